@@ -14,6 +14,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
 from stickslip.errors import InputError
 from stickslip.harmonic import balance as balance_module
+from stickslip.harmonic import shared_factor as shared_factor_module
 from stickslip.harmonic import structured as structured_module
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -22,6 +23,7 @@ from stickslip.harmonic.factors import factorise
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
+from stickslip.harmonic.shared_factor import SharedFactor
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
@@ -361,6 +363,67 @@ def test_preconditioner_holds_all_below_the_harmonics(relative):
     v = np.random.default_rng(2).standard_normal(x.size)
     assert np.linalg.norm(np.where(lower, jac.dense(), 0.0)) > 0.01 * np.linalg.norm(own)
     assert_same(solve(expected @ v), v, 1e-11)
+
+
+# ---- one factor for all harmonics -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def shared(monkeypatch):
+    monkeypatch.setattr(structured_module, "SHARED", 0)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_solution_by_a_shared_factor_is_that_of_lu(name, shared):
+    balance, x = state(name, relative=False)
+    at = balance.linearise(x, OMEGA)
+    exact = dense_solution(at.jac, -at.residual)
+    for tolerance in (1e-2, 1e-11):
+        krylov = Krylov(tolerance=tolerance)
+        found = krylov.solve(at.jac, -at.residual)
+        left = np.linalg.norm(at.jac.matvec(found) + at.residual) / np.linalg.norm(at.residual)
+        assert left <= 2.01 * tolerance  # of the second pass; see ROUNDING
+        assert krylov.counts.failures == 0
+        np.testing.assert_array_equal(
+            Krylov(tolerance=tolerance).solve(at.jac, -at.residual), found
+        )
+    assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+    kept = at.jac.preconditioner()
+    assert isinstance(kept, SharedFactor)
+    assert kept.factor.lu.dtype == np.float32
+
+
+@pytest.mark.parametrize("at_other", [OMEGA, 1.3 * OMEGA])
+def test_shared_factor_with_all_modes_is_exact_at_every_frequency(at_other, shared, monkeypatch):
+    monkeypatch.setattr(shared_factor_module, "LEAST_MODES", 1000)
+    monkeypatch.setattr(shared_factor_module, "MOST_MODES", 1)
+    balance, x = state("stick")
+    kept = balance.linearise(x, OMEGA).jac.preconditioner()
+    jac = balance.linearise(x, at_other).jac
+    solve, _ = jac.preconditioned_by(kept)
+    assert_same(solve(jac.matvec(x)), x, 1e-10)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_transposed_system_takes_the_shared_factor(name, shared):
+    balance, x = state(name, relative=False)
+    jac = balance.linearise(x, OMEGA).jac
+    kept = jac.preconditioner()
+    a, b = np.random.default_rng(7).standard_normal((2, x.size))
+    solve, _ = jac.preconditioned_by(kept)
+    back, _ = jac.transposed.preconditioned_by(kept)
+    # <P⁻¹ a, b> = <a, P⁻ᵀ b>, in single precision
+    assert abs(solve(a) @ b - a @ back(b)) <= 1e-5 * np.linalg.norm(solve(a)) * np.linalg.norm(b)
+    found = Krylov(tolerance=1e-11).solve(jac.transposed, a)
+    exact = np.linalg.solve(jac.dense().T, a)
+    assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+
+
+def test_shared_factor_turns_to_double_precision_where_single_tells_too_little(shared, monkeypatch):
+    monkeypatch.setattr(shared_factor_module, "SHARP", 1e-10)
+    balance, x = state("lift-off")
+    kept = balance.linearise(x, OMEGA).jac.preconditioner()
+    assert kept.factor.lu.dtype == np.float64
 
 
 @pytest.mark.parametrize("name", STATES)

@@ -208,7 +208,7 @@ def add_stiffness(
     stiffness: FloatArray | ComplexArray,
     columns: IntArray,
     values: FloatArray,
-    out: ComplexArray,
+    out: FloatArray | ComplexArray,
 ) -> None:
     """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` a contact.
 

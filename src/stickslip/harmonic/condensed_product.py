@@ -4,7 +4,7 @@
 condensation; one harmonic at a time is formed where it is to be factorised.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -88,6 +88,43 @@ class CondensedProduct:
         slope = _slope(near, s) - _slope(back, s)
         slope -= _dynamic(_back(self.linear, turned), s)
         return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope, self.harmonics)
+
+    def static(self) -> FloatArray:
+        """Return ``Z_0``, (n, n)."""
+        return np.asarray(self.linear.nn[0] - self.linear.nl[0] @ self.linear.far[0].T)
+
+    def mass_product(self, vectors: FloatArray) -> FloatArray:
+        """Return the mass times `vectors` (n, k), the interior, whose stiffness is one, following them statically."""
+        k, _, m = self.linear.nl
+        moved = k.T @ vectors
+        inner = m.T @ vectors - self.linear.ll[2] @ moved
+        return np.asarray(self.linear.nn[2] @ vectors - m @ moved - k @ inner)
+
+    def projected(self, vectors: FloatArray) -> "CondensedProduct":
+        """Return the same seen from motions of the retained coordinates alone, the columns of `vectors` (n, k), without a load."""
+        own, none = self.linear, np.zeros((len(self.load), vectors.shape[1]))
+
+        def near(matrix: FloatArray) -> FloatArray:
+            return np.asarray(vectors.T @ (matrix @ vectors))
+
+        def across(matrix: FloatArray) -> FloatArray:
+            return np.asarray(vectors.T @ matrix)
+
+        (k, c, m), (to_k, to_c, to_m) = own.nn, own.nl
+        seen = replace(
+            own,
+            nn=(near(k), near(c), near(m)),
+            nl=(across(to_k), across(to_c), across(to_m)),
+            ln=None if own.ln is None else (across(own.ln[0]), across(own.ln[1]), across(own.ln[2])),
+            loss=None if own.loss is None else (near(own.loss[0]), across(own.loss[1]), own.loss[2]),
+        )  # fmt: skip
+        return replace(self, linear=seen, load=none, load_slope=none)
+
+    def moved_to(self, other: "CondensedProduct") -> "CondensedProduct":
+        """Return the same at the frequency of `other`, which has the same interior."""
+        if self.omega == other.omega:
+            return self
+        return replace(self, omega=other.omega, frequencies=other.frequencies, inner=other.inner)
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order."""
@@ -193,7 +230,11 @@ def _near(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products of the retained coordinates' own matrices."""
     k, c, m = linear.nn
     loss = None if linear.loss is None else rows @ linear.loss[0]
-    return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, loss
+    stiff, inert = rows @ k, rows @ m
+    if linear.rayleigh is not None:
+        a, b = linear.rayleigh
+        return stiff, a * stiff + b * inert, inert, loss
+    return stiff, rows @ (c if linear.ln is None else c.T), inert, loss
 
 
 def _onto(linear: Interior, rows: FloatArray) -> Lossy:

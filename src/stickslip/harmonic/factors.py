@@ -11,7 +11,7 @@ import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 
-SINGULAR = 1e-15  # smallest pivot over largest below which a matrix has no usable factors
+SINGULAR = 5.0  # roundings; smallest pivot over largest below which a matrix has no usable factors
 BLOCK = 64  # rows; blocks half or twice as large cost up to a tenth more
 
 
@@ -50,38 +50,36 @@ class Factors:
         return x
 
     def solve_transposed(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
-        """Solve with the transposed matrix and one right side (n,)."""
+        """Solve with the transposed matrix and one right side (n,) or several (n, k)."""
         x = right.copy()
-        n = x.size
+        n = len(x)
         starts = range(0, n, BLOCK)
         for inverse, first in zip(self.upper, starts, strict=True):
             last = min(first + BLOCK, n)
-            x[first:last] = x[first:last] @ inverse
-            x[last:] -= x[first:last] @ self.lu[first:last, last:]
+            x[first:last] = inverse.T @ x[first:last]
+            x[last:] -= self.lu[first:last, last:].T @ x[first:last]
         for inverse, first in zip(self.lower[::-1], starts[::-1], strict=True):
             last = min(first + BLOCK, n)
-            x[first:last] = x[first:last] @ inverse
-            x[:first] -= x[first:last] @ self.lu[first:last, :first]
+            x[first:last] = inverse.T @ x[first:last]
+            x[:first] -= self.lu[first:last, :first].T @ x[first:last]
         out = np.empty_like(x)
         out[self.order] = x
         return out
 
 
 def factorise(matrix: FloatArray | ComplexArray) -> Factors | None:
-    """Factorise a (n, n) matrix of doubles in Fortran order, which is overwritten; None if it is singular to working precision."""
-    is_complex = np.iscomplexobj(matrix)
-    lapack = scipy.linalg.lapack
-    lu, pivots, info = (lapack.zgetrf if is_complex else lapack.dgetrf)(matrix, overwrite_a=True)
+    """Factorise a (n, n) matrix in Fortran order, which is overwritten; None if it is singular to its precision."""
+    getrf, invert = scipy.linalg.get_lapack_funcs(("getrf", "trtri"), (matrix,))
+    lu, pivots, info = getrf(matrix, overwrite_a=True)
     size = np.abs(np.diagonal(lu))
-    if info != 0 or not size.min() > SINGULAR * size.max():
+    if info != 0 or not size.min() > SINGULAR * np.finfo(lu.dtype).eps * size.max():
         return None
-    invert = lapack.ztrtri if is_complex else lapack.dtrtri
     lower, upper = [], []
     for first in range(0, size.size, BLOCK):
         block = lu[first : first + BLOCK, first : first + BLOCK]
         # LAPACK takes the diagonal of the lower triangle for ones and leaves the other triangle in place
         below = np.tril(invert(block, lower=1, unitdiag=1)[0], -1)
-        lower.append(below + np.eye(len(below)))
+        lower.append(below + np.eye(len(below), dtype=below.dtype))
         upper.append(np.triu(invert(block)[0]))
     return Factors(lu, _row_order(pivots), tuple(lower), tuple(upper))
 

@@ -7,6 +7,9 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 
+PROPORTIONAL = (
+    1e-13  # share of a row's largest damping by which the sum of stiffness and mass may differ
+)
 SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
 
 
@@ -57,3 +60,16 @@ def real_symmetric(structure: Structure, name: str) -> FloatArray:
             "Coriolis terms belong into the damping; a System takes other unsymmetric matrices.",
         )
     return np.asarray(dense, dtype=float)
+
+
+def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, float] | None:
+    """Return a and b with ``c = a k + b m`` to rounding; None if there are none."""
+    own = np.stack([np.diagonal(k), np.diagonal(m)], axis=1)
+    size = np.linalg.norm(own, axis=0)
+    if not np.all(size > 0.0):
+        return None
+    a, b = np.linalg.lstsq(own / size, np.diagonal(c), rcond=None)[0] / size
+    for stiff, damped, inert in zip(k, c, m, strict=True):
+        if np.max(np.abs(a * stiff + b * inert - damped)) > PROPORTIONAL * np.max(np.abs(damped)):
+            return None
+    return float(a), float(b)

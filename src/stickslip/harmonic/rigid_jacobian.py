@@ -187,17 +187,21 @@ class RigidJacobian:
         """Return how to solve ``P x = y``, and ``J v`` as a function of v and ``P v``."""
         return lambda right: self._sweep(kept, right), lambda v, _: self.matvec(v)
 
-    def solve_transposed(self, kept: RigidFactors, right: FloatArray) -> FloatArray:
-        """Solve with the transpose of what each harmonic does to itself."""
-        rows = self._by_row(right).copy()
-        for h, factors in enumerate(kept.factors):
-            if h == 0:
-                rows[0] = factors.solve_transposed(rows[0])
-                continue
-            # the transpose of a real form is that of the conjugate transpose
-            solved = factors.solve_transposed(rows[2 * h - 1] + 1j * rows[2 * h])
-            rows[2 * h - 1], rows[2 * h] = solved.real, solved.imag
-        return rows.reshape(-1)
+    def transposed_solve(self, kept: RigidFactors) -> Solve:
+        """Return how to solve with the transpose of what each harmonic does to itself."""
+
+        def solve(right: FloatArray) -> FloatArray:
+            rows = self._by_row(right).copy()
+            for h, factors in enumerate(kept.factors):
+                if h == 0:
+                    rows[0] = factors.solve_transposed(rows[0])
+                    continue
+                # the transpose of a real form is that of the conjugate transpose
+                solved = factors.solve_transposed(rows[2 * h - 1] + 1j * rows[2 * h])
+                rows[2 * h - 1], rows[2 * h] = solved.real, solved.imag
+            return rows.reshape(-1)
+
+        return solve
 
     def _sweep(self, kept: RigidFactors, right: FloatArray) -> FloatArray:
         """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts."""

@@ -16,6 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.matrices import shares_of_two
 
 Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
@@ -196,6 +197,11 @@ class Interior:
     def far(self) -> Blocks:
         """Transposed blocks from the retained coordinates to the forces on the interior."""
         return self.nl if self.ln is None else self.ln
+
+    @cached_property
+    def rayleigh(self) -> tuple[float, float] | None:
+        """The shares of stiffness and mass that make up the damping of the retained coordinates; None where it is made of more."""
+        return None if self.ln is not None else shares_of_two(*self.nn)
 
     @cached_property
     def transposed(self) -> "Interior":

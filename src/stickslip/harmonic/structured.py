@@ -1,7 +1,7 @@
 """The Jacobian of the harmonic balance as what it is made of, and the preconditioner that this suggests.
 
 ``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``D_h = Z_h + K̂ʰʰ``, one
-complex matrix a harmonic, therefore precondition the whole. From the lowest harmonic to the highest, each is solved with what those below
+complex matrix a harmonic or one real one for all of them (`harmonic.shared_factor`), therefore precondition the whole. From the lowest harmonic to the highest, each is solved with what those below
 it do at the contacts: block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``, which halves the iterations of D alone and costs no factors. With
 ``J = P + Bᵀ(K̂ - K_P)B`` no product with Z is needed where D was made at the same frequency.
 """
@@ -23,8 +23,10 @@ from stickslip.contact.product import (
     subtract_lower,
     sweep,
 )
+from stickslip.harmonic.condensed_product import CondensedProduct
 from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.linear import Products
+from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
 from stickslip.harmonic.small_blocks import (
     SMALL,
     SmallBlocks,
@@ -32,6 +34,8 @@ from stickslip.harmonic.small_blocks import (
     small_blocks,
 )
 from stickslip.operators import JacobianOperator
+
+SHARED = 150  # unknowns a harmonic from which one factor for all harmonics costs less than one each
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -57,6 +61,24 @@ class HarmonicFactors:
     means: ComplexArray
     factors: tuple[Factors, ...]
     inverses: SmallBlocks | None
+
+    def solve(self, place: int, rows: FloatArray) -> FloatArray:
+        """Solve harmonic number `place` for its one or two rows (k, n)."""
+        if place == 0:
+            return np.asarray(self.factors[0].solve(rows[0]), dtype=float)[None]
+        solved = self.factors[place].solve(rows[0] - 1j * rows[1])
+        return np.stack([solved.real, -solved.imag])
+
+    def solve_transposed(self, place: int, rows: FloatArray) -> FloatArray:
+        """Solve with the transpose of the real form of harmonic number `place`."""
+        if place == 0:
+            return np.asarray(self.factors[0].solve_transposed(rows[0]), dtype=float)[None]
+        # the transpose of a real form is that of the conjugate transpose
+        solved = self.factors[place].solve_transposed(rows[0] + 1j * rows[1])
+        return np.stack([solved.real, solved.imag])
+
+
+Kept = HarmonicFactors | SharedFactor
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +147,12 @@ class StructuredJacobian:
             block *= self.scale
             yield mean, block
 
-    def preconditioner(self) -> HarmonicFactors | None:
-        """Return the factors of ``Z_h + K̂ʰʰ``; None where one of the matrices is singular."""
+    def preconditioner(self) -> Kept | None:
+        """Return one factor for all harmonics where the structure allows it, else those of ``Z_h + K̂ʰʰ``; None where a matrix is singular."""
+        if isinstance(self.linear, CondensedProduct) and self.linear.n >= SHARED:
+            shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
+            if shared is not None:
+                return shared
         factors, means = [], []
         for h, (mean, matrix) in enumerate(self.own_blocks()):
             own = factorise(np.array(matrix.real, order="F") if h == 0 else matrix)
@@ -140,13 +166,14 @@ class StructuredJacobian:
             inverses = small_blocks([np.asarray(own.solve(unit), dtype=complex) for own in factors])
         return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)
 
-    def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
+    def preconditioned_by(self, kept: Kept) -> tuple[Solve, Product]:
         """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        own = self._inverses(kept)
 
         def solve(right: FloatArray) -> FloatArray:
-            return self._sweep(kept, right)
+            return self._sweep(own, right)
 
-        if not self.linear.same(kept.linear):
+        if not isinstance(kept, HarmonicFactors) or not self.linear.same(kept.linear):
             return solve, lambda v, _: self.matvec(v)
         left = less_means(self.blocks, kept.means)
         for h in range(1, len(self.linear.harmonics)):
@@ -160,45 +187,52 @@ class StructuredJacobian:
 
         return solve, product
 
-    def solve_transposed(self, kept: HarmonicFactors, right: FloatArray) -> FloatArray:
-        """Solve ``Pᵀ x = y`` harmonic by harmonic, from the highest one down."""
-        rows = self._by_row(right).copy()
-        for h in range(len(kept.factors) - 1, -1, -1):
-            first, last = max(2 * h - 1, 0), 2 * h + 1
-            if h == 0:
-                rows[0] = kept.factors[0].solve_transposed(rows[0])
-                break
-            # the transpose of a real form is that of the conjugate transpose
-            solved = kept.factors[h].solve_transposed(rows[first] + 1j * rows[first + 1])
-            rows[first], rows[first + 1] = solved.real, solved.imag
-            gap = self.rows.gaps(rows[first:last]).reshape(2, -1, 3)
-            force = np.zeros((first, *gap.shape[1:]))
-            for block, (row, col) in enumerate(PAIRS[: self.blocks.shape[1]]):
-                force[:, :, col] += np.einsum(
-                    "cpq,pc->qc", self.blocks[:, block, first:last, :first], gap[:, :, row]
-                )
-            self.rows.add_forces(-self.scale * force.reshape(first, -1), rows[:first])
-        return rows.reshape(-1)
+    def transposed_solve(self, kept: Kept) -> Solve:
+        """Return how to solve ``Pᵀ x = y``: harmonic by harmonic, from the highest one down."""
+        own = self._inverses(kept)
 
-    def _sweep(self, kept: HarmonicFactors, right: FloatArray) -> FloatArray:
+        def solve(right: FloatArray) -> FloatArray:
+            rows = self._by_row(right).copy()
+            for h in range(len(self.linear.harmonics) - 1, -1, -1):
+                first, last = max(2 * h - 1, 0), 2 * h + 1
+                rows[first:last] = own.solve_transposed(h, rows[first:last])
+                if h > 0:
+                    self._subtract_from_lower(rows, first, last)
+            return rows.reshape(-1)
+
+        return solve
+
+    def _subtract_from_lower(self, rows: FloatArray, first: int, last: int) -> None:
+        """Subtract what the transposed coupling makes of the rows from `first` to `last` from those before them."""
+        gap = self.rows.gaps(rows[first:last]).reshape(2, -1, 3)
+        force = np.zeros((first, *gap.shape[1:]))
+        for block, (row, col) in enumerate(PAIRS[: self.blocks.shape[1]]):
+            force[:, :, col] += np.einsum(
+                "cpq,pc->qc", self.blocks[:, block, first:last, :first], gap[:, :, row]
+            )
+        self.rows.add_forces(-self.scale * force.reshape(first, -1), rows[:first])
+
+    def _inverses(self, kept: Kept) -> HarmonicFactors | SharedInverses:
+        if isinstance(kept, HarmonicFactors):
+            return kept
+        assert isinstance(self.linear, CondensedProduct)  # it made what was kept
+        return kept.of(self.linear, harmonic_means(self.blocks), self.scale)
+
+    def _sweep(self, own: HarmonicFactors | SharedInverses, right: FloatArray) -> FloatArray:
         """Solve harmonic by harmonic, from the static one up."""
         rows = self._by_row(right).copy()
         gap = np.zeros((len(self.blocks), 3, len(rows)))
-        if kept.inverses is not None:
+        if isinstance(own, HarmonicFactors) and own.inverses is not None:
             out = np.empty_like(rows)
             sweep(
-                kept.inverses.real, kept.inverses.imaginary, self.blocks, self.rows.columns, self.rows.values, self.scale, rows, gap, out
+                own.inverses.real, own.inverses.imaginary, self.blocks, self.rows.columns, self.rows.values, self.scale, rows, gap, out
             )  # fmt: skip
             return out.reshape(-1)
         before = first = 0
-        for h, factors in enumerate(kept.factors):
+        for h in range(len(self.linear.harmonics)):
             last = 2 * h + 1
             self.subtract_below((before, first, last), gap, rows)
-            if h == 0:
-                rows[0] = factors.solve(rows[0])
-            else:
-                solved = factors.solve(rows[first] - 1j * rows[first + 1])
-                rows[first], rows[first + 1] = solved.real, -solved.imag
+            rows[first:last] = own.solve(h, rows[first:last])
             before, first = first, last
         return rows.reshape(-1)
 
@@ -229,7 +263,7 @@ class Transposable(JacobianOperator, Protocol):
 
     def preconditioner(self) -> Any: ...  # noqa: D102
 
-    def solve_transposed(self, kept: Any, right: FloatArray) -> FloatArray: ...  # noqa: D102
+    def transposed_solve(self, kept: Any) -> Solve: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,11 +296,7 @@ class Transposed:
 
     def preconditioned_by(self, kept: Any) -> tuple[Solve, Product]:
         """Return how to solve ``Pᵀ x = y``, and ``Jᵀ v``."""
-
-        def solve(right: FloatArray) -> FloatArray:
-            return self.transposed.solve_transposed(kept, right)
-
-        return solve, lambda v, _: self.matvec(v)
+        return self.transposed.transposed_solve(kept), lambda v, _: self.matvec(v)
 
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:

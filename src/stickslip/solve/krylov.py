@@ -158,13 +158,14 @@ class Krylov:
     ) -> tuple[FloatArray, float]:
         """Return a solution and its relative residual, which is `tolerance` where that was reached.
 
-        Inside a border a matrix may be singular, and its preconditioner with it. Large numbers then cancel in every product, and the
-        iteration ends at their rounding: what the residual of its solution asks for is added as long as that helps.
+        A preconditioner in single precision is linear to that precision only, and inside a border a matrix may be singular, and its
+        preconditioner with it, so that large numbers cancel in every product. The iteration then ends at that rounding: what the
+        residual of its solution asks for is added as long as that helps.
         """
         before = self.counts.products
         solution, left = self._iterate(jac, kept, right, tolerance)
         kept.took(self.counts.products - before, tolerance)
-        if not isinstance(jac, Bordered) or tolerance > COARSE:
+        if tolerance > COARSE:
             return solution, left
         size, best = float(np.linalg.norm(right)), np.inf
         while True:
