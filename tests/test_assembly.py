@@ -210,10 +210,8 @@ def test_what_is_wrong_with_a_model_is_named():
         "is no sector of a wheel",
         contacts={"a": replace(one, between=("chain.m1", "next.chain.m2"))},
     )
-    refused(
-        "contact.a.acts: is missing",
-        contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)},
-    )
+    with pytest.raises(InputError, match=r"contact.a.acts: is missing"):  # before anything is asked
+        replace(model, contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)})
     refused(
         r"contact.a.gap_m: is given, and the law jenkins has a normal force that does not depend on how far",
         contacts={"a": replace(one, between=("chain.m1", "ground"), gap=1e-3)},

@@ -243,6 +243,20 @@ def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
     assert "contact.left" in str(refused.value)
 
 
+def test_a_point_beyond_the_rim_is_told_so_and_how_much_the_tolerance_has_to_be(
+    tmp_path: Path,
+) -> None:
+    along = '[{ move_m = [0.0, 0.0125, 0.3186346] }, { turn_deg = 5.0, axis = "y" }]'
+    with pytest.raises(InputError) as error:
+        check_study(read_study(write(tmp_path, {"part.damper.placed": along})))
+    told = str(error.value)
+    assert "they stand beyond its rim: node 2 at" in told
+    assert re.search(r" 0\.00183 m off\. Give tolerance_m = ten times the largest", told)
+    wide = {f"contact.{side}.tolerance_m": "0.0184" for side in ("left", "right")}
+    wide["part.damper.placed"] = along
+    assert len(read_study(write(tmp_path / "wide", FEW | wide)).model().pairs.names) == 8
+
+
 def test_a_damper_far_from_its_blades_is_told_how_far(tmp_path: Path) -> None:
     away = '[{ move_m = [0.3, 0.0, 0.3186346] }, { turn_deg = 5.0, axis = "y" }]'
     study = read_study(write(tmp_path, {"part.damper.placed": away}))

@@ -26,6 +26,7 @@ OFF = 1e-3  # of a facet's radius: what surfaces that touch may be off everywher
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
 FLAT = 1e-9  # part of a motion along a normal that is rounding
 MEET_FACETS = 'Give pairing = "node_to_segment": each point of a rigid body meets a facet'
+TENFOLD = "ten times the largest of these distances or more"  # a node may stand a tenth of the tolerance beyond a rim
 NAMED = 5  # points that a message names
 Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
 
@@ -212,6 +213,25 @@ def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
     )
 
 
+def refuse_contacts_of_dofs(places: Places, contacts: Mapping[str, Contact]) -> None:
+    """Refuse contacts of single dofs of matrices that do not say how they act; those of meshes are looked at when they are paired."""
+    for name, contact in contacts.items():
+        part = places.parts.get(contact.between[0].partition(".")[0])
+        if contact.acts is None and part is not None and part.mesh is None and part.body is None:
+            spot = places.spot(contact.between[0], f"contact.{name}.between")
+            refuse_without_direction(name, contact, spot)
+
+
+def refuse_without_direction(name: str, contact: Contact, first: Spot) -> None:
+    """Refuse a contact of single dofs that does not say what their motion is to it."""
+    if contact.acts is None and first.surface is None:
+        raise input_error(
+            f"contact.{name}.acts",
+            f"is missing: {first.name!r} is a single dof, which has no normal",
+            'Say what its relative motion is to the contact: acts = "normal" or "tangential".',
+        )
+
+
 def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -> InputError:
     """Return an error of two surfaces of which one finds no partner, with the set of the second part that lies nearer."""
     assert second.surface is not None
@@ -251,8 +271,8 @@ def named(
         found = pair()
     except InputError as error:
         one, two = contact.between
-        told = error.called({"reach": "tolerance"})
-        if surfaces is not None and contact.pairing != "node_to_node":
+        told = error.called({"reach": "tolerance", "rim": f"tolerance = {TENFOLD}"})
+        if surfaces is not None and contact.pairing != "node_to_node" and "rim" not in error.words:
             a, b = (side.points[side.used] for side in surfaces)
             nearest = float(cKDTree(b).query(a)[0].min())
             problem = (

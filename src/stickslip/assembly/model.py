@@ -12,7 +12,7 @@ from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
-from stickslip.assembly.facing import refuse_joined
+from stickslip.assembly.facing import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
 from stickslip.assembly.load import Load, Output, refuse_second
 from stickslip.assembly.loose import without_bodies
@@ -115,6 +115,7 @@ class Model:
                     name, "is of one wheel, and a join couples several", "Leave one out."
                 )
             one.require(self.sectors)
+        refuse_contacts_of_dofs(self.places, self.contacts)
 
     def __repr__(self) -> str:
         """Return what it is in a line."""

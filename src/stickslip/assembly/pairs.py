@@ -15,6 +15,7 @@ from stickslip.assembly.facing import (
     overlap_warning,
     refuse_averted,
     refuse_held,
+    refuse_without_direction,
     refuse_without_facets,
     rim_warning,
     tilt_warning,
@@ -329,12 +330,8 @@ def _single_dofs(
             f"{contact.between[0]!r} is not of the kind of {contact.between[1]!r}: single dofs and points, or of another number",
             "Pair single dofs with as many single dofs or the ground.",
         )
-    if contact.acts is None:
-        raise input_error(
-            f"{key}.acts",
-            f"is missing: {first.name!r} is a single dof, which has no normal",
-            'Say what its relative motion is to the contact: acts = "normal" or "tangential".',
-        )
+    refuse_without_direction(name, contact, first)
+    assert contact.acts is not None
     _refuse_unused(key, contact)
     p, n = len(one), places.n
     row = 3 * np.arange(p) + ROWS[contact.acts]

@@ -191,9 +191,15 @@ def node_to_segment(
     feet = project(a.points[nodes], outward, b, reach)
     lost = feet.overhang > tolerance
     if lost.any() and (outside == "error" or lost.all()):
-        beyond = np.where(np.isfinite(feet.overhang), feet.overhang, np.inf)
+        beyond = feet.overhang[lost]
+        if np.isfinite(beyond).all():
+            raise _without_partner(
+                "node_to_segment", a, nodes[lost], beyond, "facet of side B under them: they stand beyond its rim",
+                "Give $rim, or make side B the larger one$outside.",
+                rim="a tolerance of the largest of these distances, or more",
+            )  # fmt: skip
         raise _without_partner(
-            "node_to_segment", a, nodes[lost], beyond[lost],
+            "node_to_segment", a, nodes[lost], beyond,
             f"facet of side B that faces them within {reach:.3g} m",
             "Check that both sides' normals point outward, raise $reach, or make side B the larger one$outside.",
             reach="reach or tolerance",

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
+from stickslip.assembly.facing import TENFOLD
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES
@@ -267,7 +268,8 @@ def of_task(study: Study, case: Case) -> Iterator[None]:
         yield
     except InputError as error:
         place = f"{study.path} ({case.label})" if case.label else str(study.path)
-        raise error.called({"outside": "", "reach": "tolerance_m"}).inside(place) from None
+        words = {"outside": "", "reach": "tolerance_m", "rim": f"tolerance_m = {TENFOLD}"}
+        raise error.called(words).inside(place) from None
 
 
 def _inputs(study: Study, task: Task) -> Any:

@@ -62,7 +62,8 @@ class Pair(Section):
     )
     tolerance_m: Positive | None = Field(
         None,
-        description="distance of partners node to node, reach of a segment, in m; left out: that of the pairing",
+        description="distance of partners node to node, reach of a segment, in m; a node may stand a tenth of it beyond the rim of a "
+        "segment; left out: that of the pairing, and nothing beyond the rim",
     )
 
     @field_validator("between")
