@@ -15,6 +15,8 @@ from stickslip.response.time.time_step import StepOperators
 
 FAST = 10.0  # times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
 
+COUPLED = 1e-12  # of a mode's motion that a step gives to another: less is rounding
+
 
 class PeriodicLoad(Protocol):
     """Any load ``f(t) = static + Re Σ_h harmonics[h] e^{ihωt}``, N."""
@@ -143,8 +145,18 @@ def step_operators(
         np.ascontiguousarray((seen @ hold).T),
         np.ascontiguousarray(seen[:k, :n]),
         np.ascontiguousarray(seen[k:, n:]),
+        _turn(exponential[:, :m]),
     )
     return operators, modes, springs
+
+
+def _turn(step: FloatArray) -> FloatArray:
+    """Return the (4, n) parts of a step (2n, 2n) of the motion that act within a mode; (0, n) where modes move each other."""
+    n = len(step) // 2
+    parts = [step[a : a + n, b : b + n] for a in (0, n) for b in (0, n)]
+    if any(np.any(np.abs(part - np.diag(np.diag(part))) > COUPLED) for part in parts):
+        return np.zeros((0, n))
+    return np.array([np.diag(part) for part in parts])
 
 
 def _motion_matrix(

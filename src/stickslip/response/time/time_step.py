@@ -29,8 +29,9 @@ from stickslip.response.time.contact_step import (
 )
 from stickslip.response.time.step_newton import (
     back_substitute,
-    factor,
-    newton_matrix,
+    dot,
+    factor_anew,
+    factor_slopes,
     newton_work,
     slopes,
 )
@@ -49,6 +50,7 @@ class StepOperators(NamedTuple):
     response: FloatArray  # (k, 2k), transposed: r at the end of the step -> gaps and rates
     gaps: FloatArray  # (k, m/2): displacements -> gaps
     rates: FloatArray  # (k, m/2): velocities -> rates of the gaps
+    turn: FloatArray  # (4, m/2): the motion's part of `transfer` where no mode moves another: q by q and w, w by q and w; else without rows
 
 
 class StepLog(NamedTuple):
@@ -64,6 +66,24 @@ BEGIN, FIRST, STEPS, LOGS, TAKEN, FAILED, ROWS = range(7)
 
 
 @inner
+def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
+    """``out += matrixᵀ x`` of as many columns as there is room for: plain loops, because calling a threaded BLAS costs more than it saves at this size."""
+    whole = x.size - x.size % 4
+    for j in range(0, whole, 4):
+        a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
+        for i in range(out.size):
+            out[i] += (
+                matrix[j, i] * a
+                + matrix[j + 1, i] * b
+                + matrix[j + 2, i] * c
+                + matrix[j + 3, i] * d
+            )
+    for j in range(whole, x.size):
+        for i in range(out.size):
+            out[i] += matrix[j, i] * x[j]
+
+
+@inner
 def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
     """Write how far r at the iterate is from what the laws answer; return the largest change of a gap that this makes."""
     k, largest = work.r.size, 0.0
@@ -73,10 +93,7 @@ def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
             return np.inf
     for i in range(k):
         work.moves[i] = 0.0
-    for j in range(k):
-        defect = work.defect[j]
-        for i in range(k):
-            work.moves[i] += ops.response[j, i] * defect
+    _accumulate(ops.response, work.defect, work.moves)
     for i in range(k):
         largest = max(largest, abs(work.moves[i]))
     return largest
@@ -89,12 +106,7 @@ def _at_guess(ops, laws, work):  # type: ignore[no-untyped-def]
     for i in range(k):
         laws.seen[GAP, i], laws.seen[RATE, i] = work.free[i], work.free[k + i]
         scale = max(scale, abs(work.free[i]))
-    for j in range(k):
-        r = work.r[j]
-        if r != 0.0:
-            for i in range(k):
-                laws.seen[GAP, i] += ops.response[j, i] * r
-                laws.seen[RATE, i] += ops.response[j, k + i] * r
+    _accumulate(ops.response, work.r, laws.seen.reshape(3 * k)[: 2 * k])  # rows of gaps and rates
     for i in range(k):
         scale = max(scale, abs(laws.seen[GAP, i]))
     return scale
@@ -133,8 +145,7 @@ def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
         closed = state.status[i // 3, 0] != OPEN
         work.slope[i, i % 3] = (table.stuck[i] if closed else 0.0) - table.springs[i]
         work.r[i] = state.x[m + i]
-    newton_matrix(ops, work)
-    factor(work)
+    factor_anew(ops, work)
 
 
 @inner
@@ -158,8 +169,7 @@ def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-u
         if largest == np.inf:
             return False
         if not slopes(table, laws, work):
-            newton_matrix(ops, work)
-            factor(work)
+            factor_slopes(ops, work)
         back_substitute(work)
         length = 1.0 if iteration < 2 * FULL_STEPS else 0.5
         for i in range(work.r.size):
@@ -168,21 +178,12 @@ def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-u
 
 
 @inner
-def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
-    """``out += matrixᵀ x``: plain loops, because calling a threaded BLAS costs more than it saves at this size."""
-    whole = x.size - x.size % 4
-    for j in range(0, whole, 4):
-        a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
-        for i in range(out.size):
-            out[i] += (
-                matrix[j, i] * a
-                + matrix[j + 1, i] * b
-                + matrix[j + 2, i] * c
-                + matrix[j + 3, i] * d
-            )
-    for j in range(whole, x.size):
-        for i in range(out.size):
-            out[i] += matrix[j, i] * x[j]
+def _turn(turn, x, out):  # type: ignore[no-untyped-def]
+    """Add what the motion of each mode alone comes to."""
+    n = turn.shape[1]
+    for j in range(n):
+        out[j] += turn[0, j] * x[j] + turn[1, j] * x[n + j]
+        out[n + j] += turn[2, j] * x[j] + turn[3, j] * x[n + j]
 
 
 @inner
@@ -239,13 +240,13 @@ def _predict(ops, state, work, step):  # type: ignore[no-untyped-def]
     n, k, moved, free = ops.gaps.shape[1], work.r.size, work.moved, work.free
     for j in range(moved.size):
         moved[j] = ops.drive[step, j]
-    _accumulate(ops.transfer, state.x, moved)
+    if ops.turn.shape[0] == 0:
+        _accumulate(ops.transfer, state.x, moved)
+    else:
+        _turn(ops.turn, state.x, moved)
+        _accumulate(ops.transfer[2 * n :], state.x[2 * n :], moved)
     for i in range(k):
-        gap, rate = 0.0, 0.0
-        for j in range(n):
-            gap += ops.gaps[i, j] * moved[j]
-            rate += ops.rates[i, j] * moved[n + j]
-        free[i], free[k + i] = gap, rate
+        free[i], free[k + i] = dot(ops.gaps[i], moved[:n]), dot(ops.rates[i], moved[n:])
         work.r[i] = state.x[2 * n + i]
 
 
@@ -293,7 +294,7 @@ def run_steps() -> Any:
     type_of: Any = typeof
     tuples = (
         named((table, vector, vector, vector, vector), ContactTable),
-        alike(matrix, 6, StepOperators),
+        alike(matrix, 7, StepOperators),
         named((vector, matrix, vector, table), StepState),
         type_of(law_work(0, 0, 0)),
         type_of(newton_work(0, 0)),
