@@ -10,22 +10,22 @@ from evidence.figures.timing import LEAST
 
 HEAD = """# The figures of Gastaldi and Berruti
 
-Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make figures` draws the counterparts of their figures for this
-package's own two blades and judges every statement that they make about them on the case that tests it. Numbers, verdicts and reasons are written by that command.
+This page is for readers of the paper: does what it says hold for an open case? Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make figures` draws the counterparts of their figures for this
+package's own two blades. It judges every statement of the paper about its figures on the case that tests it, and writes numbers, verdicts and reasons.
 
 - **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz): {first}.
 - **Figures 9 to 11** ({mode}, {second_hertz[0]:g} to {second_hertz[1]:g} Hz): {second}.
 
-Both on the meshes of these studies. The paper leaves dimensions, masses and damping open: both cases were searched for so that they do part of what it tells (`make reconstruction`, {{doc}}`second_damper`). A row that such a search asked for shows that a case like that exists, and is no test of the paper. The alert is the
+Both are on the meshes of these studies. The paper leaves dimensions, masses and damping open. A search chose both cases so that they show part of its findings (`make reconstruction`, {{doc}}`second_damper`). A row that was a goal of this search shows that such a case exists; it is no test of the paper. The alert is the
 published rule (`jacobian_alert`, threshold 5 %), not this package's default, and the harmonics of the repeats are the published five. Time integration is shooting with {steps} steps a period, begun at the balance with five
 harmonics, and plain integration where shooting fails. The paper compares with it at {paper:g}; here it is {in_time}. A motion is given up after {patience} periods there.
 
-**How it is judged.** *Holds* and *does not hold* compare the numbers of a row; the reason of what does not hold is computed, too. *Not tested*: the case does not do what the statement is about, and the row says what is missing.
+**How it is judged.** *Holds* and *does not hold* compare the numbers of a row; the reason why a statement does not hold is computed, too. *Not tested*: the case lacks the subject of the statement, and the row says what is missing.
 *Undecided*: the limit lies within the spread of the times, counts and times disagree, or the paper can be read in two ways that differ. Costs are counts, which are the same in every run, and CPU times of one core ({seconds:.0f} s for the
-whole command), medians of {repeats} interleaved repeats with their quartiles, at least {least:.0f} % to either side, since medians of whole runs differ by as much on a busy machine. What the paper says twice is one row; what is wrong in its own arithmetic stands in {{doc}}`misprints`.
+whole command), medians of {repeats} interleaved repeats with their quartiles, at least {least:.0f} % to either side, since medians of whole runs differ by as much on a busy machine. A statement that the paper makes twice is one row. Errors in its own arithmetic are in {{doc}}`misprints`.
 
-Numbers for two blades at the same ratio differ from page to page: here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost`
-and {{doc}}`strategies` say what theirs are of.
+Numbers for two blades at the same ratio differ from page to page. Here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost`
+and {{doc}}`strategies` give theirs.
 
 **{tally}, of {count} statements.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
 """

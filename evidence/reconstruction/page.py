@@ -58,17 +58,17 @@ def _head(number: int, full: int) -> list[str]:
         "# A closer reconstruction of the paper's case\n",
         "*Written by `make reconstruction`; do not edit.*\n",
         (
-            "Gastaldi & Berruti {cite}`gastaldi2017` give stiffnesses, friction, pull, angles of 45° and what they found, not their blades and damper. What they leave open decides more than "
-            f"physics. `evidence/reconstruction` varies it and asks of each choice which of the paper's statements it *tests* and shows. Tried are damping ratios of {damping} %, places of the force "
+            "Gastaldi & Berruti {cite}`gastaldi2017` give stiffnesses, friction, pull, angles of 45° and their findings, but not their blades and damper. The open quantities decide more than "
+            f"physics. This page shows which choices agree best with the paper, and why `examples/two_blades` is one of them. `evidence/reconstruction` varies the open quantities and asks of each choice which of the paper's statements it *tests* and shows. It tries damping ratios of {damping} %, places of the force "
             f"(`force_span` {places}: airfoil's hub, and down the shank), L1 and L2 {lines} mm from the apex, angles of the curved side's underside of {angles}°, and dampers of steel and of titanium, "
             "full prisms of 40 mm with the section that lines and angles give. Elements are "
             f"{COARSER:g} times as large as the example's; responses have {FREQUENCIES} frequencies from {HERTZ[0]:g} to {HERTZ[1]:g} Hz.\n"
         ),
         (
-            "**Both lines of the flat side are to carry load while R slips.** The pull, the flat side's resultant and the curved side's meet in a point. Each leans by up to the angle of friction "
-            "to either side of its normal. That bounds where the flat side's resultant can act; a damper is taken if the bounds lie between L1 and L2. R's distance from the apex is the largest of "
-            f"{', '.join(f'{1e3 * r:g}' for r in CURVED)} mm for which they do: it shares the load best. The old example and {len(LIFTING)} dampers that break the rule are judged as well: {number} choices in all, "
-            f"by one harmonic and its predictions; the best of them and the example's, {full}, by five and eleven harmonics and in time as well.\n"
+            "**Both lines of the flat side must carry load while R slips.** The pull, the flat side's resultant and the curved side's meet in a point. Each leans by up to the angle of friction "
+            "to either side of its normal. That bounds where the flat side's resultant can act. A damper is taken if the bounds lie between L1 and L2. R's distance from the apex is the largest of "
+            f"{', '.join(f'{1e3 * r:g}' for r in CURVED)} mm for which they do, because it shares the load best. The old example and {len(LIFTING)} dampers that break the rule are judged as well: {number} choices in all, "
+            f"by one harmonic and its predictions. The best of them and the example's, {full}, are also judged by five and eleven harmonics and in time.\n"
         ),
     ]
 
@@ -79,8 +79,8 @@ def _counts(rows: Sequence[Row], both: Sequence[Row]) -> list[str]:
         among = both if word.costly else rows
         lines.append(f"| {word.text} | {sum(r['words'].get(name, False) for r in among)} of {len(among)} |")  # fmt: skip
     notes = (
-        f"\nL1 and L2 carry load if the smaller force is at least {LEAST:g} of the larger; a line stays shut if it is open for at most {100 * SHUT:g} % of the time at the peak; alarms are predicted errors above {100 * ALARM:g} %. "
-        "One harmonic is held against eleven.\n"
+        f"\nDefinitions. L1 and L2 carry load if the smaller force is at least {LEAST:g} of the larger. A line stays shut if it is open for at most {100 * SHUT:g} % of the time at the peak. Alarms are predicted errors above {100 * ALARM:g} %. "
+        "One harmonic is compared with eleven.\n"
     )
     nowhere = [WORDS[n].text for n in WORDS if not any(r["words"].get(n, False) for r in both)]
     every = max(sum(r["words"].values()) for r in both)
@@ -128,7 +128,7 @@ def _example(chosen: Row, both: Sequence[Row]) -> list[str]:
     return [
         "## The example\n",
         (
-            f"`examples/two_blades` has {keys}. On the coarse mesh it shows {own} statements, the first of the table {most}; it is number {place}. It was chosen all the same: it makes the better example. "
+            f"`examples/two_blades` has {keys}. On the coarse mesh it shows {own} statements, the first of the table {most}; it is number {place}. It was chosen all the same, because it makes the better example. "
             f"L2 carries {_share(chosen):.0f} % of what L1 does, in the others at most {max(_share(row) for row in both if row is not chosen):.0f} %. One harmonic is too low and too high in frequency at 2, as in the paper. "
             "Its optimum lies inside the ratios, and a default run trusts all nine peaks (`python -m evidence.validation shipped_example`). On its own mesh points slip at 20 as well ({doc}`seed_figures`). "
             "With the force on the shank (`force_span = -0.04`, damping 0.5 %, R at 11.5 mm, run on 23 November 2026) the smallest peak for a unit of force was that at 2, the lowest ratio: its optimum lies below.\n"

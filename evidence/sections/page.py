@@ -57,9 +57,9 @@ def _setting() -> str:
     areas = {side: 1e6 * area for side, area in patch.areas.items()}
     size = study.tables.part["blades"].platform_size_m  # type: ignore[attr-defined]
     return (
-        f"The blades and the damper of the shipped example, whose sides have {points['flat']} and {points['curved']} points. The sides touch over the depth of the "
+        f"The model is the blades and the damper of the shipped example. The damper's sides have {points['flat']} and {points['curved']} points. They touch over the depth of the "
         f"platforms, {1e3 * patch.length:g} mm; the flat one from its first line to its last, {1e3 * patch.flat[0]:g} to {1e3 * patch.flat[1]:g} mm from the apex "
-        f"({areas['flat']:.4g} mm²); the curved one is given a strip of {areas['curved'] / (1e3 * patch.length):g} mm. The stiffness per area is that of the example's whole side over "
+        f"({areas['flat']:.4g} mm²). The curved one is given a strip of {areas['curved'] / (1e3 * patch.length):g} mm. The stiffness per area is that of the example's whole side over "
         "this area. Sections stand in the middles of equal strips. One mesh serves all: points meet facets (`node_to_segment`), elements of the platforms are the "
         f"example's ({1e3 * size:g} mm), those of airfoils and feet twice as large."
     )
@@ -73,8 +73,8 @@ def _table(found: Found) -> str:
     rows.append(["order", *(", ".join(_order(s, which) for which in (0, 1)) for s in found.series)])
     return "\n".join("| " + " | ".join(row) + " |" for row in rows) + (
         f"\n\n*Amplitude and frequency of the peak, as differences from {MOST} sections, whose own values stand in their row. Order: the p with which "
-        f"differences between {FEW} and {MOST} sections are like $n^{{-p}} - {MOST}^{{-p}}$, in amplitude and frequency; – where they are not. Bending: output `tip1.x`; leaning: the same with the centre of mass, where the pull acts, a sixth of "
-        f"the length off the middle; torsion: force and output at the edge of a tip, `edge1.x`. {_lost(found)}*"
+        f"differences between {FEW} and {MOST} sections are like $n^{{-p}} - {MOST}^{{-p}}$, in amplitude and frequency; – if they are not. Bending: output `tip1.x`. Leaning: the same, with the centre of mass, where the pull acts, a sixth of "
+        f"the length off the middle. Torsion: force and output at the edge of a tip, `edge1.x`. {_lost(found)}*"
     )
 
 
@@ -162,7 +162,7 @@ def _of_lines(found: Found) -> str:
         "a load between its outer lines alone. They stand at "
         + "; ".join(_outer(n) for n in LINES)
         + f". {_between(found.resultant)} Pressed evenly, two lines in the middles of halves would make the side $1 - 1/2^2$ = 3/4 as "
-        "stiff against rocking as the area is, two at its ends three times as stiff. Lines of the flat side are therefore no matter of resolution alone: two at the ends say that "
+        "stiff against rocking as the area is, two at its ends three times as stiff. So lines of the flat side are more than a matter of resolution: two at the ends mean that "
         "the flat touches at its edges."
     )
 

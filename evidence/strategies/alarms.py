@@ -236,7 +236,7 @@ def page(found: Sequence[Source]) -> str:
             "### Missed and false alarms",
             "",
             (
-                "Every converged solution with harmonics 0 and 1 is held against the one with harmonics 0 to 10 near it. *Missed*: the true error "
+                "Every converged solution with harmonics 0 and 1 is compared with the one with harmonics 0 to 10 near it. *Missed*: the true error "
                 "exceeds 5 % and no alarm is raised (in brackets: how many of them are below 5 % against the reference, harmonics 0 to 5, so that "
                 "only more harmonics than it has could tell). *False*: an alarm at a true error of at most 5 %, and its share of the judged points. "
                 "*Silent*: nothing acts on the missing harmonics. *Divided*: solutions on both sides of 5 % exist; the nearer one counts."

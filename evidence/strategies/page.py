@@ -14,15 +14,20 @@ SMALLEST = 1e-5  # error below which digits are those of the solver
 
 BEFORE = """# All strategies on the same cases
 
-Made by `make strategies`, in one process. Every strategy goes through the same equally spaced frequencies of four cases, with harmonics 0 and 1 at the least and 0 to 5 at the most, each with the parameters it comes with: `jacobian_alert` is the rule as published, in both passages ({doc}`theory/selection`); `guarded_alert` ({doc}`theory/guarded_alert`) and `goal_oriented` ({doc}`theory/goal_oriented`) verify as it does; the other six foretell or step up ({doc}`theory/rivals`); `always_low` and `always_high` choose nothing.
+This page compares all ways of choosing harmonics on the same four cases. Read it to choose `selection`. It is made by `make strategies`, in one process. Every strategy goes through the same equally spaced frequencies, with harmonics 0 and 1 at the least and 0 to 5 at the most, and with its default parameters:
 
-What is accepted is held against the solution with harmonics 0 to 10, followed as a branch; where it is more than 5 % away from that, also against the solution with as many harmonics that Newton's method finds from it, and the smaller error counts. Errors are those of the first harmonic over all outputs (eq. 29 of {cite:t}`gastaldi2017`).
+* `jacobian_alert` is the rule as published, in both passages ({doc}`theory/selection`).
+* `guarded_alert` ({doc}`theory/guarded_alert`) and `goal_oriented` ({doc}`theory/goal_oriented`) verify as it does.
+* The other six predict the harmonics of the next frequency or raise them step by step ({doc}`theory/rivals`).
+* `always_low` and `always_high` choose nothing.
 
-Each strategy is timed once through the 49 frequencies of the two-blade cases, on the coarse mesh of `evidence/models/two_blades.toml` (elements twice as large). The same blades at the same ratio have other numbers elsewhere: {doc}`theory/alert_cost` times 20 frequencies from 165 to 184 Hz on the mesh of that study, {doc}`seed_figures` has the blades of today's `examples/two_blades`; {doc}`theory/shooting` has errors in amplitude and phase against time integration; here they are against harmonics 0 to 10, in amplitude and phase.
+An accepted solution is compared with the solution with harmonics 0 to 10, followed as a branch. If it is more than 5 % away from that, it is also compared with the solution that Newton's method finds from it with as many harmonics, and the smaller error counts. Errors are those of the first harmonic over all outputs (eq. 29 of {cite:t}`gastaldi2017`).
+
+Each strategy is timed once through the 49 frequencies of the two-blade cases, on the coarse mesh of `evidence/models/two_blades.toml` (elements twice as large). Other pages have other numbers for the same blades at the same ratio. {doc}`theory/alert_cost` times 20 frequencies from 165 to 184 Hz on the mesh of that study. {doc}`seed_figures` has the blades of today's `examples/two_blades`. {doc}`theory/shooting` has errors in amplitude and phase against time integration; here they are against harmonics 0 to 10, in amplitude and phase.
 
 * *Unknowns*: harmonic-unknowns solved, retained coordinates times real coefficients, summed over all solves, repeats and failures included. *Newton* and *CPU*: iterations and processor time. All three relative to `always_high`.
 * *At resonance*: error at the frequency where the judge has its largest amplitude; *largest*: over all frequencies.
-* *Missed*: accepted solutions with an error above 5 %. *False*: accepted solutions with more harmonics than 0 and 1, where these two would have been within 5 %. For `always_high` that is the number of frequencies at which it wastes them.
+* *Missed*: accepted solutions with an error above 5 %. *False*: accepted solutions with more harmonics than 0 and 1 although these two would have been within 5 %. For `always_high` that is the number of frequencies at which more are wasted.
 * *Not found*: frequencies without an accepted solution. *Changes*: how often the harmonics change from one frequency to the next.
 """
 
