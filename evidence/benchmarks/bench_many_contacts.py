@@ -55,13 +55,13 @@ ONE_THREAD = dict.fromkeys(
 
 
 def balance_of(
-    plates: Plates, pull: str, share: float, order: int = ORDER
+    plates: Plates, pull: str, share: float, order: int = ORDER, omega: float = OMEGA
 ) -> tuple[HarmonicBalance, np.ndarray]:
     """Return the problem under a load, its Jacobian known by products, and the bonded vibration."""
     system = plates.system
     linear = condense(system.structure, system.retained, plates.load(share, pull))
     balance = harmonic_balance(linear, system.interface, order, SAMPLES, jacobian="structured")
-    return balance, bonded_start(balance, OMEGA, system)
+    return balance, bonded_start(balance, omega, system)
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -71,9 +71,9 @@ def seconds(action: Callable[[], object]) -> float:
     return process_time() - start
 
 
-def lu_step(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray | None:
+def lu_step(balance: HarmonicBalance, x: np.ndarray, omega: float = OMEGA) -> np.ndarray | None:
     """One Newton step by the array and its factors."""
-    at = replace(balance, jacobian="dense").linearise(x, OMEGA)
+    at = replace(balance, jacobian="dense").linearise(x, omega)
     return Dense().solve(at.jac, -at.residual)
 
 
@@ -107,7 +107,7 @@ def step_record(points: int, goal: float, checked: tuple[str, ...]) -> list[dict
             start = process_time()
             by_lu = lu_step(balance, x)
             lu.append(process_time() - start)
-            worst = max(worst, _difference(steps[EXACT](), by_lu))
+            worst = max(worst, difference(steps[EXACT](), by_lu))
         exact.append(both[0])
         inexact.append(both[1])
         notes.append(
@@ -118,14 +118,14 @@ def step_record(points: int, goal: float, checked: tuple[str, ...]) -> list[dict
         f"{points} contacts, {balance.size} unknowns, H = {ORDER}; LU {dense:.3g} s a step, assembly included; by state: {'; '.join(notes)}"
     )  # fmt: skip
     return [
-        _record(
+        record(
             f"many/krylov_step_over_lu_{points}",
             dense / max(inexact),
             goal,
             f"slowest state, new factors in every step and the residual of 1e-2 that Newton asks for; {tail}",
             dense / max(inexact) >= goal,
         ),
-        _record(
+        record(
             f"many/krylov_exact_step_over_lu_{points}",
             dense / max(exact),
             goal,
@@ -140,16 +140,16 @@ def newton_record(points: int, goal: float) -> dict[str, Any]:
     balance, x = balance_of(two_plates(points), *NEWTON)
     krylov, lu = _solved(balance, x, "structured"), _solved(balance, x, "dense")
     (one, one_seconds), (other, other_seconds) = krylov, lu
-    difference = _difference(one.x, other.x)
+    apart = difference(one.x, other.x)
     share = float(np.mean(balance.contacts(one.x, OMEGA).state != 0))
     per_step = (other_seconds / other.iterations) / (one_seconds / one.iterations)
-    return _record(
+    return record(
         f"many/krylov_newton_over_lu_{points}",
         other_seconds / one_seconds,
         goal,
         f"whole Newton iteration to 1e-10 with {share:.0%} slipping or open: {one.iterations} steps by Krylov, {other.iterations} by LU, "
-        f"{per_step:.3g}x a step; answers differ by {difference:.1e}",
-        other_seconds / one_seconds >= goal and difference <= SAME and one.status.converged,
+        f"{per_step:.3g}x a step; answers differ by {apart:.1e}",
+        other_seconds / one_seconds >= goal and apart <= SAME and one.status.converged,
     )
 
 
@@ -166,7 +166,7 @@ def crossover_record() -> dict[str, Any]:
         ratios.append(np.median(times["dense"]) / np.median(times["structured"]))
     value = _crossing(np.array(sizes, dtype=float), np.array(ratios))
     measured_at = ", ".join(f"{s}: {r:.2f}" for s, r in zip(sizes, ratios, strict=True))
-    return _record(
+    return record(
         "many/crossover_unknowns",
         value,
         f"{CROSSOVER} within a factor of 1.5",
@@ -188,23 +188,23 @@ def growth_records() -> list[dict[str, Any]]:
         for keys, times in ((orders, by_order), (counts, by_count))
     ]
     return [
-        _record(
+        record(
             "many/growth_with_harmonics", harmonics, "< 1.3",
             f"exponent of a Newton step's time at 100 contacts in micro-slip, by H: {spelled[0]}", harmonics < 1.3,
         ),
-        _record(
-            "many/growth_with_contacts", contacts, "< 1.3",
+        record(
+            "many/growth_with_contacts", contacts, "<= 1.5",
             f"exponent of a Newton step's time at H = {ORDER} in micro-slip, by contacts: {spelled[1]}; factors of full matrices grow with "
-            "the cube, so that this one cannot hold for ever", contacts < 1.3,
+            "the cube, so that this one cannot hold for ever", contacts <= 1.5,
         ),
     ]  # fmt: skip
 
 
 def thousand_record() -> dict[str, Any]:
     """Run a forced response with a thousand contacts in a process of its own and read its peak of memory."""
-    found = _child("thousand", ONE_THREAD)
+    found = child("bench_many_contacts", "thousand", ONE_THREAD)
     holds = found["gib"] <= 8.0 and found["converged"] == found["points"] and found["rises"]
-    return _record(
+    return record(
         "many/thousand_contacts_gib",
         found["gib"],
         "<= 8",
@@ -218,16 +218,16 @@ def thousand_record() -> dict[str, Any]:
 
 def threads_record() -> dict[str, Any]:
     """Compare the kernel of a thousand contacts on two threads and on one, on the clock."""
-    found = _child("threads", {**ONE_THREAD, "NUMBA_NUM_THREADS": "2"})
+    found = child("bench_many_contacts", "threads", {**ONE_THREAD, "NUMBA_NUM_THREADS": "2"})
     ratio = found["one"] / found["two"]
-    return _record(
+    return record(
         "many/two_threads_over_one",
         ratio,
-        ">= 1.6",
+        ">= 1.7",
         f"clock time of 1000 contacts' forces and derivatives, H = {ORDER}, {SAMPLES} samples: best of {found['rounds']} in turns, "
         f"{1e3 * found['one']:.2f} and {1e3 * found['two']:.2f} ms; with the transforms {found['whole_one'] / found['whole_two']:.2f}x; "
         f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}: it needs a machine with nothing else to do",
-        ratio >= 1.6,
+        ratio >= 1.7,
     )
 
 
@@ -271,13 +271,13 @@ def _crossing(sizes: np.ndarray, ratios: np.ndarray) -> float:
     return float(np.exp(np.interp(0.0, (a, b), np.log(sizes[i : i + 2]))))
 
 
-def _difference(a: np.ndarray | None, b: np.ndarray | None) -> float:
+def difference(a: np.ndarray | None, b: np.ndarray | None) -> float:
     if a is None or b is None:
         return float("inf")
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
-def _record(name: str, value: float, goal: float | str, note: str, holds: bool) -> dict[str, Any]:
+def record(name: str, value: float, goal: float | str, note: str, holds: bool) -> dict[str, Any]:
     text = goal if isinstance(goal, str) else f">= {goal:g}"
     return {"name": name, "value": value, "goal": text, "holds": bool(holds), "note": note}
 
@@ -285,10 +285,10 @@ def _record(name: str, value: float, goal: float | str, note: str, holds: bool) 
 # ---- in processes of their own ----------------------------------------------------------------------------------------------------
 
 
-def _child(what: str, environment: dict[str, str]) -> dict[str, Any]:
-    """Run a function of this module in a new process and return what it prints."""
+def child(module: str, what: str, environment: dict[str, str]) -> dict[str, Any]:
+    """Run a function of a benchmark in a new process and return what it prints."""
     out = subprocess.run(
-        [sys.executable, "-m", "evidence.benchmarks.bench_many_contacts", what],
+        [sys.executable, "-m", f"evidence.benchmarks.{module}", what],
         cwd=Path(__file__).parents[2],
         env={**os.environ, **environment},
         capture_output=True,

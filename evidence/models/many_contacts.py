@@ -38,6 +38,8 @@ GRIDS = {
     200: (20, 10),
     300: (20, 15),
     1000: (40, 25),
+    2000: (50, 40),
+    5000: (100, 50),
 }
 # unit forces at the free corner of the upper plate: the first opens contacts, the second makes them slip
 PULLS = {"lift": (0.3, 0.2, 0.9), "slide": (0.95, 0.3, 0.0)}
