@@ -54,7 +54,7 @@ def kept() -> dict[str, str]:
     """Return the pages that lie in the repository, by their paths below `docs`."""
     titles = {name: title for name, (title, _) in PAGES_OF_KEYS.items()} | {"laws": "Contact laws"}
     found = {
-        f"keys/{name}.md": f"# Keys: {titles[name]}\n\n{MADE} [The study file](../study_file.md) tells what they do.\n\n{text}"
+        f"keys/{name}.md": f"# Keys: {titles[name]}\n\n{MADE} [The study file](../study_file.md) explains them.\n\n{text}"
         for name, text in {**keys(), "laws": laws()}.items()
     }
     variables = {
@@ -64,7 +64,7 @@ def kept() -> dict[str, str]:
         "model": ("the model, in modes, Campbell and SAFE diagrams and flutter", variables_of_models()),
     }  # fmt: skip
     found |= {
-        f"variables/{name}.md": f"# Variables of {title}\n\n{MADE} [Results](../results.md) tells where they stand.\n\n{text}"
+        f"variables/{name}.md": f"# Variables of {title}\n\n{MADE} [Results](../results.md) explains where they stand.\n\n{text}"
         for name, (title, text) in variables.items()
     }
     pages = {**found, "api.md": interface_by_task.interface_page()}

@@ -44,7 +44,7 @@ TASKS = {
 }  # fmt: skip
 
 _INTRODUCTION = """\
-`ss` is `import stickslip as ss`. What most work needs stands at its top, the rest in one package for each layer, such as `ss.harmonic`.
+This page lists the public names of Python by task; [researcher](start/researcher.md) is a first script. `ss` is `import stickslip as ss`. The names for most work stand at its top, the others in one package for each layer, such as `ss.harmonic`.
 A module is loaded when one of its names is first used. `help(ss.Model)` shows parameters, units and errors, as does [the same list in full](api_in_full.md).
 Written by `python docs/generate.py`."""
 

@@ -16,7 +16,7 @@ RIGID = 1e-4  # of the highest frequency: below, rounding
 
 @dataclass(frozen=True, eq=False)
 class ContactTable:
-    """What results say of each contact point.
+    """What results say about each contact point.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ FIRST = np.zeros(1, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Blades:
-    """What the outputs of a wheel with all its sectors are.
+    """The outputs of a wheel with all its sectors.
 
     Parameters
     ----------

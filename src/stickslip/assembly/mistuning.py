@@ -40,7 +40,7 @@ def pattern(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BladeMistuning:
-    """Blades whose natural frequencies differ, their shapes as they are.
+    """Blades whose natural frequencies differ while their shapes stay.
 
     The stiffness that changes is that of the blade held where it meets the rest of its part and its neighbours: its static deformation by that rest
     does not change, and all its frequencies alone change by the deviations.
@@ -140,7 +140,7 @@ class ContactMistuning:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OwnSector:
-    """A sector of which a part is another one: a damaged or a repaired blade.
+    """A sector with another part: a damaged or a repaired blade.
 
     Parameters
     ----------

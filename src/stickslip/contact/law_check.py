@@ -15,7 +15,7 @@ WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides
 def check_law(
     law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0
 ) -> None:
-    """Walk a law along a random path and compare its derivatives with differences.
+    """Compare the derivatives of a law with differences along a random path.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ TRIED = (
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopFit:
-    """What measured loops tell of a contact of elastic Coulomb friction; NaN for what they do not tell.
+    """What measured loops show of a contact with elastic Coulomb friction; NaN for what they do not show.
 
     Parameters
     ----------

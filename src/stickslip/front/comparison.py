@@ -94,7 +94,7 @@ class Comparison:
 
 
 def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
-    """Hold designs against each other: their peaks, responses, optimisation curves, modes and inputs.
+    """Compare designs: their peaks, responses, optimisation curves, modes and inputs.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from stickslip.study.outcome import Outcome
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a study or a model has answered.
+    """The answers of a study or a model.
 
     Parameters
     ----------

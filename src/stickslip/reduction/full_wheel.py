@@ -69,7 +69,7 @@ def wheel_shape(
     structure: Structure | None = None,
     dofs: Dofs | None = None,
 ) -> ComplexArray:
-    """Return what every sector does in a travelling wave, in global axes.
+    """Return the motion of every sector in a travelling wave, in global axes.
 
     Parameters
     ----------

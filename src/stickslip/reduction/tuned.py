@@ -34,7 +34,7 @@ Write = Callable[[int], tuple[Structure, Matrix]]  # a wave in other coordinates
 
 @dataclass(frozen=True, eq=False)
 class TunedWheel:
-    """One sector of a wheel whose sectors all do the same, one after the other; `tuned_wheel` makes one.
+    """One sector of a wheel whose sectors all move alike, one after the other; `tuned_wheel` makes one.
 
     Harmonic h of the vibration has the wave number ``h m mod n_s`` of the engine order m, and its structure is that of this
     wave. The first coordinates mean the same in all waves: the gaps of the contacts, or the kept dofs of a sector, those of a

@@ -86,7 +86,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
 
 
 def frozen_sliders(system: System, static_load: FloatArray, friction_share: float = 1.0) -> System:
-    """Place the structure under a static load first, and start every slider from where that leaves it.
+    """Place the structure under a static load first, and start every slider where that load leaves it.
 
     A vibration during which no contact slips or opens is then that of plain springs, with the static state as its mean: harmonics
     and static part do not feel each other (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off forgets.

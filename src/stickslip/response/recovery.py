@@ -13,7 +13,7 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Harmonics 0..order of all that is reported.
+    """Harmonics 0..order of everything that is reported.
 
     Attributes
     ----------

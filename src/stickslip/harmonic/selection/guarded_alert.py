@@ -36,7 +36,7 @@ DOUBT = 2.0  # times the chord step that the true change may go beyond the predi
 
 @dataclass(frozen=True)
 class GuardedAlert:
-    """Repeat with all harmonics of the reference where the error may exceed a threshold: alerts that have seen the other contact states.
+    """Repeat with all harmonics of the reference where the error may exceed a threshold: judged also in the contact states after the step.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class Laxalde:
-    """Keep so many harmonics at the next frequency that the contact forces of this one would be represented.
+    """Keep enough harmonics at the next frequency to represent the contact forces of this one.
 
     The error of ``nH`` harmonics is the mean over the period of what they leave of the contact forces in the time domain, absolute
     and summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to what the static term leaves.

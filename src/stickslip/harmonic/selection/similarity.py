@@ -52,7 +52,7 @@ def jacobian_similarity(
     tolerance: float = NOTHING,
     scales: FloatArray | None = None,
 ) -> JacobianSimilarity:
-    """Compare the Jacobians that a solution with few harmonics and one with many lead to.
+    """Compare the Jacobians at a solution with few harmonics and at one with many.
 
     Both are Jacobians of the same, large problem; they differ in the motion at which the contacts are evaluated, and so in nothing
     else than the derivatives K̂ of the contact forces.

@@ -136,7 +136,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What a strategy says of a solution.
+    """The judgement of a strategy on a solution.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from stickslip.solve.newton_method import Newton
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSearch:
-    """How all motions are looked for.
+    """How to search for all motions.
 
     Parameters
     ----------

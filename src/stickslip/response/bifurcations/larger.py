@@ -79,7 +79,7 @@ def in_periods(point: ForcedPoint, periods: int) -> ForcedPoint:
 
 @dataclass(frozen=True, eq=False)
 class EverySector:
-    """A tuned wheel of which every sector may do something else.
+    """A tuned wheel whose sectors may move differently.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def subharmonic_branch(
     *,
     points: int = POINTS,
 ) -> SideBranch:
-    """Follow subharmonic motions from a given one, in both directions; nothing may lead to them from the forced response.
+    """Follow subharmonic motions from a given one, in both directions; no branch need lead to them from the forced response.
 
     Parameters
     ----------

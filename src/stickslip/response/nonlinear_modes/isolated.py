@@ -71,7 +71,7 @@ class OtherModes:
 
 @dataclass(frozen=True)
 class Isolation:
-    """How far a mode is by itself at a resonance.
+    """How isolated a mode is at a resonance.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
 
 
 def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
-    """Return how far a mode is by itself at a resonance.
+    """Return how isolated a mode is at a resonance.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) ->
 
 
 def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> ComplexArray:
-    """Return (p, k) first harmonics of dofs with what the other modes add, in the phase of the load, m."""
+    """Return (p, k) first harmonics of dofs with the share of the other modes, in the phase of the load, m."""
     own = others.oscillator
     motion = own.first(found.place)[:, dofs] * np.exp(1j * found.phase)[:, None]
     rows = np.zeros((dofs.size, own.backbone.system.structure.n))
@@ -206,7 +206,7 @@ def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> Compl
 def peak_with_others(
     others: OtherModes, curve: Synthesised, found: Resonance, dof: int
 ) -> tuple[float, float]:
-    """Return the largest amplitude of a dof, m, with what the other modes add, and its frequency, rad/s: they move a peak a little.
+    """Return the largest amplitude of a dof, m, with the share of the other modes, and its frequency, rad/s.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def refined(
     tolerance: float = 5e-3,
     most: int = 80,
 ) -> Backbone:
-    """Return a backbone with points added until interpolation between them foretells damping and modal force.
+    """Return a backbone with points added until interpolation between them predicts damping and modal force.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def _course(
 
 
 def statistics(motion: Course) -> Statistics:
-    """Return what the later half of a course is like; NaN where there are too few periods to compare."""
+    """Return statistics of the later half of a course; NaN where there are too few periods to compare."""
     outputs = motion.mean.shape[1]
     half = motion.periods // 2
     half -= half % WINDOWS

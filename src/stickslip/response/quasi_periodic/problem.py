@@ -248,7 +248,7 @@ def with_enough(
     tolerance: float,
     solve: Solving,
 ) -> tuple[TwoTones, TorusMotion]:
-    """Add combined frequencies until what is left out would change the motion by less than `tolerance`.
+    """Add combined frequencies until those left out would change the motion by less than `tolerance`.
 
     Two lightly damped resonances are hit by some combined frequency of almost any order: those are taken which the contact forces move
     most, not all up to an order.

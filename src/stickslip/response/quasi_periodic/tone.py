@@ -120,7 +120,7 @@ def forced_motion(
 
 
 def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float]) -> list[Beginning]:
-    """Return what a second tone near each of some frequencies begins with, the most likely first.
+    """Return starts for a second tone near given frequencies, the most likely first.
 
     Parameters
     ----------

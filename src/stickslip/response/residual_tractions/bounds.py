@@ -59,7 +59,7 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class TractionBounds:
-    """What residual tractions leave open at a frequency.
+    """Bounds of the amplitude over residual tractions at a frequency.
 
     Attributes
     ----------

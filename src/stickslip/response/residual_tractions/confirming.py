@@ -25,7 +25,7 @@ NEAR = 0.05  # of the amplitude in time that the missing harmonics of a bound ma
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What other means say of a bound.
+    """Checks of a bound by other means.
 
     Attributes
     ----------

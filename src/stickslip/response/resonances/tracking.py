@@ -155,7 +155,7 @@ def later_peaks(
     most: int = 3,
     done: Sequence[PeakPoint] = (),
 ) -> Iterator[PeakPoint]:
-    """Follow backwards the peaks that the last value has and that those which were followed from the first one do not lead to.
+    """Follow backwards the peaks at the last value that no peak followed from the first value reaches.
 
     Parameters
     ----------

@@ -180,7 +180,7 @@ class _Sticking:
 def damping_over_amplitude(
     problem: SelfExcited, span: tuple[float, float], points: int = 30
 ) -> list[AmplitudePoint]:
-    """Follow the motions of a mode over their amplitude: what damping each of them has.
+    """Follow the motions of a mode over their amplitude, with the damping of each.
 
     Parameters
     ----------

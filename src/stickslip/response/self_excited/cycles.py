@@ -24,7 +24,7 @@ BRACKETED = 1.0  # times the distance of the two amplitudes by which a cycle may
 
 @dataclass(frozen=True, eq=False)
 class LimitCycle:
-    """A periodic motion that nothing drives and nothing has to keep going.
+    """A periodic motion that goes on by itself.
 
     Parameters
     ----------

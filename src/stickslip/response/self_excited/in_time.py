@@ -195,7 +195,7 @@ class WaveHistory:
 
 
 def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
-    """Return the waves of a motion whose outputs are the same place in all sectors, in their order.
+    """Return the waves of a motion from outputs at the same place of all sectors, in their order.
 
     In each window of so many periods the motion of a wave number is split by the sign of its frequency: wave k and wave -k have the same
     shape at one time, and turn in opposite directions.

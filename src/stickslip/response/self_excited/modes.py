@@ -23,7 +23,7 @@ STILL = (
 
 @dataclass(frozen=True, eq=False)
 class StuckMode:
-    """A mode of what vibrates in the first harmonic, its contacts stuck.
+    """A mode of the structure in the first harmonic, with stuck contacts.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class StuckMode:
 
 
 def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> list[StuckMode]:
-    """Return the lowest modes of what vibrates in the first harmonic: of a wheel, of the wave that its engine order excites.
+    """Return the lowest modes of the structure in the first harmonic; of a wheel, those of the wave that its engine order excites.
 
     Parameters
     ----------

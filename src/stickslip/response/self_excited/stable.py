@@ -20,7 +20,7 @@ from stickslip.response.time.sectors import all_in_time
 
 @dataclass(frozen=True, eq=False)
 class CycleStability:
-    """What becomes of small disturbances of a limit cycle.
+    """Growth or decay of small disturbances of a limit cycle.
 
     Parameters
     ----------

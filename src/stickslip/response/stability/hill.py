@@ -42,7 +42,7 @@ NEAR = 0.95  # and the others count with the largest change of those that are as
 
 @dataclass(frozen=True, eq=False)
 class HillStability:
-    """What becomes of small disturbances of a motion, by Hill's method.
+    """Growth or decay of small disturbances of a motion, by Hill's method.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ Verdict = Literal["stable", "unstable", "undecided"]
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """What becomes of small disturbances of a periodic motion.
+    """Growth or decay of small disturbances of a periodic motion.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ def point_disturbances(problem: ForcedProblem, point: ForcedPoint) -> list[WaveD
 
 
 def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[WaveDisturbance]:
-    """Return the disturbances of a motion of all sectors, that which grows most first; none where nothing is known.
+    """Return the disturbances of a motion of all sectors, the fastest growing first; none if nothing is known.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ REAL = 1e-8  # of the largest entry: imaginary parts below it are rounding
 
 @dataclass(frozen=True, eq=False)
 class WaveMotion:
-    """A motion that every sector makes, each a share of the period after another one.
+    """A motion that all sectors make, each a share of the period after another.
 
     Parameters
     ----------

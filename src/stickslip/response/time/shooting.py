@@ -42,7 +42,7 @@ RESERVE = 2 * ANEW  # periods left for them
 
 @dataclass(frozen=True, eq=False)
 class ShootingResult:
-    """A periodic motion and what becomes of disturbances.
+    """A periodic motion and the growth of its disturbances.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class TimeStepping:
 
 @dataclass(frozen=True, eq=False)
 class TransientResult:
-    """What the last period of an integration looked like.
+    """The last period of an integration.
 
     Parameters
     ----------
