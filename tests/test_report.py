@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import unescape
 from pathlib import Path
 
@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from browser import CHROMIUM, Browser
+from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
 from stickslip.errors import InputError
+from stickslip.front.model import Model
 from stickslip.report.content import Table
 from stickslip.report.forced.bodies import body_motion, rigid_bodies
 from stickslip.report.forced.choice import choice, flagged_ranges
@@ -28,7 +30,8 @@ from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import number, percent, quantity, runs, scale_for
 from stickslip.report.response import NEEDED, Response
-from stickslip.report.skin import edges
+from stickslip.report.skin import edges, skin_picture
+from stickslip.report.tiles import patches, triangulated
 from stickslip.study.analyses.verdict import Verdict, to_json
 
 needs_browser = pytest.mark.skipif(
@@ -827,3 +830,38 @@ def test_tile_and_table_tell_the_quality_factor_of_the_case_shown() -> None:
     at = list(found.head).index("quality factor")
     assert [row[at] for row in found.rows] == ["125", "25"]
     assert [row[at - 1] for row in found.rows] == ["0.40", "2.00"]
+
+
+def test_patches_fill_a_flat_face_and_show_what_its_points_do() -> None:
+    x, y = np.meshgrid(np.arange(4.0), [0.0, 1.5, 2.0])
+    position = np.column_stack([x.ravel(), np.zeros(12), y.ravel()])
+    frame = np.broadcast_to(np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 0]]), (12, 3, 3))
+    found = patches(position, frame, np.full(12, 0.5), range(12))
+    corners, triangles = triangulated(found.values())
+    a, b, c = (corners[triangles[:, k]] for k in range(3))
+    assert 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() == pytest.approx(6.0)
+    for k, own in found.items():  # every corner is nearer to its point than to another one
+        away = np.linalg.norm(own[:, None] - position, axis=2)
+        assert np.all(away[:, k] <= away.min(axis=1) + 1e-12)
+    assert not patches(position, frame, np.full(12, np.nan), range(12))
+    data = synthetic_result(ratios=(20,))
+    dots = skin_picture(Response(data))
+    data["contact_area"] = "contact", np.full(data.sizes["contact"], 4e-6)
+    filled = skin_picture(Response(data))
+    kinds = [{t.name: t.type for t in p.figure.data if t.legend == "legend2" and t.showlegend} for p in (dots, filled)]  # fmt: skip
+    assert set(kinds[0]) == set(kinds[1])
+    assert set(kinds[0].values()) == {"scatter3d"}
+    assert set(kinds[1].values()) == {"mesh3d"}
+
+
+def test_the_page_of_a_python_model_tells_its_loads(tmp_path: Path) -> None:
+    model = study_of(JENKINS, tmp_path).model()
+    law = replace(model.contacts["damper"].law, limit=0.2)
+    damper = replace(model.contacts["damper"], law=law)
+    own = Model(parts=model.parts, contacts={"damper": damper}, loads=model.loads)
+    result = own.forced_response((0.1, 0.3), high=1, points=5, peak_points=0, stability="off")
+    text = page_text(result.report(tmp_path / "page.html"))
+    assert "load shaker100 mN on blade.m1; harmonic 1" in text
+    assert "slip limit 200 mN" in text
+    assert "frequency 0.1 to 0.3 Hz" in text
+    assert "shaker.xmotion along x of node set or dof blade.m1" in text

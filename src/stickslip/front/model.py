@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import did_you_mean, input_error
+from stickslip.front.as_tables import as_tables
 from stickslip.front.result import Result
 from stickslip.front.screen import by_default
 from stickslip.model.part import Part
@@ -185,9 +186,8 @@ class Model(Assembly):
         settings = SimpleNamespace(**_tables(name, keys))
         case = Case(0, "", {}, settings, lambda: self, "", Path.cwd(), checks, at=at)
         with by_default(), one_loaded_blas_thread():
-            outcome = answer(
-                named(name), [case], f"{name.replace('_', ' ').capitalize()} of a model"
-            )
+            title = f"{name.replace('_', ' ').capitalize()} of a model"
+            outcome = answer(named(name), [case], title, as_tables(self, name, keys))
         result = Result.of(outcome)
         return result if folder is None else result.saved(Path(folder))
 

@@ -1,5 +1,6 @@
 """What went in, as the head of the page tells it: loads, contacts with the values of their laws, damping, cases, names."""
 
+import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -27,11 +28,11 @@ _ENDS = 2  # numbers of a range
 _LONGEST = 12  # entries of a list that are told
 
 
-def study_of(text: str) -> Mapping[str, Any]:
-    """Return the tables of a study file's text; none where there is no text, or no TOML."""
+def study_of(root: Node) -> Mapping[str, Any]:
+    """Return the tables of a result's study file, or those that a model of Python stands for; none where there are none."""
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
+        return tomllib.loads(root.text("study_toml")) or json.loads(root.text("model_tables", "{}"))
+    except ValueError:
         return {}
 
 
@@ -41,7 +42,7 @@ def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
     Parameters
     ----------
     study
-        Tables of the study file; empty for a model made in Python, whose contacts and outputs the result knows.
+        Tables of the study file, or those that a model made in Python stands for; empty where there are none.
     nodes
         The analyses by their names.
     """
@@ -173,7 +174,8 @@ def _names(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
     if node is None:
         return None
     output = _table(study, "output")
-    points, labels = _table(output, "points"), node.labels("output")
+    loads = {n: o["on"] for n, o in _table(study, "load").items() if isinstance(o, dict) and "on" in o}  # fmt: skip
+    points, labels = loads | dict(_table(output, "points")), node.labels("output")
     wanted = node.text("report_output")
     rows = [[label, _meaning(label, points) + "; **its peak counts**" * (label == wanted)] for label in labels]  # fmt: skip
     text = "Amplitudes are those of the harmonic that the load drives: half of peak to peak, where nothing else vibrates."

@@ -151,7 +151,7 @@ def report_html(tree: xr.DataTree) -> str:
     """
     placing, nodes = Placing(), _nodes(tree)
     root = Node(tree.to_dataset())
-    given = inputs(study_of(root.text("study_toml")), nodes)
+    given = inputs(study_of(root), nodes)
     drawing = model.picture(nodes)
     body = placing([*([drawing] if drawing else []), *given])
     chapters = [Chapter("inputs", "What was computed", body)] if body else []

@@ -13,10 +13,14 @@ from stickslip.report.node import Node
 from stickslip.report.plot import INK, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
 from stickslip.report.response import Response
+from stickslip.report.tiles import outlines, patches, triangulated
 
 _MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
 _STEEL, _EDGES = "#b9c4d0", "#6f7f91"
+_SAID = ("sticks all the time", "slips", "lifts off")
+_FLAT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}  # colours as in the legend
+_ONE_WAY = 0.8  # length of the mean of the normals of contacts that look one way
 _MOST_NAMES = 15  # of contact points that do not cover each other
 
 
@@ -95,27 +99,55 @@ def _contacts(
     ]  # fmt: skip
 
 
-def _states(response: Response, position: FloatArray) -> list[go.Scatter3d]:
-    """Draw the contact points, coloured by what they do in a cycle at the peak of the case that is shown first."""
+def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.Mesh3d]:
+    """Draw the contacts, coloured by what they do in a cycle at the peak of the case that is shown first: patches where points have areas."""
     case = response.cases[response.chosen]
     state = states(response, case)
     open_, slips = ((state == k).any(axis=(1, 2)) for k in (2, 1))
     each = np.where(open_, 2, np.where(slips, 1, 0))
+    tiles = contact_patches(response, position)
+    found: list[go.Scatter3d | go.Mesh3d] = []
+    for k in range(3):
+        at = np.flatnonzero(each == k)
+        key = {"name": _SAID[k], "legend": "legend2", "legendgroup": _SAID[k]}
+        drawn = [tiles[int(i)] for i in at if i in tiles]
+        if drawn:
+            points, triangles = triangulated(drawn)
+            found.append(surface(points, triangles, color=STATE_COLOURS[k], lighting=_FLAT).update(key | {"showlegend": True}))  # fmt: skip
+        alone = np.array([i for i in at if i not in tiles], dtype=np.int64)
+        if at.size:
+            found.append(_named(response, position, at, alone, k).update(key | {"showlegend": not drawn}))  # fmt: skip
+    if tiles:
+        x, y, z = outlines(tiles.values()).astype(np.float32).T
+        rim = {"mode": "lines", "line": {"color": INK, "width": 2}, "hoverinfo": "skip"}
+        found.append(go.Scatter3d(x=x, y=y, z=z, name="rims", showlegend=False, **rim))
+    return found
+
+
+def _named(
+    response: Response, position: FloatArray, at: IntArray, alone: IntArray, state: int
+) -> go.Scatter3d:
+    """Draw contact points in a state: those that stand alone as dots, those on a patch to point at; names where they are few."""
     names = np.array(response.labels("contact"), dtype=object)
-    mode = "markers+text" if len(names) <= _MOST_NAMES else "markers"
-    place = _places(response)
-    said = ("sticks all the time", "slips", "lifts off")
-    return [
-        go.Scatter3d(
-            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=said[k],
-            legendgroup="states", legendgrouptitle={"text": f"at the peak{case.where}"},
-            text=names[at], textposition=place[at], textfont={"size": 12, "color": INK},
-            marker={"size": 5, "color": STATE_COLOURS[k], "line": {"width": 1, "color": INK}},
-            hovertemplate="%{text} " + said[k] + ": x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
-        )
-        for k in range(3)
-        if (at := np.flatnonzero(each == k)).size
-    ]  # fmt: skip
+    few = len(names) <= _MOST_NAMES
+    size = np.where(np.isin(at, alone), 8.0, 2.0)
+    return go.Scatter3d(
+        x=position[at, 0], y=position[at, 1], z=position[at, 2], mode="markers+text" if few else "markers",
+        text=names[at], textposition=_places(response)[at], textfont={"size": 12, "color": INK},
+        marker={"size": size.tolist(), "color": STATE_COLOURS[state] if alone.size else INK, "line": {"width": 1, "color": INK}},
+        hovertemplate="%{text} " + _SAID[state] + ": x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
+    )  # fmt: skip
+
+
+def contact_patches(response: Response, position: FloatArray) -> dict[int, FloatArray]:
+    """Return the corners (k, 3) of the patch of each contact point that has an area; positions in mm."""
+    if not response.has("contact_area", "contact_frame"):
+        return {}
+    frame, area = response.values("contact_frame"), 1e6 * response.values("contact_area")
+    found: dict[int, FloatArray] = {}
+    for members in response.groups.values():
+        found |= patches(position, frame, area, members)
+    return found
 
 
 def _places(response: Response) -> np.ndarray:
@@ -144,11 +176,26 @@ def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
     return position.min(axis=0) - margin, position.max(axis=0) + margin
 
 
-def _scene(low: FloatArray, high: FloatArray, *, close: bool) -> dict[str, object]:
+def _eye(response: Response) -> dict[str, float] | None:
+    """Return from where the contacts are seen: aslant onto their faces where these look one way; None where they do not."""
+    if not response.has("contact_frame"):
+        return None
+    normal = np.nanmean(response.values("contact_frame")[:, :, 2], axis=0)
+    if not np.linalg.norm(normal) > _ONE_WAY:
+        return None
+    along = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    aslant = normal + 0.45 * along + 0.3 * np.cross(normal, along)
+    seen = 1.75 * aslant / np.linalg.norm(aslant)
+    return dict(zip("xyz", seen.tolist(), strict=True))
+
+
+def _scene(
+    low: FloatArray, high: FloatArray, *, close: bool, seen: dict[str, float] | None = None
+) -> dict[str, object]:
     """Axes of a view of the box between two corners; equal lengths on all axes."""
     eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
     if close:
-        eye, size = {"x": 0.32, "y": -1.5, "z": -0.8}, 1.3
+        eye, size = seen or {"x": 0.32, "y": -1.5, "z": -0.8}, 1.6 if seen else 1.3
     span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
@@ -174,7 +221,12 @@ def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
     each = [f"{counted(len(at), 'point')} of {group}" for group, at in node.groups.items()]
     text += f" Contact points, coloured by contact: {joined(each)}." if each else ""
     if node.has("peak_state", "contact_position") and node.chosen >= 0:
-        text += " Near the contacts they are coloured by what they do in a cycle at the peak of the case shown first."
+        drawn = (
+            "their patches"
+            if contact_patches(node, 1e3 * node.floats("contact_position"))
+            else "they"
+        )
+        text += f" Near the contacts {drawn} are coloured by what they do in a cycle at the peak{node.cases[node.chosen].where}."
     unmeshed = list(rigid_bodies(node))
     verb = "is rigid and has" if len(unmeshed) == 1 else "are rigid and have"
     return text + (f" Not drawn: {joined(unmeshed)}, which {verb} no mesh." if unmeshed else "")
@@ -208,17 +260,14 @@ def skin_picture(node: Node) -> Plot | None:
         figure.add_traces(whole, rows=1, cols=1)
         points_near = _states(node, position) if stated else _contacts(node, position, named=True)
         figure.add_traces([*near, *points_near], rows=1, cols=2)
-        figure.update_layout(scene2=_scene(low, high, close=True))
+        figure.update_layout(scene2=_scene(low, high, close=True, seen=_eye(node)))
     styled(figure, 480)
-    legend = {
-        "orientation": "h",
-        "x": 1,
-        "xanchor": "right",
-        "y": 0,
-        "yanchor": "bottom",
-        "itemsizing": "constant",
-    }
+    row = {"orientation": "h", "xanchor": "center", "y": 0, "yanchor": "top", "itemsizing": "constant"}  # fmt: skip
+    legend = row | {"x": 0.24 if contacts else 0.5, "title": {"text": "contacts"}}
+    shown = node.cases[node.chosen].where if contacts and isinstance(node, Response) and node.chosen >= 0 else ""  # fmt: skip
+    second = row | {"x": 0.76, "title": {"text": f"at the peak{shown}"}, "font": {"size": 12}}
     scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
-    figure.update_layout(scene=scene, margin={"l": 0, "r": 0, "t": 40, "b": 10}, legend=legend)
+    margin = {"l": 0, "r": 0, "t": 40, "b": 70 if contacts else 10}
+    figure.update_layout(scene=scene, margin=margin, legend=legend, legend2=second)
     title = "The mesh and the contact points" if contacts else "The mesh"
     return Plot("mesh", title, _caption(node, points, triangles), figure)

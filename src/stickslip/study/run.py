@@ -145,9 +145,11 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
     return [named(name) for name in wanted]
 
 
-def answer(asked: Analysis, cases: Sequence[Case], title: str = "") -> Outcome:
-    """Answer one question to models of Python; nothing is written."""
-    book = Book(Provenance(title, "", library_versions()))
+def answer(
+    asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None
+) -> Outcome:
+    """Answer one question to models of Python, for whose page is `given` what a study file would have of them; nothing is written."""
+    book = Book(Provenance(title, "", library_versions(), json.dumps(given or {}, default=str)))
     found = []
     for case in cases:
         with JobJournal(Path(":memory:"), asked.record) as journal:

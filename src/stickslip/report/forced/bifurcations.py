@@ -35,6 +35,8 @@ def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str
     branches = 0
     for case in response.cases:
         branches += _branches(figure, response, case, over)
+    if branches:
+        figure.add_trace(key_marker("branch that leaves (dotted)", "line-ew", "bifurcations"))
     kinds = [str(kind) for kind in response.data["bifurcation_kind"].values]
     for kind, symbol in SYMBOLS.items():
         own = [i for i, k in enumerate(kinds) if k == kind]
@@ -77,8 +79,6 @@ def _branches(figure: go.Figure, response: Response, case: ShownCase, over: floa
                 hovertemplate="%{x:.2f}: %{y:.4g}<br>a branch that leaves the response<extra></extra>",
             )
         )  # fmt: skip
-    if every.size:
-        figure.add_trace(key_marker("branch that leaves (dotted)", "line-ew", "bifurcations"))
     return int(every.size)
 
 

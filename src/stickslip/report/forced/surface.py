@@ -1,7 +1,10 @@
 """Contact surfaces seen along their normal: where they slip, and where they lift off."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import plotly.graph_objects as go
+from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
@@ -10,10 +13,12 @@ from stickslip.report.forced.contact import states
 from stickslip.report.plot import MUTED, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import joined, percent
 from stickslip.report.response import Response
+from stickslip.report.tiles import outlines, patches
 
 FEWEST = 9  # points that make a surface worth a map
 THICK = 0.05  # second extent over the first, below which points stand in a line
 MOST_BESIDE = 3  # maps beside each other
+STEPS = 10  # of the colours of patches, from those that stick to those that slip all the time
 _SCALE = [[0.0, STATE_COLOURS[0]], [0.5, "#f4efe6"], [1.0, STATE_COLOURS[1]]]  # from stick to slip
 
 
@@ -28,14 +33,16 @@ def surface_map(response: Response) -> Plot | None:
     height = -(-len(surfaces) // width)
     figure = make_subplots(height, width, subplot_titles=list(surfaces), horizontal_spacing=0.1)
     names = np.array(response.labels("contact"))
+    rims = {group: _rims(response, points) for group, (points, _) in surfaces.items()}
     for case in cases:
         slips, opens = _shares(response, case)
-        for k, (points, at) in enumerate(surfaces.values()):
-            figure.add_trace(
-                _map(at, names[points], slips[points], opens[points]).update(meta=case.index),
-                row=k // width + 1,
-                col=k % width + 1,
-            )
+        for k, (group, (points, at)) in enumerate(surfaces.items()):
+            filled = _patches(rims[group], slips)
+            dots = _map(at, names[points], slips[points], opens[points], small=bool(filled))
+            for trace in (*filled, dots):
+                figure.add_trace(
+                    trace.update(meta=case.index), row=k // width + 1, col=k % width + 1
+                )
     styled(figure, 90 + 330 * height)
     figure.update_xaxes(title_text="along t (mm)")
     figure.update_yaxes(title_text="along w (mm)", col=1)
@@ -43,9 +50,10 @@ def surface_map(response: Response) -> Plot | None:
     figure.update_layout(
         showlegend=False, coloraxis={"colorscale": _SCALE, "cmin": 0, "cmax": 100, "colorbar": bar}
     )
+    patched = "what belongs to them, as far as their areas go, " if any(rims.values()) else ""
     caption = (
-        "Contact points at their places, seen along the normal; colours tell for which share of the cycle at the peak a point "
-        "slips in either direction. A dark rim marks points that lift off in the cycle."
+        f"Contact points at their places, {patched}seen along the normal; colours tell for which share of the cycle at the peak a "
+        "point slips in either direction. A dark rim marks points that lift off in the cycle."
     )
     captions = {c.index: _caption(response, c, surfaces) for c in cases}
     return Plot("surface", "Where the contacts slip", caption, figure, captions, response.chosen)
@@ -74,12 +82,40 @@ def _shares(response: Response, case: ShownCase) -> tuple[FloatArray, FloatArray
     return slips, opens
 
 
-def _map(at: FloatArray, names: FloatArray, slips: FloatArray, opens: FloatArray) -> go.Scatter:
+def _rims(response: Response, points: IntArray) -> dict[int, FloatArray]:
+    """Return the corners (k, 2) of the patches of a contact, in the plane of `_surfaces`, mm; none without areas."""
+    if not response.has("contact_area"):
+        return {}
+    position, frame, area = (response.values(f"contact_{n}") for n in ("position", "frame", "area"))
+    middle, plane = position[points].mean(axis=0), frame[points[0]][:, :2]
+    found = patches(position, frame, area, points.tolist())
+    return {k: 1e3 * (corners - middle) @ plane for k, corners in found.items()}
+
+
+def _patches(rims: Mapping[int, FloatArray], slips: FloatArray) -> list[go.Scatter]:
+    """Draw the patches of a contact, those of about the same share of slip as one trace."""
+    steps: dict[int, list[int]] = {}
+    for k in rims:
+        steps.setdefault(int(np.ceil(STEPS * slips[k] / 100.0)), []).append(k)
+    drawn = []
+    for step, own in sorted(steps.items()):
+        x, y = outlines([rims[k] for k in own]).astype(np.float32).T
+        (fill,) = sample_colorscale(_SCALE, [step / STEPS])
+        drawn.append(go.Scatter(
+            x=x, y=y, mode="lines", fill="toself", fillcolor=fill, line={"width": 0.5, "color": MUTED},
+            hoverinfo="skip", showlegend=False,
+        ))  # fmt: skip
+    return drawn
+
+
+def _map(
+    at: FloatArray, names: FloatArray, slips: FloatArray, opens: FloatArray, *, small: bool
+) -> go.Scatter:
     lifted = opens > 0
     return go.Scatter(
         x=at[:, 0].astype(np.float32), y=at[:, 1].astype(np.float32), mode="markers", showlegend=False,
         marker={
-            "size": 7, "color": slips.astype(np.float32), "coloraxis": "coloraxis",
+            "size": 5 if small else 7, "color": slips.astype(np.float32), "coloraxis": "coloraxis",
             "line": {"color": MUTED, "width": np.where(lifted, 1.8, 0.4)},
         },
         customdata=np.column_stack([names, slips.round(), opens.round()]),

@@ -25,6 +25,8 @@ class Provenance:
         Its text; empty for a model of Python.
     versions
         Of the libraries that make numbers.
+    model_tables
+        JSON of the tables that a study file would have of a model of Python; empty for a study.
     created
         Beginning of the run that wrote the result.
     began
@@ -34,12 +36,14 @@ class Provenance:
     title: str
     study_toml: str
     versions: dict[str, str]
+    model_tables: str = ""
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     began: float = field(default_factory=perf_counter)
 
     def attributes(self, *, complete: bool) -> dict[str, Any]:
         """Return the attributes of the root: texts and numbers only."""
-        return {
+        told = {"model_tables": self.model_tables} if self.model_tables else {}
+        return told | {
             "title": self.title,
             "study_toml": self.study_toml,
             "stickslip_version": __version__,
