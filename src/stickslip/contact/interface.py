@@ -201,8 +201,12 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
     n_contacts, n_pairs, m, _ = blocks.shape
     width = columns.shape[1]
     local = np.empty((3, 3))
+    stride, place = (
+        np.uintp(n),
+        columns.astype(np.uintp),
+    )  # no sign to be looked at in the inner loop
     for c in range(n_contacts):
-        b = values[c]
+        b, own = values[c], place[c]
         for q in range(m):
             for p in range(m):
                 local[:] = 0.0
@@ -218,8 +222,8 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
                     row_t = local[0, 0] * b[0, j] + local[0, 1] * b[1, j] + local[0, 2] * b[2, j]
                     row_w = local[1, 0] * b[0, j] + local[1, 1] * b[1, j] + local[1, 2] * b[2, j]
                     row_n = local[2, 0] * b[0, j] + local[2, 1] * b[1, j] + local[2, 2] * b[2, j]
-                    col = q * n + columns[c, j]
+                    col = np.uintp(q) * stride + own[j]
                     for i in range(width):
-                        jac[p * n + columns[c, i], col] += (
+                        jac[np.uintp(p) * stride + own[i], col] += (
                             b[0, i] * row_t + b[1, i] * row_w + b[2, i] * row_n
                         )

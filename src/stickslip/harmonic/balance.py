@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from time import perf_counter
 from typing import Literal, get_args
 
@@ -15,6 +15,7 @@ from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
+from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, Products
@@ -39,13 +40,18 @@ CROSSOVER = 500  # unknowns above which products and a Krylov method cost less t
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Residual and derivatives at one state, all scaled, and the time the contacts took."""
+    """Residual and derivatives at one state, all scaled, and the time the contacts took; `jac_p` may be computed when it is asked for."""
 
     residual: FloatArray  # (size,)
     jac: FloatArray | StructuredJacobian  # (size, size)
-    jac_p: FloatArray  # (size,), by the parameter ω
+    by_omega: FloatArray | Callable[[], FloatArray]
     seconds_contact: float
     events: Events | None = None  # of the contacts, where all of them are known
+
+    @cached_property
+    def jac_p(self) -> FloatArray:
+        """(size,) derivative of the residual by the parameter ω."""
+        return self.by_omega() if callable(self.by_omega) else self.by_omega
 
     def dense_jac(self) -> FloatArray:
         """Return the Jacobian as an array."""
@@ -54,20 +60,18 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class _LinearPart:
-    operators: ComplexArray  # (2, n_harmonics, n, n) dynamic stiffness and its ω-derivative
-    loads: ComplexArray  # (2, n_harmonics, n, 1) load and its ω-derivative
+    condensed: Condensed  # of the harmonics kept
     matrix: FloatArray  # (n m, n m) real form of the block-diagonal dynamic stiffness
+    load: FloatArray  # (n m,)
 
 
 @lru_cache(maxsize=4)
 def _linear_part(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> _LinearPart:
     """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
-    part, own = linear.condensed(omega, harmonics[-1]), list(harmonics)
-    return _LinearPart(
-        np.stack([part.stiffness[own], part.derivative[own]]),
-        np.stack([part.load[own], part.load_derivative[own]])[..., None],
-        real_matrix(part.stiffness[own]),
-    )
+    part = linear.condensed(omega, harmonics[-1])
+    if not is_full(harmonics):
+        part = part.kept(list(harmonics))
+    return _LinearPart(part, real_matrix(part.stiffness), to_real(part.load).reshape(-1))
 
 
 @lru_cache(maxsize=2)
@@ -178,20 +182,26 @@ class HarmonicBalance:
             period = self.forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
+        by_omega: FloatArray | Callable[[], FloatArray]
         if self.large or self.structured:
             linear, slope, jac = self._by_products(x, omega, period)
+            by_omega = self._with_forces(slope, period.by_omega)
         else:
-            linear, slope, jac = self._by_matrices(x, omega, period)
-        self.rows.add_forces(period.coefficients, linear)
-        if period.by_omega is not None:
-            self.rows.add_forces(period.by_omega, slope)
+            linear, jac = self._by_matrices(x, omega, period.blocks)
+            by_omega = partial(self._slope, x, omega, period.by_omega)
         return Linearisation(
-            linear.reshape(-1) / self.force_scale,
+            self._with_forces(linear, period.coefficients),
             jac,
-            slope.reshape(-1) / self.force_scale,
+            by_omega,
             seconds,
             period.events if period.events is not None and period.events.whole else None,
         )
+
+    def _with_forces(self, rows: FloatArray, contacts: FloatArray | None) -> FloatArray:
+        """Return the (size,) scaled equations: `rows` (m, n), to which the coefficients of the contact forces are added."""
+        if contacts is not None:
+            self.rows.add_forces(contacts, rows)
+        return rows.reshape(-1) / self.force_scale
 
     def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
         """Return the (size,) scaled residual from contacts whose `period` is known: without condensed matrices, if it can be."""
@@ -204,14 +214,13 @@ class HarmonicBalance:
 
     def linear_residual(self, x: FloatArray, omega: float) -> FloatArray:
         """Return the (size,) scaled residual without the contact forces."""
-        q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
+        q = x * self.displacement_scale
         if self.large or self.structured:
             part = _product(self.linear, self.harmonics, omega)
-            force: FloatArray = part.product(q) - part.load
+            force = part.product(q.reshape(self.n_rows, -1)) - part.load
         else:
             own = _linear_part(self.linear, self.harmonics, omega)
-            product = own.operators[0] @ to_complex(q)[:, :, None] - own.loads[0]
-            force = to_real(product[..., 0])
+            force = own.matrix @ q - own.load
         return force.reshape(-1) / self.force_scale
 
     def by_mass_damping(
@@ -233,18 +242,23 @@ class HarmonicBalance:
         return -condensed.reshape(-1) / self.force_scale
 
     def _by_matrices(
-        self, x: FloatArray, omega: float, period: ContactPeriod
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return linear forces and their slope by ω (m, n), and the Jacobian as an array."""
+        self, x: FloatArray, omega: float, blocks: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return linear forces (m, n), and the Jacobian as an array."""
         factor = self.displacement_scale / self.force_scale
         part = _linear_part(self.linear, self.harmonics, omega)
         jac = factor * part.matrix
-        add_contact_jacobian(
-            period.blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac
-        )
+        add_contact_jacobian(blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac)  # fmt: skip
+        linear = part.matrix @ (self.displacement_scale * x)
+        linear -= part.load
+        return linear.reshape(self.n_rows, -1), jac
+
+    def _slope(self, x: FloatArray, omega: float, contacts: FloatArray | None) -> FloatArray:
+        """Return the (size,) derivative of the scaled residual by ω, from that of the contact forces."""
+        part = _linear_part(self.linear, self.harmonics, omega).condensed
         q = to_complex(x.reshape(self.n_rows, self.linear.n)) * self.displacement_scale
-        force, slope = part.operators @ q[:, :, None] - part.loads
-        return to_real(force[..., 0]), to_real(slope[..., 0]), jac
+        slope = (part.derivative @ q[:, :, None])[..., 0] - part.load_derivative
+        return self._with_forces(to_real(slope), contacts)
 
     def _by_products(
         self, x: FloatArray, omega: float, period: ContactPeriod

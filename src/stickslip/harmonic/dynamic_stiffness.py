@@ -38,6 +38,11 @@ class Condensed:
     load: ComplexArray  # (H+1, n)
     load_derivative: ComplexArray  # (H+1, n), by ω
 
+    def kept(self, harmonics: list[int]) -> "Condensed":
+        """Return those of some harmonics."""
+        own = (self.stiffness, self.derivative, self.load, self.load_derivative)
+        return Condensed(*(a[harmonics] for a in own))
+
 
 @dataclass(frozen=True, eq=False)
 class _Sums:

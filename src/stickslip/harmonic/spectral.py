@@ -24,7 +24,6 @@ LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem tak
 ILL_CONDITIONED = 1e4
 PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
 LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
-FEWEST = 200  # terms below which such a table gains nothing
 FAST = (
     10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 )
@@ -354,33 +353,42 @@ def summed(
     matrices[0, 0], matrices[1, 0] = terms.polynomial[0], 0.0
     _fill(terms, p, rate, matrices[:, 1:])
     loads = np.zeros((2, order + 1, n), dtype=complex)
-    own = slice(1, min(order + 1, len(source)))
-    if len(source) > 1:
-        p, rate = p[: own.stop - 1], rate[: own.stop - 1]
-        v, v_slope = terms.load_weights(p)
-        loads[0, own] = -(v * source[own]) @ terms.left.T - p * direct[own]
-        loads[1, own] = rate * (-(v_slope * source[own]) @ terms.left.T - direct[own])
+    loaded = min(order + 1, len(source))
+    if loaded > 1:
+        own, p = loads[:, 1:loaded], p[: loaded - 1]
+        np.matmul(terms.load_weights(p) * -source[1:loaded], terms.left.T, out=own)
+        own[0] -= p * direct[1:loaded]
+        own[1] -= direct[1:loaded]
+        own[1] *= rate[: loaded - 1]
     return matrices, loads
 
 
 def _fill(terms: Terms, p: ComplexArray, rate: ComplexArray, out: ComplexArray) -> None:
     """Write ``Σ_k P_k p^k - Σ w R`` and `rate` times its derivative by `p` (H, 1) to `out` (2, H, n, n)."""
     n, size = terms.left.shape
-    one = np.ones_like(p)
-    powers = np.array([[one, p, p * p, p**3], [0.0 * p, one, 2.0 * p, 3.0 * p * p]])[..., 0]
-    powers = powers.transpose(0, 2, 1)
-    if not terms.symmetric or size < FEWEST or size * n * (n + 1) / 2 > LARGEST_TABLE:
+    if not terms.symmetric or size * n * (n + 1) / 2 > LARGEST_TABLE:
         weights = terms.weights(p)
         scaled = (terms.left * weights[:, :, None]).reshape(2 * p.size * n, size)
         products = (scaled @ terms.right).reshape(out.shape)
-        np.subtract((powers @ terms.polynomial.reshape(4, -1)).reshape(out.shape), products, out)
+        polynomial = _powers(p) @ terms.polynomial.reshape(4, -1)
+        np.subtract(polynomial.reshape(out.shape), products, out)
         out[1] *= rate[:, :, None]
         return
-    weights = np.concatenate([powers, terms.on_table(p)], axis=2)
+    weights = np.concatenate([_powers(p), terms.on_table(p)], axis=2)
     weights[1] *= rate
-    rows = np.array([weights.real, weights.imag]).reshape(-1, weights.shape[2])
+    rows = np.array([weights.real, weights.imag]).reshape(-1, 4 + size)
     full = (rows @ terms.table).take(_places(n), axis=1).reshape(2, *out.shape)
     out.real, out.imag = full
+
+
+def _powers(p: ComplexArray) -> ComplexArray:
+    """Return the powers 0 to 3 of `p` (H, 1) and their derivatives, (2, H, 4)."""
+    out = np.zeros((2, p.shape[0], 4), dtype=complex)
+    square = p * p
+    out[0, :, 0] = out[1, :, 1] = 1.0
+    out[0, :, 1:2], out[0, :, 2:3], out[0, :, 3:] = p, square, p * square
+    out[1, :, 2:3], out[1, :, 3:] = 2.0 * p, 3.0 * square
+    return out
 
 
 @lru_cache(maxsize=8)

@@ -306,7 +306,8 @@ def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
     matrix[:n, :n] = blocks[0].real
     for h in range(1, order + 1):
         cos, sin = slice((2 * h - 1) * n, 2 * h * n), slice(2 * h * n, (2 * h + 1) * n)
-        matrix[cos, cos] = matrix[sin, sin] = blocks[h].real
-        matrix[cos, sin] = blocks[h].imag
-        matrix[sin, cos] = -blocks[h].imag
+        real, imag = blocks[h].real, blocks[h].imag
+        matrix[cos, cos] = matrix[sin, sin] = real
+        matrix[cos, sin] = imag
+        np.negative(imag, out=matrix[sin, cos])
     return matrix

@@ -28,7 +28,7 @@ class GrowingLoad:
         """Return residual and derivatives at the scaled unknowns `x` and the share `p`."""
         at = self.balance.linearise(x, self.omega)
         left = (1.0 - p) * self.excitation
-        return replace(at, residual=at.residual + left, jac_p=-self.excitation)
+        return replace(at, residual=at.residual + left, by_omega=-self.excitation)
 
 
 def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:

@@ -85,7 +85,7 @@ class Dense:
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
-        return solve_signed(_array(jac), right)[0]
+        return solve_dense(_array(jac), right)
 
     def solve_bordered(
         self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
@@ -104,7 +104,8 @@ def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatA
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
-    return solve_signed(matrix, right)[0]
+    lu, pivots = _factors(matrix)
+    return None if lu is None else Factored(lu, pivots)(right)
 
 
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
@@ -155,10 +156,10 @@ class Factored:
 def _factors(matrix: FloatArray) -> tuple[FloatArray | None, FloatArray]:
     """Return LU factors and pivots; None if the matrix is singular to working precision. `matrix` is overwritten."""
     lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
-    size = np.abs(np.diagonal(lu))
-    if info != 0 or not np.all(np.isfinite(size)) or size.min() <= SINGULAR * size.max():
-        return None, pivots
-    return lu, pivots
+    size = np.abs(lu.diagonal())
+    # neither NaN nor infinity passes
+    usable = info == 0 and size.min() > SINGULAR * size.max()
+    return (lu if usable else None), pivots
 
 
 def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
