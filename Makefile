@@ -17,6 +17,8 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # one resolution for Linux, macOS and Windows and for all Pythons that pyproject.toml allows, in markers
 LOCK := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 	--no-config --custom-compile-command "make lock"
+# Processes that tests start would compile this package anew, each of them.
+unexport PYTHONDONTWRITEBYTECODE
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 

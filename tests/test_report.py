@@ -89,11 +89,14 @@ def small_result() -> xr.Dataset:
     return synthetic_result(ratios=(20, 5, 2), n=24)
 
 
-def page_text(html: Path) -> str:
+def html_of(dataset: xr.Dataset, **root: object) -> str:
+    """Return the page of a result that is not written."""
+    return report_html(tree_of(provenance(**root), forced_response=dataset))
+
+
+def page_text(html: str) -> str:
     """Return the page without scripts and tags."""
-    text = re.sub(
-        r"<(script|style)\b.*?</\1>", " ", html.read_text(encoding="utf-8"), flags=re.DOTALL
-    )
+    text = re.sub(r"<(script|style)\b.*?</\1>", " ", html, flags=re.DOTALL)
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", "", text)))
 
 
@@ -240,9 +243,9 @@ def test_the_browser_check_sees_a_broken_page(browser: Browser, page: Path, tmp_
     assert marks(seen.figure("errors")) > 0
 
 
-def test_headline_numbers_come_from_the_data(tmp_path: Path) -> None:
+def test_headline_numbers_come_from_the_data() -> None:
     data = synthetic_result()
-    text = page_text(report(data, tmp_path))
+    text = page_text(html_of(data))
     response = (data.peak_amplitude / data.excitation_n).values
     best = int(np.argmin(response))
     assert (
@@ -257,9 +260,9 @@ def test_headline_numbers_come_from_the_data(tmp_path: Path) -> None:
     assert f"at {number(float(data.frequency_hz[worst]), 5)} Hz for {KEY}" in text
 
 
-def test_text_of_the_dataset_is_escaped(tmp_path: Path) -> None:
+def test_text_of_the_dataset_is_escaped() -> None:
     evil = "</script><script>document.title = 'owned'</script>"
-    data = synthetic_result()
+    data = small_result()
     n = data.sizes["case"]
     data.attrs |= {
         "verdicts": to_json(
@@ -281,13 +284,13 @@ def test_text_of_the_dataset_is_escaped(tmp_path: Path) -> None:
         "created": evil,
         "versions": json.dumps({evil: evil}),
     }
-    html = report(data, tmp_path, **root).read_text(encoding="utf-8")
+    html = html_of(data, **root)
     assert "<script>document.title" not in html
     assert "&lt;script&gt;document.title" in html
 
 
-def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path) -> None:
-    data = synthetic_result(failed=3)
+def test_verdicts_are_listed_the_worst_first_with_their_remedies() -> None:
+    data = synthetic_result(ratios=(5, 2), failed=3)
     each = (
         Verdict("doubtful", "", None, "the damper may drift along y", "Hold it."),
         Verdict("wrong", f"{KEY} = 2", 170.0, "did not converge", "Take more points."),
@@ -295,7 +298,7 @@ def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path)
         Verdict("trusted", f"{KEY} = 5", 171.0, "peak with H = 5, stable"),
     )
     data.attrs["verdicts"] = to_json(each)
-    text = page_text(report(data, tmp_path, complete=0))
+    text = page_text(html_of(data, complete=0))
     told = "Not to be trusted as it stands: the run is not complete; forced response: wrong. See the verdicts."
     assert told in text
     assert f"WRONG: {KEY} = 2: 170.00 Hz: did not converge. Take more points." in text
@@ -306,13 +309,13 @@ def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path)
     assert "Trusted, and what for: 1" in text
 
 
-def test_harmonics_that_were_raised_along_the_branch_are_told_as_such(tmp_path: Path) -> None:
+def test_harmonics_that_were_raised_along_the_branch_are_told_as_such() -> None:
     data = synthetic_result(ratios=(5,), n=10)
     n = data.sizes["point"]
     data.attrs["passages"] = "auto"
     data["own_error_percent"] = "point", np.linspace(0.5, 3.5, n)
     data["audit_error_percent"] = "point", np.where(np.arange(n) == 4, 1.25, np.nan)
-    text = page_text(report(data, tmp_path))
+    text = page_text(html_of(data))
     assert "Harmonics are raised along the branch, from H = 1 up to 5" in text
     assert "3.5 %; 1.2 %" in text
     assert "predicts of each accepted solution's own harmonics" in text
@@ -353,10 +356,10 @@ def test_errors_of_rounding_alone_are_not_drawn() -> None:
     assert errors(Response(data)) is not None
 
 
-def test_warnings_of_older_results_are_doubts(tmp_path: Path) -> None:
-    data = synthetic_result()
+def test_warnings_of_older_results_are_doubts() -> None:
+    data = small_result()
     data.attrs["warnings"] = json.dumps(["3 points did not converge. Take more."])
-    assert "DOUBTFUL: 3 points did not converge. Take more." in page_text(report(data, tmp_path))
+    assert "DOUBTFUL: 3 points did not converge. Take more." in page_text(html_of(data))
 
 
 def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
@@ -456,7 +459,7 @@ def test_the_panels_of_harmonics_end_at_the_highest_that_is_kept() -> None:
 
 
 def test_a_clean_run_says_so(page: Path) -> None:
-    assert "Every answer is trusted." in page_text(page)
+    assert "Every answer is trusted." in page_text(page.read_text(encoding="utf-8"))
 
 
 def _without(*prefixes: str) -> Callable[[xr.Dataset], xr.Dataset]:
@@ -535,25 +538,23 @@ PARTIAL = {
 
 
 @pytest.mark.parametrize("name", PARTIAL)
-def test_what_is_missing_is_left_out_of_the_page_and_nothing_else(
-    name: str, tmp_path: Path
-) -> None:
+def test_what_is_missing_is_left_out_of_the_page_and_nothing_else(name: str) -> None:
     change, missing = PARTIAL[name]
-    text = page_text(report(change(small_result()), tmp_path))
+    text = page_text(html_of(change(small_result())))
     assert {what for what, said in SAID.items() if said not in text} == missing
 
 
-def test_a_run_without_a_finished_case_makes_a_page(tmp_path: Path) -> None:
+def test_a_run_without_a_finished_case_makes_a_page() -> None:
     data = _without("verify")(small_result().isel(case=slice(0, 0), point=slice(0, 0)))
-    html = report_html(tree_of(provenance(complete=0), forced_response=data))
+    html = html_of(data, complete=0)
     assert "the run is not complete" in html
     assert "<figure" not in html
 
 
-def test_one_case_without_vary_speaks_of_no_cases(tmp_path: Path) -> None:
+def test_one_case_without_vary_speaks_of_no_cases() -> None:
     data = synthetic_result(ratios=(5,)).drop_vars(["vary", "vary_value"])
     data["case_label"] = "case", [""]
-    text = page_text(report(data, tmp_path))
+    text = page_text(html_of(data))
     assert "Optimisation curves" not in text
     assert "Frequency response. First harmonic" in text
     assert "peak of tip1.x" in text
@@ -561,7 +562,7 @@ def test_one_case_without_vary_speaks_of_no_cases(tmp_path: Path) -> None:
     assert KEY not in text
 
 
-def test_without_excitation_amplitudes_are_not_divided(tmp_path: Path) -> None:
+def test_without_excitation_amplitudes_are_not_divided() -> None:
     data = synthetic_result(ratios=(5, 2))
     response = Response(data.assign(excitation_n=data["excitation_n"] * np.nan))
     assert response.unit == "m"
@@ -621,7 +622,7 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"text\.nc: is no netCDF-4 file, or a damaged one"):
         report_file(text)
     other = write_result(
-        tree_of(forced_response=synthetic_result().drop_vars("status")), tmp_path / "other.nc"
+        tree_of(forced_response=small_result().drop_vars("status")), tmp_path / "other.nc"
     )
     with pytest.raises(
         InputError,
@@ -670,7 +671,7 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     assert '<li><b class="doubtful">DOUBTFUL:</b> So so.</li>' in html
 
 
-def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
+def test_flagged_ranges_are_runs_of_neighbouring_points() -> None:
     data = synthetic_result(ratios=(5,), n=10)
     hz = np.concatenate([np.arange(100.0, 110.0), [104.1, 104.2, 104.3]])
     error = np.array([0, 6, 0, 0, 7, 9, 8, 0, 0, 0, np.nan, np.nan, np.nan])
@@ -679,7 +680,7 @@ def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
     assert flagged_ranges(result, result.cases[0]) == [(101, 101), (104, 106)]
 
 
-def test_largest_error_is_told_where_none_is_above_the_threshold(tmp_path: Path) -> None:
+def test_largest_error_is_told_where_none_is_above_the_threshold() -> None:
     data = synthetic_result(ratios=(5,), n=4)
     data["frequency_hz"][:4] = np.arange(100.0, 104.0)
     data["predicted_error_percent"][:] = [0.1, 1.2, 1, 0.1, np.nan, np.nan, np.nan]
@@ -688,7 +689,7 @@ def test_largest_error_is_told_where_none_is_above_the_threshold(tmp_path: Path)
     assert list(table.rows[0][1:3]) == ["nowhere", "1.2 % at 101 Hz"]
 
 
-def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Path) -> None:
+def test_the_report_knows_of_alerts_whose_points_a_branch_replaced() -> None:
     data = synthetic_result(ratios=(5,), n=10)
     data["predicted_error_percent"][:] = np.nan
     data["alert_case"] = "alert_point", np.zeros(6, dtype=int)
@@ -707,7 +708,7 @@ def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Pat
     assert "4 of 6 checked points lie above it" in drawn.caption
 
 
-def test_curves_follow_frequency_but_a_folded_branch_its_own_order(tmp_path: Path) -> None:
+def test_curves_follow_frequency_but_a_folded_branch_its_own_order() -> None:
     data = synthetic_result(ratios=(5,), n=6)
     result = Response(data)
     assert np.all(np.diff(result.floats("frequency_hz")[result.points(result.cases[0])]) >= 0)
@@ -716,7 +717,7 @@ def test_curves_follow_frequency_but_a_folded_branch_its_own_order(tmp_path: Pat
     assert folded.points(folded.cases[0]).tolist() == [0, 1, 2, 3, 4, 5]
 
 
-def test_motion_of_a_body_is_the_fourier_series(tmp_path: Path) -> None:
+def test_motion_of_a_body_is_the_fourier_series() -> None:
     data = synthetic_result(ratios=(5,), n=6)
     values = data["retained_displacement"]
     values[:] = 0.0
@@ -736,10 +737,10 @@ def test_motion_of_a_body_is_the_fourier_series(tmp_path: Path) -> None:
     assert not motion[[0, 1, 2, 4, 5]].any()
 
 
-def test_a_stuck_contact_dissipates_nothing_in_spite_of_rounding(tmp_path: Path) -> None:
+def test_a_stuck_contact_dissipates_nothing_in_spite_of_rounding() -> None:
     data = synthetic_result(ratios=(5000,), n=6)
     data["dissipated_energy"][:] = 1e-19
-    text = page_text(report(data, tmp_path))
+    text = page_text(html_of(data))
     assert text.count("No loop encloses an area: nothing is dissipated in this direction.") == 2
     assert "At the peak nothing is dissipated: every point sticks." in text
     assert "No point dissipates energy." in text
@@ -792,7 +793,7 @@ def test_keys_of_a_study_are_told_in_words() -> None:
     assert told("coriolis", True) == "coriolis yes"
 
 
-def test_the_head_of_the_page_tells_what_went_in(tmp_path: Path) -> None:
+def test_the_head_of_the_page_tells_what_went_in() -> None:
     study = """
 [load.shaker]
 on = "blades.force"
@@ -809,7 +810,7 @@ points = { tip1 = "blades.tip1" }
 [vary]
 load.shaker.ratio = [20, 5]
 """
-    text = page_text(report(synthetic_result(ratios=(20, 5)), tmp_path, study_toml=study))
+    text = page_text(html_of(synthetic_result(ratios=(20, 5)), study_toml=study))
     assert "load shakerload.pull over 20 on blades.force along x; harmonic 1" in text
     assert "flatdamper.flat, blades.under" in text
     assert "friction coefficient 0.6" in text

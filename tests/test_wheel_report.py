@@ -93,7 +93,7 @@ def test_page_needs_no_network_and_tells_the_numbers(folder: Path) -> None:
     assert len(html) < 8e6
     assert 'src="http' not in html
     assert "<title>A &lt;flat&gt; ring &amp; nothing else</title>" in html
-    text = page_text(folder / "report.html")
+    text = page_text((folder / "report.html").read_text(encoding="utf-8"))
     found = safe_result(0.1)
     near = int(found.pair_near.sum())
     assert near > 0
