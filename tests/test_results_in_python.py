@@ -9,6 +9,7 @@ from synthetic_result import KEY, synthetic_result, tree_of
 
 import stickslip as ss
 from stickslip.study.analyses.analysis import named
+from stickslip.study.analyses.forced.quantities import flags
 
 
 def test_a_response_is_a_row_a_point_and_output() -> None:
@@ -21,6 +22,9 @@ def test_a_response_is_a_row_a_point_and_output() -> None:
     np.testing.assert_array_equal(one["frequency_hz"], data["frequency_hz"].values[at])
     np.testing.assert_array_equal(one["amplitude"], data["amplitude"].values[at, 1])
     assert frame.attrs["units"]["amplitude"] == data["amplitude"].attrs["units"]
+    data["verdict"] = ("point", np.arange(data.sizes["point"]) % 3, flags("verdict"))
+    words = ss.Result(tree_of(forced_response=data)).to_dataframe()["verdict"]
+    assert words[:: data.sizes["output"]].tolist()[:4] == ["trusted", "doubtful", "wrong", "trusted"]  # fmt: skip
 
 
 def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_for() -> None:

@@ -12,7 +12,7 @@ _CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_
 
 
 def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
-    """Return a variable and all that belongs to its entries, a row an entry; entries that are not there are left out.
+    """Return a variable and all that belongs to its entries, a row an entry; entries that are not there are left out, and verdicts and states are words.
 
     Parameters
     ----------
@@ -60,6 +60,11 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
         keys, values = varied_values(data)
         for k, key in reversed(list(enumerate(keys))):
             frame.insert(0, key, values[case, k])
+    for v in own.data_vars:  # numbers that stand for words
+        told = own[v].attrs
+        if "flag_meanings" in told:
+            words = dict(zip(np.ravel(told["flag_values"]).tolist(), str(told["flag_meanings"]).split(), strict=True))  # fmt: skip
+            frame[str(v)] = [words.get(x, x) for x in frame[str(v)].tolist()]
     frame = frame.infer_objects()
     frame.attrs["units"] = {str(v): str(own[v].attrs["units"]) for v in own if "units" in own[v].attrs}  # fmt: skip
     return frame

@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.forced.bodies import group_colours, rigid_bodies
 from stickslip.report.forced.contact import contact_lines, states
 from stickslip.report.node import Node
-from stickslip.report.plot import INK, STATE_COLOURS, Plot, styled
+from stickslip.report.plot import INK, MUTED, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
 from stickslip.report.response import Response
 from stickslip.report.tiles import outlines, patches, triangulated
@@ -18,7 +18,8 @@ from stickslip.report.tiles import outlines, patches, triangulated
 _MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
 _STEEL, _EDGES = "#b9c4d0", "#6f7f91"
-_SAID = ("sticks all the time", "slips", "lifts off")
+_SAID = ("sticks, or stays closed", "slips", "lifts off", "stays open")
+_COLOURS = (*STATE_COLOURS[:3], MUTED)
 _FLAT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}  # colours as in the legend
 _ONE_WAY = 0.8  # length of the mean of the normals of contacts that look one way
 _MOST_NAMES = 15  # of contact points that do not cover each other
@@ -104,16 +105,17 @@ def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.
     case = response.cases[response.chosen]
     state = states(response, case)
     open_, slips = ((state == k).any(axis=(1, 2)) for k in (2, 1))
-    each = np.where(open_, 2, np.where(slips, 1, 0))
+    apart = (state == 2).all(axis=(1, 2))
+    each = np.where(apart, 3, np.where(open_, 2, np.where(slips, 1, 0)))
     tiles = contact_patches(response, position)
     found: list[go.Scatter3d | go.Mesh3d] = []
-    for k in range(3):
+    for k in range(4):
         at = np.flatnonzero(each == k)
         key = {"name": _SAID[k], "legend": "legend2", "legendgroup": _SAID[k]}
         drawn = [tiles[int(i)] for i in at if i in tiles]
         if drawn:
             points, triangles = triangulated(drawn)
-            found.append(surface(points, triangles, color=STATE_COLOURS[k], lighting=_FLAT).update(key | {"showlegend": True}))  # fmt: skip
+            found.append(surface(points, triangles, color=_COLOURS[k], lighting=_FLAT).update(key | {"showlegend": True}))  # fmt: skip
         alone = np.array([i for i in at if i not in tiles], dtype=np.int64)
         if at.size:
             found.append(_named(response, position, at, alone, k).update(key | {"showlegend": not drawn}))  # fmt: skip
@@ -134,7 +136,7 @@ def _named(
     return go.Scatter3d(
         x=position[at, 0], y=position[at, 1], z=position[at, 2], mode="markers+text" if few else "markers",
         text=names[at], textposition=_places(response)[at], textfont={"size": 12, "color": INK},
-        marker={"size": size.tolist(), "color": STATE_COLOURS[state] if alone.size else INK, "line": {"width": 1, "color": INK}},
+        marker={"size": size.tolist(), "color": _COLOURS[state] if alone.size else INK, "line": {"width": 1, "color": INK}},
         hovertemplate="%{text} " + _SAID[state] + ": x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
     )  # fmt: skip
 

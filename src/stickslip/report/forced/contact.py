@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
@@ -192,19 +192,28 @@ def hysteresis_w(response: Response) -> Plot | None:
 
 def _state_caption(response: Response, case: ShownCase, rows: list[int]) -> str:
     state, names = states(response, case), response.labels("contact")
-    slipping, open_ = ((state == k).any(axis=(1, 2)) for k in (1, 2))
-    drawn = state.reshape(-1, state.shape[-1])[rows]
-    share = [100 * float((drawn == k).mean()) for k in range(3)]
-    text = (
-        f"{int(slipping.sum())} of {counted(len(names), 'point')} slip during the cycle and {int(open_.sum())} "
-        f"lift off; over all rows the contact sticks for {percent(share[0])}, slips for "
-        f"{percent(share[1])} and is open for {percent(share[2])} of the time."
-    )
-    lifting = [n for n, o in zip(names, open_, strict=True) if o]
-    if lifting:
-        more = [f"{len(lifting) - 12} others"] if len(lifting) > 12 else []
-        text += f" Lift-off at {joined(lifting[:12] + more)}."
+    slipping, away = ((state == k).any(axis=(1, 2)) for k in (1, 2))
+    apart = (state == 2).all(axis=(1, 2))
+    text = f"{int(slipping.sum())} of {counted(len(names), 'point')} slip during the cycle and {int((away & ~apart).sum())} lift off."
+    of_time = state.reshape(-1, state.shape[-1])[rows][_rubs(response, case, rows)]
+    if of_time.size:
+        stick, slip, open_ = (percent(100 * float((of_time == k).mean())) for k in range(3))
+        text += f" Where there is friction, the contact sticks for {stick}, slips for {slip} and is open for {open_} of the time."
+    for which, word in ((away & ~apart, "Lift-off at"), (apart, "Open all the time:")):
+        told = [n for n, one in zip(names, which, strict=True) if one]
+        if told:
+            more = [f"{len(told) - 12} others"] if len(told) > 12 else []
+            text += f" {word} {joined(told[:12] + more)}."
     return text
+
+
+def _rubs(response: Response, case: ShownCase, rows: list[int]) -> BoolArray:
+    """Which rows of (contact, tangent) have friction: a stop has no tangential force, and its state says no more than closed or open."""
+    if not response.has("peak_force"):
+        return np.ones(len(rows), dtype=bool)
+    force = period(response, case, "peak_force")[:, : len(response.labels("tangent"))]
+    rubs: BoolArray = np.any(force, axis=-1).reshape(-1)[rows]
+    return rubs
 
 
 def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[int], list[str]]:
