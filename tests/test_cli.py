@@ -138,7 +138,7 @@ def test_commands_of_before_are_analyses_now(command: str) -> None:
     assert f"No such command '{command}'" in refused(command, "study.toml")
 
 
-@pytest.mark.parametrize("kind", ["blades", "sector", "file", "masses"])
+@pytest.mark.parametrize("kind", ["blades", "sector", "wheel", "file", "masses"])
 def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
     said = done("new", str(tmp_path / "made"), "--kind", kind)
     path = tmp_path / "made" / "study.toml"

@@ -143,7 +143,12 @@ def test_the_schema_lists_tables_and_keys():
 
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
-    folders = {"blades": "two_blades", "sector": "shrouded_sector", "masses": "four_masses"}
+    folders = {
+        "blades": "two_blades",
+        "sector": "shrouded_sector",
+        "wheel": "friction_ring",
+        "masses": "four_masses",
+    }
     if kind in folders:
         written = (EXAMPLES / folders[kind] / "study.toml").read_text(encoding="utf-8")
         assert example_text(kind) == written

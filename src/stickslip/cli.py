@@ -25,12 +25,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
-Kind = Literal["blades", "sector", "file", "masses"]
+Kind = Literal["blades", "sector", "wheel", "file", "masses"]
 StudyKind = Annotated[
     Kind,
     typer.Option(
         "--kind",
-        help="blades: two blades and a damper; sector: a bladed disk; file: one from a finite-element program; "
+        help="blades: two blades and a damper; sector: a meshed bladed disk with shrouds; wheel: a blisk of masses with a friction ring, by nodal diameters; file: one from a finite-element program; "
         "masses: four masses on springs, the smallest study.",
     ),
 ]

@@ -3,10 +3,10 @@
 from importlib.resources import files
 from typing import Literal
 
-Kind = Literal["blades", "sector", "file", "masses"]
+Kind = Literal["blades", "sector", "wheel", "file", "masses"]
 
 
 def example_text(kind: Kind = "blades") -> str:
-    """Return the example study of two blades and a damper, a sector of a bladed disk, one from a file, or four masses."""
+    """Return the example study of two blades and a damper, a meshed sector of a bladed disk, a wheel of lumped masses, one from a file, or four masses."""
     folder = files("stickslip.study.file").joinpath("examples")
     return folder.joinpath(f"{kind}.toml").read_text(encoding="utf-8")
