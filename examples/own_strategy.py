@@ -4,7 +4,7 @@ A strategy of one's own
 
 Harmonics chosen by the contact forces that nothing balances.
 
-Run it as it is; nothing of the package is touched.
+Run it as it is; nothing of the package is touched. It uses the layers below ``ss.Model``: a strategy sees the balance itself.
 """
 
 from dataclasses import dataclass

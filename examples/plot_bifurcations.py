@@ -4,6 +4,8 @@ A wheel that localises: bifurcations and the branch that leaves
 
 Four equal masses in a ring, each between two elastic stops, neighbours driven against each other. Where the stops are met the motion
 that all sectors share loses its stability, and a branch leaves in which two of them take nearly all of the vibration.
+
+It uses the layers below ``ss.Model``, to show the waves of a wheel and the branch as objects of Python. With ``ss.Model`` the same is asked by ``model.forced_response(bifurcations="branches")``.
 """
 
 import matplotlib.pyplot as plt

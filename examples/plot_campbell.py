@@ -4,6 +4,8 @@ Campbell diagram
 
 A blade stiffens as it turns. Where a multiple of the speed of rotation meets one of its frequencies it may resonate. The
 Campbell diagram shows at which speeds.
+
+It uses the layers below ``ss.Model``, to show a structure that is a function of the speed. With ``ss.Model`` the same is asked by ``model.campbell()``.
 """
 
 import matplotlib.pyplot as plt

@@ -6,6 +6,8 @@ The Jacobian of harmonic balance has a block for each pair of harmonics: :math:`
 is there, and each harmonic lives for itself. Slip and lift-off couple them. Here are the norms of the blocks for two blades with a wedge
 between them, at a solution with one harmonic, as Gastaldi and Berruti (2017) draw them in their figure 1; the last column shows
 :math:`\Delta J` (their eq. 20), the part that a solution with harmonics 0 and 1 neglects.
+
+It uses the layers below ``ss.Model``, to show the blocks of the Jacobian.
 """
 
 import matplotlib.pyplot as plt

@@ -5,6 +5,8 @@ One Jenkins element: loop, describing function and sampling
 A spring in series with a friction slider is the smallest element of every joint in this package. Under a sinusoidal
 motion its hysteresis loop is a parallelogram and its first harmonic has a closed form. This example draws the first and
 compares the second with what the alternating frequency/time scheme finds from samples of one period.
+
+It uses the layers below ``ss.Model``, to show one law and its samples.
 """
 
 import matplotlib.pyplot as plt

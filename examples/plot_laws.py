@@ -4,6 +4,8 @@ All contact laws, by their loops
 
 Every law of the registry under the same motion: an ellipse in the contact plane, in three sizes, of which the force along t is drawn
 over the gap along t. Contacts under a preload are pressed and relieved at the same time. The last picture shows normal forces.
+
+It uses the layers below ``ss.Model``, to show the laws by themselves.
 """
 
 import matplotlib.pyplot as plt

@@ -1,36 +1,38 @@
 r"""
-The backbone of a blade with a friction damper
-==============================================
+The nonlinear mode behind a family of resonances
+================================================
 
-With its amplitude the frequency of a mode falls from that of stuck contacts to that without friction, and its damping rises and falls
-again. One curve tells it for all loads: the peaks of the frequency responses lie on it.
+A blade with a friction damper has no single natural frequency: it falls from the frequency of the stuck damper to that of the sliding
+one as the amplitude grows, and in between the damper takes the most energy. The nonlinear mode tells both without any load, and the peaks
+of all frequency responses lie on it.
 """
+
+from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import stickslip as ss
-from stickslip.response.nonlinear_modes import ModeSweep, nonlinear_mode
-from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited import stuck_modes
 
 # %%
 # One mass on a spring, a dashpot of 1 % and a friction damper of half the stiffness.
 
-structure = ss.model.lumped(np.eye(1), np.eye(1), np.array([[0.02]]))
-gap = np.array([[1.0], [0.0], [0.0]])  # t, w, n
-damper = ss.Jenkins(k_t=0.5, limit=0.1)
-system = ss.System(structure, ss.Interface(("damper",), (damper,), gap), np.array([0]))
-still = ss.HarmonicLoad(np.zeros(1))
+blade = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1), names=("mass",))
+damper = ss.Contact(
+    between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.1), acts="tangential"
+)
+model = ss.Model(parts={"blade": ss.Part(structure=blade)}, contacts={"damper": damper}, loads={"shaker": ss.Load(on="blade.mass", newton=0.1)})  # fmt: skip
 
 # %%
 # The mode, from half the amplitude at which the damper slips to five times that, with as many harmonics as it needs.
 
-mode = stuck_modes(system, 1)[0]
-sweep = ModeSweep(span=(0.1, 1.0), points=30, most_harmonics=15)
-backbone = nonlinear_mode(system, still, mode, 0, Discretisation(order=3), sweep)
-print(backbone.end)
-amplitude, omega, ratio = np.array([(p.amplitude, p.omega, p.ratio) for p in backbone.points]).T
+mode = model.nonlinear_mode(modes=[1], amplitude_mm=(100, 1000), most_harmonics=15)
+curve = mode["nonlinear_mode"].isel(case=0, branch=0)
+print(str(curve.end.values))
+known = curve.status.values == 0
+amplitude, hertz, ratio = (
+    curve[name].values[known] for name in ("amplitude", "frequency_hz", "damping_ratio")
+)
 
 # %%
 # Frequency responses to three forces, and the backbone over them.
@@ -38,28 +40,24 @@ amplitude, omega, ratio = np.array([(p.amplitude, p.omega, p.ratio) for p in bac
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4))
 peaks = []
 for force in (0.02, 0.05, 0.1):
-    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
-    swept = ss.Sweep(omega_range=(0.9, 1.4), low=[1, 3, 5], high=[1, 3, 5], selection="always_high")
-    problem = ss.response.forced_problem(system, load, swept)
-    points = list(ss.response.accepted_points(list(ss.forced_response(system, load, swept))))
-    points.sort(key=lambda p: p.omega)
-    left.plot([p.omega for p in points], [problem.amplitude(p) for p in points], label=f"{force} N")
-    peak = max(points, key=problem.amplitude)
-    peaks.append((problem.amplitude(peak), peak.omega, force))
-left.plot(omega, amplitude, "k--", label="backbone")
-left.set(xlabel="frequency, rad/s", ylabel="amplitude, m", yscale="log")
+    driven = replace(model, loads={"shaker": ss.Load(on="blade.mass", newton=force)})
+    found = driven.forced_response((0.145, 0.22), high=5, selection="always_high", stability="off")
+    data = found["forced_response"].sortby("frequency_hz")
+    left.plot(data.frequency_hz, data.amplitude.isel(output=0), label=f"{force} N")
+    peaks.append((float(data.peak_amplitude[0]), float(data.peak_frequency_hz[0]), force))
+left.plot(hertz, amplitude, "k--", label="backbone")
+left.set(xlabel="frequency, Hz", ylabel="amplitude, m", yscale="log")
 left.legend()
 right.plot(amplitude, 100 * ratio)
 right.set(xlabel="amplitude, m", ylabel="damping ratio, %", xscale="log")
 plt.show()
 
 for top, at, force in peaks:
-    on_curve = np.interp(top, amplitude, omega)
-    balance = (
-        2.0 * np.interp(top, amplitude, ratio) * at**2 * top
-    )  # what damping takes at resonance
+    on_curve = np.interp(top, amplitude, hertz)
+    # what damping takes at resonance
+    balance = 2.0 * np.interp(top, amplitude, ratio) * (2 * np.pi * at) ** 2 * top
     print(
-        f"{force} N: peak at {at:.4f} rad/s, backbone {on_curve:.4f}; {balance:.4f} N by its damping"
+        f"{force} N: peak at {at:.5f} Hz, backbone {on_curve:.5f}; {balance:.4f} N by its damping"
     )
     assert abs(at / on_curve - 1.0) < 0.01
     assert abs(balance / force - 1.0) < 0.03

@@ -5,6 +5,8 @@ Non-matching meshes: the patch test
 Two elastic blocks lie on each other and are pressed by 1 MPa. The pressure between them is 1 MPa everywhere, whatever the meshes. This example presses two blocks whose
 meshes do not match through contact springs, once with the nodes of one side projected on the facets of the other, and once with quadrature points on the pieces that
 facets of both sides have in common.
+
+It uses the layers below ``ss.Model``, to show contact operators between meshes.
 """
 
 import matplotlib.pyplot as plt

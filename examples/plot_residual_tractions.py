@@ -7,6 +7,8 @@ died. Each force within the friction cone is a steady motion. As long as all con
 contact slips, the mean decides how hard that is pressed, and with it the amplitude.
 
 The system is the wedge damper between two planar blades after Ferhatoglu and Zucca.
+
+It uses the layers below ``ss.Model``, to show the bounds and their tractions. With ``ss.Model`` the same is asked by ``model.residual_tractions()``.
 """
 
 import matplotlib.pyplot as plt

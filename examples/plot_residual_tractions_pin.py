@@ -5,6 +5,8 @@ A wide band: a pin whose guide sticks
 Residual tractions matter most where the contact that sticks carries the load which presses the one that slips. A pin is pressed
 against a blade with 0.4 N through a guide whose friction holds up to 0.36 N either way. The blade is rubbed under 0.04 to
 0.76 N, and the pin does not tell.
+
+It uses the layers below ``ss.Model``, to show the bounds and their tractions. With ``ss.Model`` the same is asked by ``model.residual_tractions()``.
 """
 
 import matplotlib.pyplot as plt

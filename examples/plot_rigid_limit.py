@@ -6,6 +6,8 @@ Two masses, the second of which rubs on the ground. A *penalty law* puts a sprin
 sticks without moving, and the friction force jumps when the velocity changes its sign. The dynamic Lagrangian frequency-time method solves
 for it. It has a penalty :math:`\varepsilon` of its own, which is no property of the contact. The motion at 1.5 rad/s is known exactly by
 integration from event to event: the second mass moves by 26.786093 in its first harmonic.
+
+It uses the layers below ``ss.Model``, to show the method by which rigid contacts are solved. With ``ss.Model`` the same is asked by the law ``ss.RigidCoulomb`` in a contact.
 """
 
 import matplotlib.pyplot as plt

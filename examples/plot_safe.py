@@ -4,6 +4,8 @@ SAFE diagram
 
 On a wheel of equal blades a resonance needs more than a frequency: the excitation must have the shape of the mode as well. A
 SAFE diagram shows both.
+
+It uses the layers below ``ss.Model``, to show the waves of a wheel as matrices. With ``ss.Model`` the same is asked by ``model.safe()``.
 """
 
 import matplotlib.pyplot as plt

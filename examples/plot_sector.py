@@ -4,6 +4,8 @@ A bladed disk from one sector
 
 A wheel of 24 blades with shrouds, computed from one of its sectors: geometry and mesh, the natural frequencies by nodal
 diameter at rest and at speed, and one mode of the whole wheel. No solver and no mesh of your own is needed.
+
+It uses the layers below ``ss.Model``, to show the sector, its waves and their shapes. With ``ss.Model`` the same is asked by ``model.modes()``.
 """
 
 import matplotlib.pyplot as plt

@@ -4,6 +4,8 @@ Shooting: the motion without its transient, and its stability
 
 `shoot` finds the periodic motion that time integration would settle to, and says how fast a small disturbance of it
 dies: its Floquet multipliers. The blade is one mass on a spring, with a friction damper pressed against it.
+
+It uses the layers below ``ss.Model``, to show time integration over single periods and its multipliers.
 """
 
 import matplotlib.pyplot as plt
