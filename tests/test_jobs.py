@@ -98,7 +98,7 @@ def test_job_is_set_aside_that_dies_twice_at_the_same_place(tmp_path: Path) -> N
     assert len(records) == 3
     assert not cell.lives
     assert len(said) == 2
-    why = "toy was set aside: its process was ended by signal SIGKILL, twice at the same place"
+    why = "the toy job was set aside: its process was ended by signal SIGKILL, twice at the same place"
     assert notes["set aside"]["text"] == why
     # the next run takes it up
     jobs.solve(made, made.file)
@@ -276,7 +276,7 @@ def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, *, begun: boo
     for own in made:
         why = read_sealed(own.sealed, own.analysis.record)[1]["set aside"]["text"]
         assert why == (
-            f"toy was set aside: {given} workers were lost with it at the same place (OSError: the machine is gone)"
+            f"the toy job was set aside: {given} workers were lost with it at the same place (OSError: the machine is gone)"
         )
 
 

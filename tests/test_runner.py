@@ -144,7 +144,7 @@ def test_job_that_kills_its_process_is_set_aside_and_taken_up_by_the_next_run(
     assert outcome.failed == 1
     (verdict,) = (v for v in of_tree(result(poisoned)) if v.level == "wrong")
     assert verdict.sentence == (
-        "factor = 1.5: toy was set aside: its process was ended by signal SIGKILL, as a rule for lack of memory, twice at the same "
+        "factor = 1.5: the toy job was set aside: its process was ended by signal SIGKILL, as a rule for lack of memory, twice at the same "
         "place. The same command goes on with it: give it more time or memory, or leave the case out."
     )
     assert conclusion(result(poisoned)).startswith("Not to be trusted as it stands: 1 of the jobs")

@@ -116,11 +116,12 @@ def run(
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
-        from stickslip.study.analyses.verdict import worst_first
+        from stickslip.study.analyses.verdict import stored, worst_first
 
         for table in (t for tables in result.summaries.values() for t in tables):
             say_table(table.title, table.head, table.rows, table.lines)
-        say_answers(worst_first(result.verdicts), result.failed, files, result.conclusion)
+        points = result.failed - len(stored(result.data.attrs))  # jobs set aside are no points
+        say_answers(worst_first(result.verdicts), points, files, result.conclusion)
     raise typer.Exit(NOT_CONVERGED if result.failed else DONE)
 
 

@@ -110,7 +110,7 @@ def unknown(label: str, error: Exception) -> StickslipError:
 def set_aside(parcel: Parcel, why: str) -> None:
     """Seal a job as it is, with the reason; the next run goes on with it."""
     with JobJournal(parcel.file) as journal:
-        journal.put(ASIDE, {"text": f"{parcel.question} was set aside: {why}"})
+        journal.put(ASIDE, {"text": f"the {parcel.question} job was set aside: {why}"})
         journal.seal()
     clear(parcel.sealed)
 
