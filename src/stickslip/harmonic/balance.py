@@ -107,17 +107,17 @@ class HarmonicBalance:
         """What stands for the contacts where nothing slips or opens."""
         return self.interface
 
-    @property
+    @cached_property
     def n_rows(self) -> int:
         """Real coefficients a coordinate."""
         return 2 * len(self.harmonics) - 1
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of real unknowns."""
         return self.linear.n * self.n_rows
 
-    @property
+    @cached_property
     def structured(self) -> bool:
         """Whether the Jacobian is given by its products; without harmonics it is an array."""
         large = self.large if self.jacobian == "auto" else self.jacobian == "structured"

@@ -76,7 +76,7 @@ class CondensedStiffness:
     )
     loss: Blocks | None = None  # structural damping on nn, nl, ll
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of retained coordinates."""
         return int(self.retained.size)

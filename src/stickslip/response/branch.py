@@ -76,6 +76,10 @@ class Followed:
         """The parameter."""
         return self.point.p
 
+    def taking(self, seconds: float) -> "Followed":
+        """Return the same with what it took."""
+        return Followed(self.kind, self.index, self.level, self.point, self.judged, seconds)
+
 
 class Curve(Protocol):
     """What is followed: one equation with several levels of harmonics; what is said here of levels holds where there is only one."""
@@ -262,7 +266,7 @@ def branch_of(every: Iterable[P]) -> list[P]:
     branch: list[P] = []
     for one in every:
         if one.kind == "point":
-            branch = [*branch[: one.index], one]
+            branch[one.index :] = [one]
         elif one.kind == "found":
             branch[one.index] = one
     return branch

@@ -15,7 +15,7 @@ for once more, when their neighbours are known.
 """
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
 
 from stickslip.response.branch import Curve, Followed, Route
@@ -129,7 +129,7 @@ class _Walk:
         if known is None:
             began = perf_counter()
             made = without_more(self.curve, self._levels(), make())
-            known = replace(made, seconds=perf_counter() - began)
+            known = made.taking(perf_counter() - began)
             yield known
             known = self.curve.stored(known)
         self.spent += known.point.solution.iterations * self.curve.cost(known.level)
@@ -138,8 +138,8 @@ class _Walk:
     def _onward(self, here: _Stop) -> Followed:
         """Take a step along the branch; one that only goes back where the branch came from is none."""
         made = onward(self.curve, here.ahead, len(self.branch), self._target(), self.route.last)
-        before = [stop.point for stop in self.branch if stop.point.converged]
-        return lost(made) if not self.route.listed and retraced(self.curve, before, made) else made
+        before = [] if self.route.listed else [s.point for s in self.branch if s.point.converged]
+        return lost(made) if retraced(self.curve, before, made) else made
 
     def _kept(
         self, made: Followed, audit: Followed | None = None, *, begins: bool = False

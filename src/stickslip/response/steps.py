@@ -26,6 +26,8 @@ FEWEST = 2  # levels that are always allowed
 def levels_left(curve: Curve, route: Route, spent: float) -> int:
     """Return how many levels may be used after so much work: all while less than half of it is done, then fewer and fewer."""
     levels = curve.levels
+    if levels <= FEWEST:
+        return levels
     most = EFFORT * route.points * curve.cost(levels - 1)
     over = int((spent / most - 0.5) * 2.0 * levels) + 1 if spent > 0.5 * most else 0
     return max(levels - over, min(levels, FEWEST))

@@ -47,7 +47,7 @@ __all__ = [
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
-    latest = Latest(problem)
+    latest = problem if isinstance(problem, Latest) else Latest(problem)
     solution = newton(lambda v: latest.linearise(v, p), x, following.newton)
     upward = np.zeros(x.size + 1)
     upward[-1] = 1.0

@@ -68,7 +68,7 @@ class Work:
         """Evaluate at `x`."""
         at = self.evaluate(x)
         self.seconds_contact += at.seconds_contact
-        return Iterate(x, at, float(np.max(np.abs(at.residual))))
+        return Iterate(x, at, float(np.abs(at.residual).max()))
 
     def rounded(self, now: Iterate) -> bool:
         """Whether a residual is as small as the last digits of the unknowns allow.
@@ -101,7 +101,7 @@ class Work:
         start = perf_counter()
         step = solve()
         self.seconds_linear += perf_counter() - start
-        return step if step is not None and np.all(np.isfinite(step)) else None
+        return step if step is not None and np.isfinite(step).all() else None
 
 
 class Globalisation(Protocol):

@@ -1,5 +1,6 @@
 """Which harmonics a frequency needs: strategies, one a file; their names are in `stickslip.harmonic.strategies`."""
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -26,6 +27,7 @@ def strategy_named(name: str, threshold: float | None = None, **options: bool) -
     return strategy
 
 
+@cache
 def _class_of(name: str) -> Any:
     file, own = STRATEGIES[name]
     return getattr(import_module(f"{__name__}.{file}"), own)

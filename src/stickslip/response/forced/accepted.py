@@ -57,7 +57,7 @@ def points_of_branch(points: Sequence[ForcedPoint], stage: Stage) -> list[Forced
     branch: list[ForcedPoint] = []
     for one in points:
         if one.stage == stage:
-            branch = [*branch[: one.index], one]
+            branch[one.index :] = [one]
         elif one.stage == "found":
             branch[one.index] = one
     return branch

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -199,10 +199,20 @@ class ForcedCurve:
         """Return a solution as it comes back from where it was written down."""
         return of_forced(self, to_forced(self, found))
 
+    def stage_of(self, found: Followed) -> Stage:
+        """Return the name under which a solution is written down."""
+        return "low" if found.kind == "point" and not self.raises else found.kind
+
     def height(self, found: Followed) -> float:
         """Return the amplitude of the first output, m."""
-        q = self.problem(found.level).coefficients(found.point.x)
-        return self.forced.amplitude_of(found.p, q)
+        return _height(self, found)
+
+
+@lru_cache(maxsize=4)
+def _height(curve: ForcedCurve, found: Followed) -> float:
+    """Return a height; kept, because each point is compared with two neighbours."""
+    q = curve.problem(found.level).coefficients(found.point.x)
+    return curve.forced.amplitude_of(found.p, q)
 
 
 def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
@@ -242,18 +252,22 @@ def followed(
 
 def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -> ForcedPoint:
     """Return what was found on the way as a point of the response."""
+    return _as_forced(curve, found, stage or curve.stage_of(found))
+
+
+@lru_cache(maxsize=2)
+def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint:
+    """Return the same; kept, because the follower goes on from what is written down."""
     point, judged = found.point, found.judged
-    balance = curve.problem(found.level)
-    made = forced_point(balance, point.solution, stage or found.kind, found.index, point.p, found.seconds)  # fmt: skip
-    start = np.zeros((0, 0), dtype=complex) if judged.start is None else judged.start
-    return replace(
-        made,
-        tangent=point.tangent,
-        step=point.step,
-        orientation=point.orientation,
-        predicted_error=judged.bound,
-        asked=np.array(judged.asked, dtype=np.int64),
-        start=start,
+    return forced_point(
+        curve.problem(found.level),
+        point.solution,
+        stage,
+        found.index,
+        point.p,
+        found.seconds,
+        point,
+        judged,
     )
 
 

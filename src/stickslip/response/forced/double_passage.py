@@ -50,9 +50,9 @@ def double_passage(
     passage = [p for p in done if p.stage in ("low", "found")]
     known = [of_forced(curve, p) for p in passage]
     for found in follow(curve, route_of(problem), known):
-        passage.append(to_forced(curve, found, "low" if found.kind == "point" else None))
+        passage.append(to_forced(curve, found))
         yield passage[-1]
-    low = [replace(p, stage="low") for p in points_of_branch(passage, "low")]
+    low = [p if p.stage == "low" else replace(p, stage="low") for p in points_of_branch(passage, "low")]  # fmt: skip
     stored = iter([p for p in done if p.stage in ("high", "branch")])
     yield from _Second(problem, low, static, stored).run()
 
@@ -143,12 +143,8 @@ def _followed(
                 # another sheet at the frequency of the end: on to that of the range
                 goal = low[-1].omega if any(p.omega == end for p in branch) else end
                 point = advance(balance, problem.branch_point(here), goal, following)
-            made = forced_point(
-                balance, point.solution, "branch", first, point.p, perf_counter() - began
-            )
-            made = replace(
-                made, tangent=point.tangent, step=point.step, orientation=point.orientation
-            )
+            seconds = perf_counter() - began
+            made = forced_point(balance, point.solution, "branch", first, point.p, seconds, point)
             yield made
         branch.append(made)
 

@@ -1,6 +1,7 @@
 """One forced response: the problem set up for both passages, and the points that it consists of."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ from stickslip.harmonic.selection.strategy import (
 from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, supports_of
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.branch import following_vibration
+from stickslip.response.branch import Judged, following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, start_point, step_to
@@ -136,8 +137,9 @@ class ForcedProblem:
     low: Balance
     high: Balance
     others: dict[Harmonics, Balance] = field(default_factory=dict)  # made when first needed
+    ways: dict[AnyBalance, Following] = field(default_factory=dict)  # of each such balance
 
-    @property
+    @cached_property
     def strategy(self) -> Strategy:
         """How harmonics are chosen."""
         return self.sweep.strategy
@@ -201,12 +203,17 @@ class ForcedProblem:
 
     def following(self, balance: AnyBalance) -> Following:
         """Return how a branch of `balance` is followed."""
+        if balance in self.ways:
+            return self.ways[balance]
         # along a branch a shorter step is cheaper than a long correction
         few = replace(
             self.sweep.newton,
             max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
         )
-        return following_vibration(balance, self.sweep.control, few)
+        way = following_vibration(balance, self.sweep.control, few)
+        if not isinstance(balance, LocalBalance):
+            self.ways[balance] = way
+        return way
 
     def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance) -> Point:
         """Go from a solution to another frequency on the branch with the harmonics of `balance`."""
@@ -248,7 +255,7 @@ class ForcedProblem:
         )
         return self.measure.change(motion, exact - motion)[0]
 
-    @property
+    @cached_property
     def driven(self) -> Harmonics:
         """Harmonics that the load drives; 1 where it drives none."""
         forces = self.low.linear.load.harmonics
@@ -369,12 +376,19 @@ def forced_point(
     index: int,
     omega: float,
     seconds: float,
+    there: Point | None = None,
+    judged: Judged = Judged(),  # noqa: B008  # frozen
 ) -> ForcedPoint:
-    """Return a solution as a point of the response."""
+    """Return a solution as a point of the response, with what a branch goes on with `there` and how it is `judged`."""
+    tangent: FloatArray = np.zeros(0)
+    step = sign = 0.0
+    if there is not None:
+        tangent, step, sign = there.tangent, there.step, there.orientation
     point = ForcedPoint(
-        stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
-        np.nan, solution.seconds_contact, solution.seconds_linear, seconds, rescue=solution.rung,
-        harmonics=np.array(balance.harmonics),
+        stage, index, omega, balance.coefficients(solution.x), tangent, step, solution.status, solution.iterations,
+        judged.bound, solution.seconds_contact, solution.seconds_linear, seconds, sign, solution.rung,
+        np.array(balance.harmonics), np.array(judged.asked, dtype=np.int64),
+        np.zeros((0, 0), dtype=complex) if judged.start is None else judged.start,
     )  # fmt: skip
     if not isinstance(balance, LocalBalance):
         return point
