@@ -137,7 +137,7 @@ class ForcedProblem:
     low: Balance
     high: Balance
     others: dict[Harmonics, Balance] = field(default_factory=dict)  # made when first needed
-    ways: dict[AnyBalance, Following] = field(default_factory=dict)  # of each such balance
+    ways: dict[AnyBalance, Following] = field(default_factory=dict, init=False)  # of each
 
     @cached_property
     def strategy(self) -> Strategy:
