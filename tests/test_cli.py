@@ -223,7 +223,7 @@ def test_check_says_once_what_holds_for_all_cases(tmp_path: Path) -> None:
     said = done("check", str(path)).splitlines()
     assert said.count("load.shaker.force_n = 5") == 1
     assert len([line for line in said if "natural frequencies, contacts open" in line]) == 1
-    assert "the same holds for: load.shaker.force_n = 8, load.shaker.force_n = 9" in said
+    assert "the same holds for: load.shaker.force_n = 8, 9" in said
 
 
 def test_masses_from_new_to_the_page(tmp_path: Path) -> None:

@@ -375,7 +375,7 @@ def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
     code, said = invoke("check", str(study))
     assert code == 0
     assert "stability: the peak and at most 4 doubtful points of a case" in said
-    code, said = invoke("run", str(study))
+    code, said = invoke("run", "-v", str(study))
     assert code == 0
     assert "Is it stable?" in said
     assert " Hz: stable" in said

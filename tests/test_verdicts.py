@@ -20,12 +20,15 @@ from stickslip.study.analyses.verdict import (
     conclusion,
     doubt,
     from_json,
+    in_lines,
     not_trusted,
     of_all_cases,
     of_tree,
     stored,
     to_json,
+    together,
     worst,
+    worst_first,
 )
 
 HZ = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
@@ -102,6 +105,27 @@ def many(at: tuple[int, ...]) -> np.ndarray:
     kept[:, :2] = 1
     kept[list(at)] = 1
     return kept
+
+
+def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
+    """As a terminal has them."""
+    fold = "whether it is stable: undecided, modulus {}"
+    given = [
+        Verdict("trusted", "k = 1", 10.0, "peak with H = 1"),
+        Verdict("doubtful", "k = 2", 11.0, fold.format(0.99), "Ask at 11 Hz."),
+        Verdict("trusted", "k = 3", 12.0, "peak with H = 3"),
+        Verdict("doubtful", "k = 4", 12.5, fold.format(1.01), "Ask at 12.5 Hz."),
+        Verdict("doubtful", "k = 5", None, "3 points have no solution"),
+        Verdict("doubtful", "k = 6", None, "4 audits failed"),
+    ]
+    assert in_lines(given) == [
+        f"DOUBTFUL: k = 2: 11.00 Hz: {fold.format(0.99)}. Ask at 11 Hz. The like: k = 4 (12.5 Hz).",
+        "DOUBTFUL: k = 5: 3 points have no solution.",
+        "DOUBTFUL: k = 6: 4 audits failed.",
+        "TRUSTED: k = 1, 3.",
+    ]
+    assert in_lines(given, every=True) == [str(v) for v in worst_first(given)]
+    assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
 
 
 def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> None:

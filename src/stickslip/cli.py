@@ -98,7 +98,11 @@ def run(
     ] = True,
     verbose: Annotated[
         bool,
-        typer.Option("--verbose", "-v", help="Say what jobs say on their way: points, checks."),
+        typer.Option(
+            "--verbose",
+            "-v",
+            help="Say what jobs say on their way, points and checks, and every verdict.",
+        ),
     ] = False,
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
@@ -116,12 +120,14 @@ def run(
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
-        from stickslip.study.analyses.verdict import stored, worst_first
+        from stickslip.study.analyses.verdict import in_lines, stored
 
         for table in (t for tables in result.summaries.values() for t in tables):
-            say_table(table.title, table.head, table.rows, table.lines)
+            if verbose or not table.detail:
+                say_table(table.title, table.head, table.rows, table.lines)
         points = result.failed - len(stored(result.data.attrs))  # jobs set aside are no points
-        say_answers(worst_first(result.verdicts), points, files, result.conclusion)
+        told = in_lines(result.verdicts, every=verbose)
+        say_answers(told, points, files, result.conclusion)
     raise typer.Exit(NOT_CONVERGED if result.failed else DONE)
 
 

@@ -78,9 +78,9 @@ def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]])
     console().print(table)
 
 
-def say_answers(verdicts: Sequence[object], failed: int, files: Sequence[Path], last: str) -> None:
+def say_answers(verdicts: Sequence[str], failed: int, files: Sequence[Path], last: str) -> None:
     """Print the verdicts, how many points have no solution, which files there are, and last whether to trust it."""
-    say_lines("Verdicts", [str(v) for v in verdicts])
+    say_lines("Verdicts", verdicts)
     if failed:
         told = f"{failed} of the points: marked in the result and in the report, not filled in"
         say_lines("Not converged", [told])

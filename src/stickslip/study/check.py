@@ -3,6 +3,7 @@
 import math
 
 from stickslip.assembly.model import Model
+from stickslip.study.analyses.verdict import together
 from stickslip.study.keep.progress import LOG
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
@@ -37,7 +38,7 @@ def check_study(study: Study) -> tuple[str, ...]:
     if measured is not None:
         LOG.info(measured.sentence)
     if alike:
-        LOG.info(f"the same holds for: {', '.join(alike)}")
+        LOG.info(f"the same holds for: {together(alike)}")
     return tuple(t.removeprefix(WARNING) for t in told if t.startswith(WARNING))
 
 

@@ -187,9 +187,10 @@ def named(name: str) -> Analysis:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text: its heading, the names of its columns, its cells, and lines below it."""
+    """A table as text: its heading, the names of its columns, its cells, and lines below it; `detail`: a terminal shows it on request."""
 
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     lines: tuple[str, ...] = ()
+    detail: bool = False

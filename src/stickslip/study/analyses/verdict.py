@@ -1,6 +1,7 @@
 """Whether an answer is to be trusted: trusted, doubtful or wrong, why, and what to do."""
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
@@ -11,6 +12,8 @@ import xarray as xr
 Level = Literal["trusted", "doubtful", "wrong"]
 LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a dataset is its place
 ATTRIBUTE = "verdicts"  # of the dataset of an analysis
+ALIKE = 20  # characters that two verdicts of one kind share before their first number, at least
+_NUMBER = re.compile(r"\d")
 INCOMPLETE = "the run is not complete"
 
 
@@ -68,6 +71,12 @@ class Verdict:
         return said(self.case, f"{place}{self.why}.")
 
     @property
+    def place(self) -> str:
+        """Its case and frequency."""
+        hertz = "" if self.frequency_hz is None else f"{self.frequency_hz:.6g} Hz"
+        return f"{self.case} ({hertz})" if self.case and hertz else self.case or hertz
+
+    @property
     def sentence(self) -> str:
         """The verdict in words, but for its level."""
         return f"{self.finding} {self.remedy}".rstrip()
@@ -110,6 +119,40 @@ def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdic
 def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
     """Return verdicts as they are read: wrong, doubtful, warnings, notes, trusted; the order of the cases within each."""
     return sorted(verdicts, key=lambda v: (-v.rank, not v.warns, not v.told))
+
+
+def together(labels: Sequence[str]) -> str:
+    """Return labels of cases in a line: values of one key behind its name."""
+    keys = {label.partition(" = ")[0] for label in labels}
+    if len(keys) == 1 and not any(", " in label for label in labels):
+        head, *rest = labels
+        return ", ".join([head, *(label.partition(" = ")[2] or label for label in rest)])
+    return ", ".join(labels)
+
+
+def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
+    """Return verdicts as lines, worst first: of one kind the first one and where the others are, unless `every` one is asked for."""
+    kinds: dict[tuple[str, ...], list[Verdict]] = {}
+    for v in worst_first(verdicts):
+        own: tuple[str, ...] = (v.word, _gist(v.why), _gist(v.remedy))
+        if every or len(own[1]) < ALIKE:
+            own = (str(v),)
+        if not every and v.case and not v.told:
+            own = ()
+        kinds.setdefault(own, []).append(v)
+    lines = []
+    for own, (first, *others) in kinds.items():
+        if not own and others:
+            lines.append(f"TRUSTED: {together([v.case for v in (first, *others)])}.")
+        else:
+            like = together([v.place for v in others])
+            lines.append(f"{first}{f' The like: {like}.' * bool(others)}")
+    return lines
+
+
+def _gist(text: str) -> str:
+    """Return what a sentence says before its first number."""
+    return _NUMBER.split(text, maxsplit=1)[0]
 
 
 def to_json(verdicts: Iterable[Verdict]) -> str:
@@ -188,7 +231,7 @@ def _not_trusted(name: str, data: xr.Dataset) -> str:
     beside = [label for label in bad if label in labels[levels < 2]]
     said = [f"wrong at single points of {', '.join(beside)}"] * bool(beside)
     said += [
-        f"{np.sum(levels == rank)} of {levels.size} cases {LEVELS[rank]} ({', '.join(labels[levels == rank])})"
+        f"{np.sum(levels == rank)} of {levels.size} cases {LEVELS[rank]} ({together(labels[levels == rank].tolist())})"
         for rank in (2, 1)
         if np.any(levels == rank)
     ]

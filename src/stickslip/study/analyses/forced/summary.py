@@ -46,9 +46,9 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _of_orders(data, labels),
         _of_blades(data, labels),
         _lines(TITLE, range_lines(data)),
-        _lines(_choice_title(data), choices(data)),
+        _lines(_choice_title(data), choices(data), detail=True),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
-        _lines("Is it stable?", all_lines(data, labels)),
+        _lines("Is it stable?", all_lines(data, labels), detail=True),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
         _lines(
             "In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)
@@ -187,8 +187,8 @@ def beside_bifurcations(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
     return (*_along(data, "side_branch", labels), *limits)
 
 
-def _lines(title: str, lines: tuple[str, ...]) -> TextTable:
-    return TextTable(title, (), (), lines)
+def _lines(title: str, lines: tuple[str, ...], *, detail: bool = False) -> TextTable:
+    return TextTable(title, (), (), lines, detail)
 
 
 def _sentences(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
