@@ -1,5 +1,6 @@
 """Many contacts: the Jacobian by its products, its preconditioner, and Krylov methods, against arrays and LU."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic import shared_factor as shared_factor_module
 from stickslip.harmonic import structured as structured_module
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import factorise
@@ -28,7 +30,7 @@ from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.operators import Bordered, array_of
+from stickslip.operators import Bordered, Costs, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
@@ -665,20 +667,87 @@ def test_size_chooses_the_form(monkeypatch):
     made = replace(problem(1.0), jacobian="auto")
     assert not made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, np.ndarray)
-    monkeypatch.setattr(balance_module, "CROSSOVER", made.size + 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: False)
     assert not made.structured
-    monkeypatch.setattr(balance_module, "CROSSOVER", made.size - 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     assert made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
     # without harmonics nothing is saved, and the static problem is small
     static = problem(1.0).with_order(0)
     x = np.random.default_rng(0).standard_normal(static.size)
     assert isinstance(static.linearise(x, OMEGA).jac, np.ndarray)
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     by_products = static.linearise(x, OMEGA)
     assert isinstance(by_products.jac, np.ndarray)
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1000)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: False)
     assert_same(by_products.jac, static.linearise(x, OMEGA).jac)
+
+
+def test_products_pay_from_some_three_hundred_unknowns():
+    def pay(coordinates, order):
+        contacts = coordinates // 3
+        return products_pay(linear_costs(coordinates, order + 1, 5 * contacts * (2 * order + 1) ** 2))  # fmt: skip
+
+    assert not pay(24, 3)  # 168 unknowns
+    assert not pay(36, 3)  # 252
+    assert pay(36, 5)  # 396
+    assert pay(33, 41)  # 2739
+    assert pay(300, 5)  # 3300
+
+
+def priced(monkeypatch, product: float, array: float) -> None:
+    """Let systems cost what a test wants."""
+    costs = Costs(product, 0.0, array)
+    monkeypatch.setattr(structured_module, "linear_costs", lambda *_: costs)
+
+
+def test_what_costs_more_by_products_is_factorised_for_a_while(monkeypatch):
+    balance, x = state("gross slip")
+    at = balance.linearise(x, OMEGA)
+    right = np.random.default_rng(0).standard_normal(balance.size)
+    exact = np.linalg.solve(at.jac.dense(), right)
+    dear, automatic = [], Automatic()
+    priced(monkeypatch, 1.0, 1.5)
+    for _ in range(20):
+        before = automatic.krylov.counts.systems
+        found = automatic.solve(at.jac, right)
+        dear.append(automatic.krylov.counts.systems > before)
+        if not dear[-1]:
+            assert_same(found, exact, 1e-9)
+    # products are tried once, and again after a longer while
+    assert np.flatnonzero(dear).tolist() == [0, 5, 14]
+    priced(monkeypatch, 1.0, 1000.0)
+    automatic = Automatic()
+    for _ in range(10):
+        automatic.solve(at.jac, right)
+    assert automatic.krylov.counts.systems == 10
+
+
+def test_what_a_krylov_method_does_not_solve_is_factorised():
+    balance, x = state("gross slip")
+    at = balance.linearise(x, OMEGA)
+    right = np.random.default_rng(0).standard_normal(balance.size + 1)
+    krylov = Krylov(tolerance=1e-12, max_products=2)
+    assert krylov.solve(at.jac, right[:-1]) is None
+    automatic = Automatic(krylov=krylov)
+    for jac in (at.jac, at.jac.transposed):
+        assert_same(automatic.solve(jac, right[:-1]), np.linalg.solve(jac.dense(), right[:-1]), 1e-9)  # fmt: skip
+    border = (at.jac_p, x, 0.5)
+    found, sign = Automatic(krylov=krylov).solve_bordered(at.jac, *border, right)
+    whole = np.block([[at.jac.dense(), at.jac_p[:, None]], [x[None], np.array([[0.5]])]])
+    assert_same(found, np.linalg.solve(whole, right), 1e-9)
+    assert sign == np.sign(np.linalg.slogdet(whole)[0])
+
+
+def test_the_choice_of_solver_is_pickled_without_what_it_saw():
+    balance, x = state("gross slip")
+    at = balance.linearise(x, OMEGA)
+    automatic = Automatic(krylov=Krylov(tolerance=1e-3))
+    automatic.solve(at.jac, at.residual)
+    copy = pickle.loads(pickle.dumps(automatic))
+    assert copy.krylov.tolerance == 1e-3
+    assert len(automatic.accounts) == 1
+    assert len(copy.accounts) == 0
 
 
 @pytest.mark.parametrize("name", STATES)
@@ -757,7 +826,7 @@ def test_forced_response_is_the_same(monkeypatch):
     )
     made, forces = system(), load(STATES["gross slip"])
     dense = list(forced_response(made, forces, sweep))
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     assert forced_problem(made, forces, sweep).low.structured
     iterated = list(forced_response(made, forces, sweep))
     assert all(p.converged for p in [*dense, *iterated])

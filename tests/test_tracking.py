@@ -201,7 +201,7 @@ def test_a_peak_that_almost_is_a_fold_is_tracked(ratio, form, monkeypatch):
     system, load = duffing()
     stiffness = system.structure.stiffness
     system = replace(system, structure=lumped(np.eye(2), stiffness, ratio * stiffness))
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1 if form == "structured" else 10**9)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: form == "structured")
     how = Discretisation(order=3, samples=64)
     levels = ratio / 0.03 * np.array([1.0, 1.5, 2.0])
     points = list(track_peak(system, load, "excitation", levels, (0.5, 0.9), discretisation=how))
@@ -240,7 +240,7 @@ def test_many_unknowns_are_tracked_by_products_as_by_arrays(by, monkeypatch):
     system, load = block()
     how, values = Discretisation(order=4), (0.5, 0.3, 0.15)
     arrays = list(track_peak(system, load, "mu", values, (0.8, 1.6), by, discretisation=how))
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     assert how.balance(system, load, NONE).structured
     krylov = Krylov()
     how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))

@@ -174,7 +174,7 @@ def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatc
     arrays = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
     assert all(point.converged and point.is_maximum for point in arrays)
     krylov = Krylov()
-    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))
     products = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
     assert krylov.counts.products > 0

@@ -22,6 +22,25 @@ class JacobianOperator(Protocol):
     def transposed(self) -> "JacobianOperator": ...  # noqa: D102
 
 
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """Seconds of one core that a linear system is estimated to cost.
+
+    Parameters
+    ----------
+    product
+        One product with the matrix and the preconditioner, and the share of a Krylov method in it.
+    factors
+        A new preconditioner.
+    array
+        The matrix put together and factorised.
+    """
+
+    product: float
+    factors: float
+    array: float
+
+
 Jacobian = FloatArray | JacobianOperator
 Corner = float | FloatArray
 

@@ -15,6 +15,7 @@ from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
+from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
@@ -33,9 +34,9 @@ from stickslip.harmonic.vector_forces import (
     linear_force,
     mass_damping_slope,
 )
+from stickslip.operators import Costs
 
 JacobianForm = Literal["auto", "dense", "structured"]
-CROSSOVER = 500  # unknowns above which products and a Krylov method cost less than an array and its LU factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +124,15 @@ class HarmonicBalance:
         large = self.large if self.jacobian == "auto" else self.jacobian == "structured"
         return large and self.order > 0
 
+    @cached_property
+    def _costs(self) -> Costs:
+        contacts = self.compiled.n_contacts * self.compiled.pairs
+        return linear_costs(self.linear.n, len(self.harmonics), contacts * self.n_rows**2)
+
     @property
     def large(self) -> bool:
         """Whether products cost less than an array."""
-        return self.size > CROSSOVER
+        return products_pay(self._costs)
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""

@@ -6,15 +6,17 @@ the gap over its coordinate, ``J = S + Rᵀ f E (ε D f R - R S / f)``: rows of 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.product import harmonic_means
+from stickslip.harmonic.costs import CALL, linear_costs
 from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.structured import StructuredJacobian, Transposed
+from stickslip.operators import Costs
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -159,6 +161,14 @@ class RigidJacobian:
         out = self._by_row(self.soft.rmatvec(w.reshape(-1)))
         out[:, laws.column] += laws.penalised_transposed(back).T
         return out.reshape(-1)
+
+    @property
+    def costs(self) -> Costs:
+        """What its linear systems cost: the harmonics of a product are solved one by one."""
+        harmonics = self.laws.order + 1
+        derivatives = self.soft.blocks.size + self.laws.own.size + self.laws.by_normal.size
+        own = linear_costs(self.soft.linear.n, harmonics, derivatives)
+        return replace(own, product=own.product + CALL * harmonics)
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""

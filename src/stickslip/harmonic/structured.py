@@ -24,6 +24,7 @@ from stickslip.contact.product import (
     sweep,
 )
 from stickslip.harmonic.condensed_product import CondensedProduct
+from stickslip.harmonic.costs import linear_costs
 from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.linear import Products
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
@@ -33,7 +34,7 @@ from stickslip.harmonic.small_blocks import (
     dynamic_stiffness,
     small_blocks,
 )
-from stickslip.operators import JacobianOperator
+from stickslip.operators import Costs, JacobianOperator
 
 SHARED = 150  # unknowns a harmonic from which one factor for all harmonics costs less than one each
 
@@ -130,6 +131,11 @@ class StructuredJacobian:
     def transposed(self) -> "Transposed":
         """Its transpose."""
         return Transposed(self)
+
+    @property
+    def costs(self) -> Costs:
+        """What its linear systems cost."""
+        return linear_costs(self.linear.n, len(self.linear.harmonics), self.blocks.size)
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
@@ -261,6 +267,11 @@ class Transposable(JacobianOperator, Protocol):
     @property
     def problem(self) -> object: ...  # noqa: D102
 
+    @property
+    def costs(self) -> Costs: ...  # noqa: D102
+
+    def dense(self) -> FloatArray: ...  # noqa: D102
+
     def preconditioner(self) -> Any: ...  # noqa: D102
 
     def transposed_solve(self, kept: Any) -> Solve: ...  # noqa: D102
@@ -281,6 +292,15 @@ class Transposed:
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return self.transposed.shape
+
+    @property
+    def costs(self) -> Costs:
+        """What its linear systems cost."""
+        return self.transposed.costs
+
+    def dense(self) -> FloatArray:
+        """Return it as an array."""
+        return self.transposed.dense().T
 
     def matvec(self, v: FloatArray) -> FloatArray:
         """Return ``Jᵀ v``."""

@@ -17,7 +17,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.operators import Bordered, Corner, Jacobian, JacobianOperator, array_of, times
 from stickslip.solve.gmres import gmres
-from stickslip.solve.linear import Dense, LinearSolver
+from stickslip.solve.linear import MOST, Assembling, Dense, LinearSolver, assembled
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -26,6 +26,12 @@ YOUNG = 12  # ... though not below that many iterations, which cost less than ne
 GAIN = (
     0.1  # share of the residual of a bordered system above which another correction does not help
 )
+CREDIT = 4.0  # arrays that systems which were cheap by products pay for
+PAUSES = (
+    4,
+    64,
+)  # systems that are factorised before products are tried again: the first time, and at most
+LEAST = 8  # products that are tried
 COARSE = 1e-4  # tolerance above which rounding is no part of what is left
 ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
 
@@ -89,8 +95,9 @@ class Krylov:
     tangent_tolerance
         The same for the tangent of a branch, whose right side is zero but for the border; `tolerance` where that is finer.
     max_products
-        Products with the Jacobian in one system. What was reached then counts as a solution if its relative residual is below the root
-        of the tolerance.
+        Products with the Jacobian in one system.
+    lenient
+        Whether what these reach counts as a solution where its relative residual is below the root of the tolerance.
     counts
         What was done so far.
     memory
@@ -101,6 +108,7 @@ class Krylov:
     tolerance: float = 1e-2
     tangent_tolerance: float = 1e-6
     max_products: int = 100
+    lenient: bool = True
     counts: KrylovCounts = field(default_factory=KrylovCounts)
     memory: "WeakKeyDictionary[object, _Kept]" = field(
         default_factory=WeakKeyDictionary, repr=False
@@ -111,7 +119,7 @@ class Krylov:
 
     def __reduce__(self) -> tuple["partial[Krylov]", tuple[()]]:
         """Pickle the options alone: what is kept belongs to the problems of one process."""
-        options = ("method", "tolerance", "tangent_tolerance", "max_products")
+        options = ("method", "tolerance", "tangent_tolerance", "max_products", "lenient")
         return partial(Krylov, **{name: getattr(self, name) for name in options}), ()
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
@@ -148,7 +156,7 @@ class Krylov:
             self.counts.preconditioners += 1
             kept = self.memory[inside.problem] = _Kept(made)
             solution, left = self._refined(jac, kept, right, tolerance)
-            if left <= max(tolerance, np.sqrt(tolerance)):
+            if left <= (max(tolerance, np.sqrt(tolerance)) if self.lenient else tolerance):
                 return solution
         self.counts.failures += 1
         return None
@@ -255,25 +263,106 @@ def _preconditioned(jac: Jacobian) -> Preconditioned:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
+class _Account:
+    """How systems of a problem turned out by products, and how many of the next ones are factorised.
+
+    Attributes
+    ----------
+    debt
+        Seconds that products took beyond what arrays would have, as `Costs` has them; negative where they took less.
+    arrays
+        Systems to be factorised before products are tried again.
+    pause
+        How many it will be the next time.
+    """
+
+    debt: float = 0.0
+    arrays: int = 0
+    pause: int = PAUSES[0]
+
+    def took(self, spent: float, array: float, *, failed: bool) -> None:
+        """Take down what a system took by products, and what it would have taken as an array."""
+        self.debt = max(self.debt + spent - array, -CREDIT * array)
+        if failed or self.debt > array:
+            self.arrays, self.debt = self.pause, 0.0
+            self.pause = min(2 * self.pause, PAUSES[1])
+        elif self.debt == -CREDIT * array:
+            self.pause = PAUSES[0]
+
+
+_By = Callable[[LinearSolver, Jacobian], tuple[FloatArray | None, float]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Automatic:
-    """LU for a Jacobian that is an array, and a Krylov method for one that is known by its products."""
+    """LU for a Jacobian that is an array. A Krylov method for one that is known by its products, and LU where that was seen to cost more.
+
+    What products took is counted, not timed, so that every run decides alike: the costs of a product and of an array are estimated from
+    what can be counted (`Costs`). A Krylov method that takes more than an array, or finds no solution, gives way to LU for some systems of the same
+    problem, and is then tried again.
+
+    Parameters
+    ----------
+    dense, krylov
+        The solvers.
+    accounts
+        What was seen so far, of each problem and each tolerance.
+    """
 
     dense: LinearSolver = Dense()  # noqa: RUF009  # frozen
-    krylov: LinearSolver = field(default_factory=Krylov)
+    krylov: Krylov = field(default_factory=Krylov)
+    accounts: "WeakKeyDictionary[object, dict[float, _Account]]" = field(
+        default_factory=WeakKeyDictionary, repr=False
+    )
+
+    def __reduce__(self) -> tuple["partial[Automatic]", tuple[()]]:
+        """Pickle the solvers alone: what was seen belongs to the problems of one process."""
+        return partial(Automatic, dense=self.dense, krylov=self.krylov), ()
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
-        return self._solver(jac).solve(jac, right)
+        return self._solve(jac, lambda linear, whole: (linear.solve(whole, right), np.nan))[0]
 
     def solve_bordered(
         self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system; see `LinearSolver`."""
-        return self._solver(jac).solve_bordered(jac, column, row, corner, right)
 
-    def _solver(self, jac: Jacobian) -> LinearSolver:
-        return self.krylov if array_of(jac) is None else self.dense
+        def by(linear: LinearSolver, inside: Jacobian) -> tuple[FloatArray | None, float]:
+            return linear.solve_bordered(inside, column, row, corner, right)
+
+        return self._solve(jac, by)
+
+    def _solve(self, jac: Jacobian, by: _By) -> tuple[FloatArray | None, float]:
+        """Solve `by` the solver that costs less."""
+        if array_of(jac) is not None:
+            return by(self.dense, jac)
+        inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+        if not (isinstance(inside, Assembling) and isinstance(inside, Preconditioned)):
+            return by(self.krylov, jac)
+        account = self.accounts.setdefault(inside.problem, {}).setdefault(
+            self.krylov.tolerance, _Account()
+        )
+        if account.arrays > 0:
+            account.arrays -= 1
+            array = assembled(jac)
+            if array is not None:
+                return by(self.dense, array)
+        costs, counts, before = inside.costs, self.krylov.counts, replace(self.krylov.counts)
+        krylov = self.krylov
+        if inside.shape[0] <= MOST:  # as long as it is worth it: there is another way
+            worth = max(int(costs.array / costs.product), LEAST)
+            krylov = replace(krylov, max_products=min(krylov.max_products, worth), lenient=False)
+        found = by(krylov, jac)
+        products = counts.products - before.products
+        new = counts.preconditioners - before.preconditioners
+        spent = products * costs.product + new * costs.factors
+        account.took(spent, costs.array, failed=found[0] is None)
+        if found[0] is not None:
+            return found
+        array = assembled(jac)
+        return found if array is None else by(self.dense, array)
 
 
 def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:
@@ -281,5 +370,5 @@ def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:
     if isinstance(linear, Krylov):
         return replace(linear, tolerance=tolerance)
     if isinstance(linear, Automatic):
-        return replace(linear, krylov=to_tolerance(linear.krylov, tolerance))
+        return replace(linear, krylov=replace(linear.krylov, tolerance=tolerance))
     return linear

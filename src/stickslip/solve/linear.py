@@ -1,6 +1,6 @@
 """The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -11,6 +11,7 @@ from stickslip.errors import input_error
 from stickslip.operators import (
     Bordered,
     Corner,
+    Costs,
     Inverse,
     Jacobian,
     JacobianOperator,
@@ -21,14 +22,21 @@ from stickslip.operators import (
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 
 
-ASSEMBLED = (
-    1500  # unknowns up to which one factorisation costs less than some five iterative solutions
-)
+SOLUTIONS, PRODUCTS = (
+    5,
+    10,
+)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
+MOST = 8000  # unknowns of an array, which then takes half a GB
 
 
 @runtime_checkable
 class Assembling(JacobianOperator, Protocol):
     """A Jacobian known by its products that can be had as an array."""
+
+    @property
+    def costs(self) -> Costs:
+        """What its linear systems cost."""
+        ...
 
     def dense(self) -> FloatArray:
         """Return the array."""
@@ -111,16 +119,30 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
     """Return how systems with `jac` and with its transpose are solved; None if `jac` is singular.
 
-    An array is factorised once, and overwritten. So is a Jacobian known by its products that can be put together and is not large, for many
-    right sides follow; a large one is solved by `linear` for each of them.
+    An array is factorised once, and overwritten. So is a Jacobian known by its products where that costs less than some solutions, for several
+    right sides follow; others are solved by `linear` for each of them.
     """
     matrix = array_of(jac)
-    if matrix is None and isinstance(jac, Assembling) and jac.shape[0] <= ASSEMBLED:
+    if matrix is None and isinstance(jac, Assembling) and _array_pays(jac):
         matrix = jac.dense()
     if matrix is None:
         return _Iterated(linear, jac)
     lu, pivots = _factors(matrix)
     return None if lu is None else Factored(lu, pivots)
+
+
+def _array_pays(jac: Assembling) -> bool:
+    costs = jac.costs
+    return costs.array < costs.factors + SOLUTIONS * PRODUCTS * costs.product
+
+
+def assembled(jac: Jacobian) -> FloatArray | None:
+    """Return a Jacobian known by its products as a new array, borders included; None where it cannot be put together, or is too large."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if not isinstance(inside, Assembling) or inside.shape[0] > MOST:
+        return None
+    array = inside.dense()
+    return replace(jac.flat, jac=array).array() if isinstance(jac, Bordered) else array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.assembly.model import Model
-from stickslip.harmonic.balance import CROSSOVER
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
 from stickslip.model.part import Part
@@ -16,6 +15,7 @@ from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
 NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
 AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
 FEWEST_A_POINT = 2  # where hardly a contact slips: two wheels took 1.6 to 3
@@ -134,7 +134,7 @@ def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
 
 def _flops(unknowns: int) -> int:
     """Return what a Newton step takes; with many unknowns a Krylov method is used, which does not factorise them all together."""
-    return 4 * unknowns * min(unknowns, CROSSOVER) ** 2
+    return 4 * unknowns * min(unknowns, FACTORISED) ** 2
 
 
 def check_limits(limits: Limits, cost: Estimate) -> None:
