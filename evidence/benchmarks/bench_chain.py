@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from evidence.benchmarks.bench_newton import medians
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
@@ -35,6 +36,7 @@ OWN_ENVIRONMENT = ROOT / ".venv-rival" / "bin" / "python"
 ABSENT = "not measured: install stickslip[bench], or run `make bench-rival`"
 REPEATS = 120  # over the number of elements: runs of which the fastest counts
 EQUAL = 1e-6  # of the largest coefficient of the point
+PARTS = 101  # rounds in which the parts of a point are timed
 STEP = 0.2  # rad/s between points
 LOAD_SHARES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)  # of a load that is ramped up
 HYBRID = {
@@ -101,11 +103,11 @@ class Chain:
 CASES = {
     "small": (
         Chain(masses=20, mass=1.0, stiffness=1e4, elements=6, k_t=2e3, limit=10.0, omega_range=(6.0, 12.0), points=32, rival_runs=3),
-        50.0,
+        80.0,
     ),
     "big": (
         Chain(masses=100, mass=0.2, stiffness=5e4, elements=60, k_t=200.0, limit=1.0, omega_range=(8.0, 14.0), points=32),
-        80.0,
+        90.0,
     ),
 }  # fmt: skip
 
@@ -168,6 +170,38 @@ def timed(case: Chain) -> tuple[float, list[ForcedPoint]]:
     return min(seconds[1:]) / sum(p.converged for p in points), points
 
 
+def split(case: Chain, points: list[ForcedPoint], seconds: float) -> str:
+    """Return how the time of a point splits: what its evaluations, linear systems and one condensation take at the point in the middle."""
+    balance = forced_problem(case.system(), case.load(), case.sweep()).high
+    point = points[len(points) // 2]
+    x, omega = balance.unknowns(point.coefficients), point.omega
+    at = balance.linearise(x, omega)
+    linear = case.sweep().newton.linear
+
+    def solve() -> None:  # an array is overwritten
+        linear.solve(at.jac.copy() if isinstance(at.jac, np.ndarray) else at.jac, at.residual)
+
+    contacts, equations, factors, condensed = medians(
+        [
+            lambda: balance.forces(x, omega),
+            lambda: balance.linearise(x, omega),
+            solve,
+            lambda: balance.linear.condensed(omega, case.order),
+        ],
+        PARTS,
+    )
+    # an evaluation and a linear system each Newton step and, for the tangent, each point
+    each = 1.0 + sum(p.iterations for p in points) / len(points)
+    parts = {
+        "contacts": each * contacts,
+        "equations": each * (equations - contacts),
+        "linear systems": each * factors,
+        "condensation": condensed,
+    }
+    parts["steps and the rest"] = seconds - sum(parts.values())
+    return ", ".join(f"{name} {1e6 * t:.0f} us" for name, t in parts.items())
+
+
 def difference(case: Chain, other: Rival) -> float:
     """Return the largest difference of a coefficient from pyHarm's at its own frequencies, over the largest of the point.
 
@@ -211,15 +245,10 @@ def compared(name: str, case: Chain, goal: float, python: str) -> list[dict[str,
     for key, method in (("", HYBRID), ("_newton", NEWTON_RAPHSON)):
         others[key] = rival(python, case, method)
         ours = min(ours, timed(case)[0])
-    shares = [
-        sum(getattr(p, part) for p in points)
-        for part in ("seconds_contact", "seconds_linear", "seconds_total")
-    ]
     failed = sum(not p.converged for p in points)
     note = (
         f"{case.elements} elements, H = {case.order}, {case.samples} samples; stickslip {1e3 * ours:.2f} ms a point, {len(points)} points, "
-        f"{failed} without a solution, {sum(p.iterations for p in points)} Newton steps (contacts {shares[0] / shares[2]:.0%}, "
-        f"LAPACK {shares[1] / shares[2]:.0%})"
+        f"{failed} without a solution, {sum(p.iterations for p in points)} Newton steps: {split(case, points, ours)}"
     )
     records = [
         {
