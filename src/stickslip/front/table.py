@@ -58,4 +58,6 @@ class Table:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    if isinstance(value, float | np.floating):
+        return f"{value:.6g}" if np.isfinite(value) else "–"
+    return str(value)

@@ -141,7 +141,14 @@ def differences(designs: Sequence[Design]) -> list[list[str]]:
     """Return a row for each key of the study files that is not the same in all: the key, then its value in each design."""
     keys = dict.fromkeys(key for d in designs for key in d.inputs)
     rows = [[key, *(d.inputs.get(key, MISSING) for d in designs)] for key in keys]
-    return [[str(cell) for cell in row] for row in rows if any(cell != row[1] for cell in row[2:])]
+    return [[row[0], *map(_plain, row[1:])] for row in rows if any(c != row[1] for c in row[2:])]
+
+
+def _plain(value: Any) -> str:
+    """Return a value of a study file as text: numbers with the digits that they need, lists without quotes."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain, value))}]"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def read_curve(path: Path) -> MeasuredCurve:

@@ -119,15 +119,21 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
     over = " / force" if divided else ""
     figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))  # fmt: skip
     figure.update_xaxes(title_text="frequency (Hz)")
-    caption = f"Amplitude of {joined([_output(d) for d in told])}. Open symbols are doubtful points, crosses wrong ones."
+    caption = (
+        f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones."
+    )
     captions = {c.index: _shown(told, c, divided=divided) for c in offered}
     first = opening(designs, offered, divided=divided)
     chosen = first.index if first else -1
     return Plot("compared_responses", "Responses over each other", caption, figure, captions, chosen)  # fmt: skip
 
 
-def _output(design: Design) -> str:
-    return f"{design.response.output_name} ({design.name})" if design.response else design.name
+def _outputs(designs: Sequence[Design]) -> str:
+    """Name the outputs whose amplitudes are compared: once where they are called alike."""
+    names = {d.name: d.response.output_name for d in designs if d.response}
+    if len({*names.values()}) == 1:
+        return next(iter(names.values()))
+    return joined([f"{output} ({name})" for name, output in names.items()])
 
 
 def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> str:
@@ -319,7 +325,8 @@ def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
         if not name:
             first, name = height, design.name
         else:
-            note += f"; {percent(over_first(height, first), 3)} against {name}"
+            off = over_first(height, first)
+            note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {name}"
         found.append(Card(quantity(height, unit_of(designs, divided=divided)), f"{word} of {design.name}", note))  # fmt: skip
     return found
 

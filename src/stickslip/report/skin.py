@@ -269,7 +269,7 @@ def skin_picture(node: Node) -> Plot | None:
     shown = node.cases[node.chosen].where if contacts and isinstance(node, Response) and node.chosen >= 0 else ""  # fmt: skip
     second = row | {"x": 0.76, "title": {"text": f"at the peak{shown}"}, "font": {"size": 12}}
     scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
-    margin = {"l": 0, "r": 0, "t": 40, "b": 70 if contacts else 10}
+    margin = {"l": 0, "r": 0, "t": 62, "b": 70 if contacts else 10}
     figure.update_layout(scene=scene, margin=margin, legend=legend, legend2=second)
     title = "The mesh and the contact points" if contacts else "The mesh"
     return Plot("mesh", title, _caption(node, points, triangles), figure)

@@ -250,7 +250,7 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
         return text
     a, b = known[0], known[-1]
     return text + (
-        f"Between the values the peak moves by {number(hz[b] - hz[a])} Hz, "
+        f"Between the values the peak moves by {number(abs(hz[b] - hz[a]))} Hz, "
         f"from {number(hz[a], 5)} Hz{cases[a].where} to {number(hz[b], 5)} Hz{cases[b].where}."
     )
 

@@ -42,7 +42,7 @@ def _peak_card(response: Response) -> Card:
     kind = counted(int(counts.sum()), "case")
     if not counts.all():
         kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
-    note = f"smallest peak of {kind}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    note = f"{response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if within[best] in (response.cases[0], response.cases[-1]):
         note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
     lower = int(np.argmin(peaks))
@@ -50,7 +50,7 @@ def _peak_card(response: Response) -> Card:
         note += f"; {number(float(peaks[lower]) * scale.factor)} {scale.unit} is {response.level(within[lower])}{within[lower].where}"
     if left_out:
         note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
-    return Card(size, within[best].label, note)
+    return Card(size, f"smallest peak of {kind}", note)
 
 
 def _shift_card(response: Response) -> Card | None:

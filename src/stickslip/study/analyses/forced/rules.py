@@ -176,8 +176,9 @@ def folds(case: Curve) -> Iterator[Finding]:
         return
     low, high = min(b for b, _ in back), max(a for _, a in back)
     inside = low <= case.peak_hz <= high
+    digits = next((d for d in range(2, 6) if round(low, d) != round(high, d)), 6)
     why = (
-        f"the response folds between {low:.2f} and {high:.2f} Hz: more than one periodic motion was found there, as a rule one "
+        f"the response folds between {low:.{digits}f} and {high:.{digits}f} Hz: more than one periodic motion was found there, as a rule one "
         "of them unstable" + (", and the peak stands among them" if inside else "")
     )
     remedy = "Points outside the asked range belong to the fold."
