@@ -285,3 +285,23 @@ def test_one_process_and_none_of_its_own_by_default() -> None:
         assert hands.cell is None
     with executor("", 1, apart=True) as hands:
         assert hands.cell is not None
+
+
+def test_what_is_not_complete_is_written_in_a_tenth_of_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock, written = [0.0], []
+
+    def write() -> None:
+        written.append(clock[0])
+        clock[0] += 2.0
+
+    monkeypatch.setattr(run, "monotonic", lambda: clock[0])
+    show = run._now_and_then(write)
+    for left in range(44, 0, -1):
+        show(left)
+        clock[0] += 1.0
+    assert written == [0.0, 20.0, 40.0]
+    clock[0] = 1000.0
+    show(0)  # the end writes it whole
+    assert len(written) == 3

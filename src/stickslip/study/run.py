@@ -1,7 +1,7 @@
 """From a study to its results: every job of every analysis, each record safe on the disk. The only runner."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, fields, replace
@@ -10,6 +10,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from stickslip import __version__
@@ -32,6 +33,8 @@ from stickslip.study.keep.workers import Hands, check_kind, executor
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.shard import Shard
+
+SHARE = 0.1  # of the time that a run may write what is not complete
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,12 +195,13 @@ def _run(
             files.append(study.folder / f"{name}.vtu")
             with whole_file(files[-1]) as temporary:
                 write_mesh(mesh, temporary)
+        show = _now_and_then(lambda: write_tree(book.tree(complete=False), target))
         with closing(worked(jobs, hands, study.folder)) as finished:
-            for sealed in finished:
+            for done, sealed in enumerate(finished, 1):
                 del unfinished[sealed]
                 if place.shard is None:
                     book.read(tasks, unfinished)
-                    write_tree(book.tree(complete=False), target)
+                    show(len(jobs) - done)
     if place.shard is not None:
         left = {t.sealed for t in tasks if t.analysis in asked and not t.ended()}
         if left:
@@ -208,6 +212,20 @@ def _run(
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
     return replace(outcome, files=(target, *files, place.log(study.folder)))
+
+
+def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:
+    """Return what writes while jobs are left, and no more than a tenth of the time: results of many cases take a while."""
+    due = 0.0
+
+    def wrote(left: int) -> None:
+        nonlocal due
+        began = monotonic()
+        if left and began >= due:
+            write()
+            due = monotonic() + (1 / SHARE - 1) * (monotonic() - began)
+
+    return wrote
 
 
 def _longest_first(tasks: Iterable[Task]) -> list[Task]:
