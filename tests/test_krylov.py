@@ -25,8 +25,8 @@ from stickslip.harmonic.factors import factorise
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
-from stickslip.harmonic.shared_factor import SharedFactor
-from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses
+from stickslip.harmonic.structured import HarmonicFactors, StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
@@ -373,6 +373,7 @@ def test_preconditioner_holds_all_below_the_harmonics(relative):
 @pytest.fixture
 def shared(monkeypatch):
     monkeypatch.setattr(structured_module, "SHARED", 0)
+    monkeypatch.setattr(shared_factor_module, "REACH", 0.0)  # as many modes as there may be
 
 
 @pytest.mark.parametrize("name", STATES)
@@ -419,6 +420,24 @@ def test_transposed_system_takes_the_shared_factor(name, shared):
     found = Krylov(tolerance=1e-11).solve(jac.transposed, a)
     exact = np.linalg.solve(jac.dense().T, a)
     assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+
+
+def test_harmonics_above_all_modes_have_factors_of_their_own(monkeypatch):
+    monkeypatch.setattr(structured_module, "SHARED", 0)
+    balance, x = state("lift-off")  # the third harmonic is above a quarter of the modes
+    kept = balance.linearise(x, OMEGA).jac.preconditioner()
+    assert isinstance(kept, HarmonicFactors)
+
+
+def test_harmonics_have_factors_of_their_own_where_a_shared_one_does_not_do(shared, monkeypatch):
+    balance, x = state("lift-off")
+    at = balance.linearise(x, OMEGA)
+    monkeypatch.setattr(SharedInverses, "solve", lambda _, place, rows: (place % 2) * rows)
+    krylov = Krylov(tolerance=1e-8)
+    found = krylov.solve(at.jac, -at.residual)
+    exact = dense_solution(at.jac, -at.residual)
+    assert np.linalg.norm(found - exact) <= 1e-6 * np.linalg.norm(exact)
+    assert (krylov.counts.preconditioners, krylov.counts.failures) == (2, 0)
 
 
 def test_shared_factor_turns_to_double_precision_where_single_tells_too_little(shared, monkeypatch):

@@ -22,7 +22,9 @@ from stickslip.harmonic.condensed_product import CondensedProduct
 from stickslip.harmonic.factors import Factors, factorise
 
 Solve = Callable[[FloatArray | ComplexArray], FloatArray | ComplexArray]
-LEAST_MODES, MODES_PER_HARMONIC = 24, 4
+LEAST_MODES = 24
+REACH = 1.2  # times the highest harmonic's frequency up to which modes are wanted ...
+INNER = 0.75  # ... among this share of them: the last ones are not sharp
 MOST_MODES = 4  # coordinates for each mode at least
 ROUNDS = 4  # of the subspace iteration for the modes
 SHARP = 0.01  # residual that single precision may leave of a random right side
@@ -107,7 +109,7 @@ def _in_its_precision(factor: Factors, solve: Solve, right: FloatArray) -> Float
 def shared_factor(
     linear: CondensedProduct, means: ComplexArray, rows: SparseRows, scale: float
 ) -> SharedFactor | None:
-    """Factorise A and find its low modes; None if A is singular.
+    """Factorise A and find its low modes; None if A is singular, or too many modes are low.
 
     Parameters
     ----------
@@ -123,42 +125,56 @@ def shared_factor(
     matrix = linear.static()
     add_stiffness(means.real.mean(axis=0), rows.columns, rows.values, matrix)
     matrix *= scale
-    count = _mode_count(linear)
-    start = np.random.default_rng(0).standard_normal((linear.n, count + 1))
-    right, start = start[:, 0], start[:, 1:]
     for single in (True, False):
         factor = factorise(
             matrix.astype(np.float32, order="F") if single else np.array(matrix, order="F")
         )
-        if factor is None:
+        found = None if factor is None else _enough_modes(linear, factor, scale)
+        if factor is None or found is None:
             continue
-        modes, weighted = _low_modes(linear, factor, start)
+        modes, weighted = found
+        right = np.random.default_rng(1).standard_normal(linear.n)
         high = right - weighted @ (modes.T @ right)
-        found = _in_its_precision(factor, factor.solve, high)
-        if np.linalg.norm(matrix @ found - high) <= SHARP * np.linalg.norm(high):
-            gaps = rows.gaps(modes.T.copy())
-            gaps = np.ascontiguousarray(gaps.reshape(count, -1, 3).transpose(1, 2, 0))
-            return SharedFactor(linear, factor, modes, weighted, gaps, linear.projected(modes))
+        left = matrix @ _in_its_precision(factor, factor.solve, high) - high
+        if np.linalg.norm(left) <= SHARP * np.linalg.norm(high):
+            count = modes.shape[1]
+            gaps = rows.gaps(modes.T.copy()).reshape(count, -1, 3).transpose(1, 2, 0)
+            projected = linear.projected(modes)
+            return SharedFactor(
+                linear, factor, modes, weighted, np.ascontiguousarray(gaps), projected
+            )
     return None
 
 
-def _mode_count(linear: CondensedProduct) -> int:
-    wanted = max(LEAST_MODES, MODES_PER_HARMONIC * linear.harmonics[-1])
-    return min(wanted, linear.n // MOST_MODES)
+def _enough_modes(
+    linear: CondensedProduct, factor: Factors, scale: float
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return low modes beyond the highest harmonic, and M times them; None if that takes too many."""
+    wanted = scale * (REACH * linear.harmonics[-1] * linear.omega) ** 2
+    most = linear.n // MOST_MODES
+    count = min(LEAST_MODES, most)
+    while True:
+        sizes, modes, weighted = _low_modes(linear, factor, count)
+        if sizes[int(INNER * (count - 1))] >= wanted:
+            return modes, weighted
+        if count == most:
+            return None
+        count = min(2 * count, most)
 
 
 def _low_modes(
-    linear: CondensedProduct, factor: Factors, start: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return approximate low modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973)."""
-    weighted = start
-    modes = start
+    linear: CondensedProduct, factor: Factors, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973)."""
+    weighted: FloatArray = np.random.default_rng(0).standard_normal((linear.n, count))
+    sizes, modes = np.zeros(count), weighted
     for _ in range(ROUNDS):
         modes = _in_its_precision(factor, factor.solve, weighted)
         stiffness = modes.T @ weighted
         weighted = linear.mass_product(modes)
         mass = modes.T @ weighted
         # of unit mass; the stiffness is symmetric but for friction under a normal force
-        turn = scipy.linalg.eigh(stiffness + stiffness.T, mass + mass.T)[1] * np.sqrt(2.0)
+        sizes, turn = scipy.linalg.eigh(stiffness + stiffness.T, mass + mass.T)
+        turn *= np.sqrt(2.0)
         modes, weighted = modes @ turn, weighted @ turn
-    return modes, weighted
+    return sizes, modes, weighted

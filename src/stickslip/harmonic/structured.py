@@ -159,6 +159,13 @@ class StructuredJacobian:
             shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
             if shared is not None:
                 return shared
+        return self._harmonic_factors()
+
+    def better_preconditioner(self, kept: Kept) -> HarmonicFactors | None:
+        """Return the factors of ``Z_h + K̂ʰʰ`` where one factor for all of them did not do; None where they are what was kept, or singular."""
+        return self._harmonic_factors() if isinstance(kept, SharedFactor) else None
+
+    def _harmonic_factors(self) -> HarmonicFactors | None:
         factors, means = [], []
         for h, (mean, matrix) in enumerate(self.own_blocks()):
             own = factorise(np.array(matrix.real, order="F") if h == 0 else matrix)

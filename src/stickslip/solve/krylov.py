@@ -54,6 +54,15 @@ class Preconditioned(JacobianOperator, Protocol):
         ...
 
 
+@runtime_checkable
+class Graded(Preconditioned, Protocol):
+    """One that has a better preconditioner where its own does not do."""
+
+    def better_preconditioner(self, kept: object) -> object | None:
+        """Return what of a better preconditioner than `kept` is costly; None if there is none."""
+        ...
+
+
 @dataclass(eq=False)
 class KrylovCounts:
     """What a Krylov solver did so far: systems solved, products with a Jacobian, preconditioners made, systems given up."""
@@ -150,14 +159,14 @@ class Krylov:
                 return solution
         # the old factors go before the new ones come: they are most of what a large problem holds
         self.memory.pop(inside.problem, None)
-        kept = None
         made = inside.preconditioner()
-        if made is not None:
+        while made is not None:
             self.counts.preconditioners += 1
             kept = self.memory[inside.problem] = _Kept(made)
             solution, left = self._refined(jac, kept, right, tolerance)
             if left <= (max(tolerance, np.sqrt(tolerance)) if self.lenient else tolerance):
                 return solution
+            made = inside.better_preconditioner(made) if isinstance(inside, Graded) else None
         self.counts.failures += 1
         return None
 
