@@ -687,8 +687,9 @@ def test_size_chooses_the_form(monkeypatch):
     assert not made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, np.ndarray)
     monkeypatch.setattr(balance_module, "products_pay", lambda _: False)
-    assert not made.structured
+    assert not replace(made).structured
     monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
+    made = replace(made)  # the choice is kept
     assert made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
     # without harmonics nothing is saved, and the static problem is small
