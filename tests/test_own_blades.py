@@ -10,6 +10,7 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done
 
+from stickslip.assembly.forces import first_nodes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
@@ -254,7 +255,16 @@ def test_a_point_beyond_the_rim_is_told_so_and_how_much_the_tolerance_has_to_be(
     assert re.search(r" 0\.00183 m off\. Give tolerance_m = ten times the largest", told)
     wide = {f"contact.{side}.tolerance_m": "0.0184" for side in ("left", "right")}
     wide["part.damper.placed"] = along
-    assert len(read_study(write(tmp_path / "wide", FEW | wide)).model().pairs.names) == 8
+    model = read_study(write(tmp_path / "wide", FEW | wide)).model()
+    assert len(model.pairs.names) == 8
+    # of two outputs on sets of nodes the first node, which a user has to be told; a body has no others
+    left, right = first_nodes(model.places, model.outputs)
+    first = model.parts["left"].mesh.points[model.parts["left"].mesh.node_sets["TIP"][0]]
+    assert (
+        left
+        == f"output left: the first of the 35 nodes of left.TIP, at ({', '.join(f'{x:.6g}' for x in first)}) m"
+    )
+    assert right.startswith("output right: ")
 
 
 def test_a_damper_far_from_its_blades_is_told_how_far(tmp_path: Path) -> None:

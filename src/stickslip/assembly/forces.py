@@ -238,6 +238,20 @@ def _first(places: Places, spot: Spot) -> IntArray:
     return np.asarray(places.rows(spot.part, spot.surface.numbers[:1])[0])
 
 
+def first_nodes(places: Places, outputs: tuple[Output, ...]) -> tuple[str, ...]:
+    """Return a line about each output on a set of several nodes: it is the first of them."""
+    found = []
+    for output in outputs:
+        if output.near is None and places.parts[output.on.partition(".")[0]].body is None:
+            surface = places.spot(output.on, f"output.points.{output.name}").surface
+            if surface is not None and surface.numbers is not None and len(surface.numbers) > 1:
+                at = ", ".join(f"{x:.6g}" for x in surface.points[0])
+                found.append(
+                    f"output {output.name}: the first of the {len(surface.numbers)} nodes of {output.on}, at ({at}) m"
+                )
+    return tuple(found)
+
+
 def far_outputs(places: Places, outputs: tuple[Output, ...]) -> list[str]:
     """Return a warning about each output whose nearest node is far from the place asked for."""
     found = []

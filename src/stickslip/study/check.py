@@ -2,6 +2,7 @@
 
 import math
 
+from stickslip.assembly.forces import first_nodes
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.verdict import together
 from stickslip.study.keep.progress import LOG
@@ -25,7 +26,8 @@ def check_study(study: Study) -> tuple[str, ...]:
     for case in study.cases():
         model = case.build()
         with of_task(study, case):
-            lines = [_size(model), *(f"{WARNING}{text}" for text in model.warnings)]
+            lines = [_size(model), *first_nodes(model.places, model.outputs)]
+            lines += [*(f"{WARNING}{text}" for text in model.warnings)]
             for one in asked:
                 lines += one.check(case, model)
         # what holds for all cases is said once

@@ -10,10 +10,8 @@ from pathlib import Path
 from uuid import uuid4
 
 from stickslip.errors import InputError
-from stickslip.study.keep.journal import AT_WORK, JobJournal, read_place
+from stickslip.study.keep.journal import AT_WORK, BESIDE, JobJournal, read_place
 from stickslip.study.keep.progress import LOG
-
-BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
 
 
 def file_at_work(sealed: Path, owner: str = "") -> Path:

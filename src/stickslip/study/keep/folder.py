@@ -9,7 +9,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
-from stickslip.study.keep.journal import AT_WORK, SEALED
+from stickslip.study.keep.journal import AT_WORK, BESIDE, SEALED
 from stickslip.study.keep.whole import beside, unwritable
 
 NEEDED_BYTES = 200_000_000  # results, jobs and parts of a usual run
@@ -20,11 +20,11 @@ WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until
 OWN = (
     *WHOLE,
     *map(beside, WHOLE),
-    *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", "-journal")),
+    *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)),
 )
 LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
 SHARD_LOGS = "run-*-of-*.log"
-HELD = (LOCK, f"{LOCK}-journal", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
+HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from stickslip.study.keep.whole import unwritable
 
 FORMAT = 6  # raised whenever the tables or the archives change
 AT_WORK, SEALED = ".part", ".job"
+BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
 WHOLE = "whole"  # what a file says of itself that has been sealed
 DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
 PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
