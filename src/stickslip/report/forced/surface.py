@@ -127,13 +127,9 @@ def _caption(
     response: Response, case: ShownCase, surfaces: dict[str, tuple[IntArray, FloatArray]]
 ) -> str:
     slips, opens = _shares(response, case)
-    said = [
-        f"{group} {percent(100.0 * float(np.mean(slips[points] > 0)))}"
-        + (
-            f", {percent(100.0 * float(np.mean(opens[points] > 0)))} of them lift off"
-            if opens[points].any()
-            else ""
-        )
-        for group, (points, _) in surfaces.items()
-    ]
-    return f"Points that slip in the cycle: {joined(said)}."
+    said = []
+    for group, (points, _) in surfaces.items():
+        share, lifted = (percent(100.0 * float(np.mean(of[points] > 0))) for of in (slips, opens))
+        lifts = f", {lifted} lift off" if opens[points].any() else ""
+        said.append(f"{share} of the points of {group} slip{lifts}")
+    return f"In the cycle {joined(said)}."
