@@ -42,8 +42,8 @@ LOADS = {
     "lift-off": ("lift", 0.2),
 }
 TOLERANCE, SAME = 1e-8, 1e-6  # residual of a solution; relative difference of two answers
-GROSS_SLIP = 0.3  # share of the preload: nearly all contacts slip in the resonance
-MICRO_SLIP = 0.1
+GROSS_SLIP = 0.2  # share of the preload: nearly all contacts slip in the resonance
+MICRO_SLIP = 0.4
 GROSS = 0.9  # share of contacts that slip at some time of the period
 TWO_CORES = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "2"
