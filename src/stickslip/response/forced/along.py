@@ -91,8 +91,9 @@ class ForcedCurve:
         """Solve at a frequency to which no branch leads."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
-            forced.system, self.problem(level), forced.sweep.newton, p, known, most
-        )
+            forced.system, self.problem(level), forced.sweep.newton, p, known,
+            most and forced.sweep.rescue == "all",
+        )  # fmt: skip
 
     def cost(self, level: int) -> float:
         """Return the work of a Newton step, which grows with the unknowns: few are factorised, many solved by products."""

@@ -3,6 +3,7 @@
 from typing import Literal
 
 Passages = Literal["double", "single"]
+Rescue = Literal["all", "off"]
 RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
 PUBLISHED = 5  # highest harmonic of the repeats in the papers
 SELECTION = "guarded_alert"  # what chooses harmonics where nothing else is said

@@ -77,6 +77,8 @@ class _Second:
             run, branch = self.low[first : last + 1], list[ForcedPoint]()
             for order in (run, run[::-1]):
                 yield from self._again(order, None, branch)
+            if self.problem.sweep.rescue == "off":
+                continue
             if self._left(run):
                 yield from _followed(
                     self.problem, first, last, self.low, branch, self.high, self.stored

@@ -218,7 +218,8 @@ class ForcedProblem:
     def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance) -> Point:
         """Go from a solution to another frequency on the branch with the harmonics of `balance`."""
         following = self.following(balance)
-        following = replace(following, control=replace(following.control, max_points=DETOUR))
+        most = min(DETOUR, following.control.max_points)
+        following = replace(following, control=replace(following.control, max_points=most))
         start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
         if not start.solution.status.converged:
             return start
@@ -234,8 +235,9 @@ class ForcedProblem:
         return always_kept(self.strategy) != "low"
 
     def asks_again(self, point: ForcedPoint) -> bool:
-        """Whether a point of the first passage is repeated: alerted, or not found although its neighbours may lead to it."""
-        return (self.repeats and not point.converged) or self.alerted(point)
+        """Whether a point of the first passage is repeated: alerted, or not found although its neighbours, or more harmonics, may lead to it."""
+        anew = self.sweep.rescue == "all" or point.support != self.high.harmonics
+        return (self.repeats and not point.converged and anew) or self.alerted(point)
 
     def branch_point(self, point: ForcedPoint) -> Point:
         """Return a point of a branch as one that it goes on from."""

@@ -121,7 +121,10 @@ def _solution(
             spent.append(problem.along_branch(point, omega, balance).solution)
     if not (spent and spent[-1].status.converged):
         found = [balance.unknowns(p.coefficients) for p in tried if p.converged][-1:]
-        spent.append(without_branch(problem.system, balance, problem.sweep.newton, omega, found))
+        most = problem.sweep.rescue == "all"
+        spent.append(
+            without_branch(problem.system, balance, problem.sweep.newton, omega, found, most)
+        )
     return charged(spent[-1], spent)
 
 

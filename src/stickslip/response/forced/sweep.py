@@ -1,7 +1,7 @@
 """What a forced response is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,7 +14,7 @@ from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_s
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.branch import steps_through
-from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages, Rescue
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
@@ -62,6 +62,10 @@ class Sweep:
         ``up``: from the first frequency to the last; ``down``: from the last to the first, which finds other motions beside folds.
     peak_points
         Most points added to resolve the peak.
+    rescue
+        ``all``: a frequency that is not found is looked for by other globalisations and homotopies, up to some thousand Newton steps;
+        ``off``: by the corrector alone, from its neighbours, the bonded vibration and few harmonics; listed frequencies by no branch in
+        between either. Where many contacts lift off and no motion repeats, the first takes hours to say no.
     newton
         Corrector options.
     """
@@ -81,6 +85,7 @@ class Sweep:
     at: tuple[float, ...] = ()
     direction: Direction = "up"
     peak_points: int = 12
+    rescue: Rescue = "all"
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
@@ -102,6 +107,7 @@ class Sweep:
         _check_steps(self)
         hint = "'double' repeats what needs more harmonics."
         check_choice("Sweep.passages", self.passages, get_args(Passages), hint)
+        check_choice("Sweep.rescue", self.rescue, get_args(Rescue), "'off' gives up sooner.")
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")
         if isinstance(self.high, str):
@@ -195,7 +201,9 @@ class Sweep:
     def control(self) -> StepControl:
         """Step control of the branch: a step is at most a `points`-th of the range."""
         first, last = self.omega_range
-        return steps_through(last - first, self.points)
+        control = steps_through(last - first, self.points)
+        listed = self.rescue == "off" and self.grid.size > 0
+        return replace(control, max_points=0) if listed else control
 
     @property
     def first_harmonics(self) -> Harmonics:

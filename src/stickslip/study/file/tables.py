@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field, create_model
 
 from stickslip.contact.evaluators import Evaluator
+from stickslip.response.forced.choices import Rescue
 from stickslip.study.analyses import ANALYSES, TABLES
 from stickslip.study.file.aero import AeroTable
 from stickslip.study.file.contacts import ContactTable, JoinTable
@@ -38,12 +39,18 @@ OF_THE_MODEL = frozenset(
 
 
 class Solver(Section):
-    """How contact forces are computed."""
+    """How contact forces are computed, and how much is done for a frequency that does not converge."""
 
     evaluator: Evaluator = Field(
         "events",
         description="how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), "
         "intervals (transitions on the time samples) or march (sample by sample)",
+    )
+    rescue: Rescue = Field(
+        "all",
+        description="of [forced_response]. all: a frequency that does not converge is looked for by other globalisations and homotopies, up to some "
+        "thousand Newton steps; off: by the corrector alone, from several starts, listed frequencies by no branch in between either: for strong "
+        "lift-off of many contacts, beside not_periodic_points",
     )
 
 

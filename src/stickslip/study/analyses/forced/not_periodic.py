@@ -25,7 +25,6 @@ from stickslip.study.analyses.forced.question import MOST_IN_TIME, TOO_MANY, Que
 from stickslip.study.analyses.forced.stable import Examined
 from stickslip.units import HZ
 
-MOST_POINTS = 2  # of a case, the peak first, then the nearest to it
 STEPS = 512
 TURNS = 128  # periods whose amplitudes are kept for the picture
 SAME = 1e-3  # relative difference of the amplitudes of all periods that counts as none
@@ -115,7 +114,7 @@ def without_periodic(
             )
     middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega  # fmt: skip
     nearest = sorted(found, key=lambda omega: abs(omega - middle))
-    return [(omega, *found[omega]) for omega in nearest[:MOST_POINTS]]
+    return [(omega, *found[omega]) for omega in nearest[: question.not_periodic_points]]
 
 
 def in_time_instead(

@@ -63,6 +63,8 @@ class Question:
         Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
     not_periodic_s
         Seconds of a march where no periodic motion stands for the response; 0: none.
+    not_periodic_points
+        Most points that are marched so.
     """
 
     label: str
@@ -76,6 +78,7 @@ class Question:
     examine: Literal["peak", "off", "all"] = "peak"
     bifurcations: Literal["off", "folds", "all", "branches"] = "off"
     not_periodic_s: float = 0.0
+    not_periodic_points: int = 2
 
     @property
     def over_speed(self) -> bool:
@@ -190,6 +193,7 @@ def question_of(case: Case, model: Model) -> Question:
             if settings.forced_response.not_periodic == "in_time"
             else 0.0
         ),
+        not_periodic_points=settings.forced_response.not_periodic_points,
     )
 
 

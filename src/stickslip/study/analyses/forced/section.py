@@ -67,6 +67,12 @@ class ForcedResponse(Section):
     not_periodic_s: Positive = Field(
         5.0, description="seconds that each such motion may take, greater than zero"
     )
+    not_periodic_points: int = Field(
+        2,
+        ge=1,
+        le=10_000,
+        description="most points of a case that are marched so, 1 to 10000: the peak first, then the nearest to it",
+    )
     static_friction_share: float | None = Field(
         None,
         gt=0,

@@ -62,6 +62,7 @@ def sweep_through(
         high="auto" if h.high == "auto" else h.high_harmonics,
         samples=h.samples,
         evaluator=settings.solver.evaluator,
+        rescue=settings.solver.rescue,
         cap=max(RUNGS[-1], MULTIPLE * low[-1]),
         threshold=h.alert_threshold_percent / 100,
         selection=h.chooser,
