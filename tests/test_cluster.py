@@ -168,7 +168,7 @@ def kill_workers(nannies: list[int], folder: Path, killed: list[int], over: Even
     """Kill a worker every ten seconds, one after the other, but none before a job has come further since the last kill.
 
     An overloaded machine may need more than ten seconds to start a worker, and with a bare clock no job would ever end there. A
-    quiet one is done after three kills.
+    quiet one is done before the most of them.
     """
     before: dict[str, tuple[int, ...]] = {}
     while len(killed) < MOST and not over.wait(EVERY):
