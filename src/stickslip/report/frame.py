@@ -28,9 +28,6 @@ _CONFIG = {
     # the camera saves pictures for print: twice the size on the screen
     "toImageButtonOptions": {"scale": 2},
 }
-_UNIT = re.compile(
-    r"(?<=\d) (?=(?:%|dB|rpm|°|[kMµmnp]?(?:Hz|m|N|J|g|s|Pa|rad)\b))"
-)  # behind a number
 _BOLD, _CODE = re.compile(r"\*\*(.+?)\*\*"), re.compile(r"`([^`]+)`")
 
 
@@ -151,20 +148,13 @@ def inline(text: str) -> Markup:
     return Markup(_CODE.sub(r"<code>\1</code>", safe).replace("\n", "<br>"))
 
 
-def prose(text: str) -> Markup:
-    """Return `inline` text whose lines do not break between a number and its unit, or before the value of a key; for sentences, not for cells that are copied."""
-    if isinstance(text, Markup):
-        return text
-    return inline(_UNIT.sub("\u00a0", text).replace(" = ", " =\u00a0"))
-
-
 @cache
 def _templates() -> Environment:
     found = Environment(
         loader=PackageLoader("stickslip.report", "assets"),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    found.filters |= {"inline": inline, "prose": prose, "anchor": anchor}
+    found.filters |= {"inline": inline, "anchor": anchor}
     return found
 
 

@@ -38,3 +38,11 @@ addEventListener("beforeprint", () => document.querySelectorAll("details:not([op
   folded.open = true;
   addEventListener("afterprint", () => { folded.open = false; }, {once: true});
 }));
+// lines of sentences do not break between a number and its unit, or before the value of a key
+document.querySelectorAll(".card, figcaption, main p, main li").forEach(told => {
+  const texts = document.createTreeWalker(told, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const own = texts.currentNode;
+    own.data = own.data.replace(/(\d) (?=(?:%|dB|rpm|°|[kMµmnp]?(?:Hz|m|N|J|g|s|Pa|rad)\b))/g, "$1\u00a0").replace(/ = /g, " =\u00a0");
+  }
+});
