@@ -34,7 +34,9 @@ def five_harmonics() -> tuple[HarmonicBalance, np.ndarray, float]:
     case = two_blades()
     load = case.load(RATIO)
     linear = condense(case.system.structure, case.system.retained, load)
-    balance = harmonic_balance(linear, case.system.interface, 5, case.sweep.samples)
+    balance = harmonic_balance(
+        linear, case.system.interface, 5, case.sweep.samples, jacobian="dense"
+    )
     omega = 0.5 * sum(case.sweep.omega_range)
     guess = balance.coefficients(bonded_start(balance, omega, case.system))
     guess[0] = preload(case.system, load.static)

@@ -131,8 +131,8 @@ class HarmonicBalance:
 
     @property
     def large(self) -> bool:
-        """Whether products cost less than an array."""
-        return products_pay(self._costs)
+        """Whether products cost less than an array, where none was asked for."""
+        return self.jacobian != "dense" and products_pay(self._costs)
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""
