@@ -392,6 +392,26 @@ def test_factors_solve_with_a_bordered_matrix_and_its_transpose(m):
     assert sign == np.sign(np.linalg.det(whole))
 
 
+@pytest.mark.parametrize("corner", [2.5, -0.4])
+def test_a_border_whose_row_prescribes_the_last_unknown_alone(corner):
+    random = np.random.default_rng(5)
+    a, column, right = (
+        random.standard_normal((5, 5)),
+        random.standard_normal(5),
+        random.standard_normal(6),
+    )
+    before = a.copy()
+    whole = array_of(Bordered(a, column, np.zeros(5), corner))
+    found, sign = Dense().solve_bordered(a, column, np.zeros(5), corner, right)
+    assert np.allclose(found, np.linalg.solve(whole, right), rtol=1e-12)
+    assert sign == np.sign(np.linalg.det(whole))
+    assert np.array_equal(a, before)
+    a[:, 1] = a[:, 0]
+    assert Dense().solve_bordered(a, column, np.zeros(5), corner, right) == (None, 0.0)
+    column[2] = np.nan
+    assert Dense().solve_bordered(before, column, np.zeros(5), corner, right) == (None, 0.0)
+
+
 def test_a_singular_matrix_in_a_regular_border():
     # at a fold: the matrix has no inverse, the bordered one has
     a = np.diag([1.0, 0.0])

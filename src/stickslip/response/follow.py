@@ -147,7 +147,7 @@ class _Walk:
         """Accept a point, and look at it or at the one before more closely where that is due."""
         silent = made.judged.bound == 0.0
         self.branch.append(_Stop(made, made, silent or audit is not None, audit, begins))
-        if not made.converged:
+        if not made.converged or self.curve.levels == 1:  # alone, it is compared with nothing
             return
         if audit is not None or self.curve.quiet(made.level, made.judged):
             self.quiet_for += 1

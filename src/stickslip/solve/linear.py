@@ -99,7 +99,20 @@ class Dense:
         self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system and return the sign of its determinant; see `LinearSolver`."""
+        if isinstance(jac, np.ndarray) and isinstance(corner, float) and corner and not row.any():
+            return _last_known(jac, column, corner, right)
         return solve_signed(_array(Bordered(jac, column, row, corner)), right)
+
+
+def _last_known(
+    jac: FloatArray, column: FloatArray, corner: float, right: FloatArray
+) -> tuple[FloatArray | None, float]:
+    """Solve a bordered system whose last row prescribes the last unknown alone: what is inside needs no border."""
+    last = right[-1] / corner
+    inside, sign = solve_signed(np.array(jac, order="F"), right[:-1] - last * column)
+    if inside is None or not np.isfinite(inside).all():
+        return None, 0.0
+    return np.append(inside, last), sign if corner > 0.0 else -sign
 
 
 def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatArray | None:
