@@ -510,6 +510,20 @@ def test_values_that_are_lists_themselves_vary(tmp_path):
     assert model.loads["shaker"].direction == (1.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("table", ["[vary]", "[[vary]]"])
+def test_one_value_of_a_varied_key_is_refused_and_another_vary_is_taken(tmp_path, table):
+    path, key = write_four_masses(tmp_path), "load.shaker.force_n"
+    path.write_text(f"{path.read_text(encoding='utf-8')}\n{table}\n{key} = [2.0, 3.0]\n")
+    study = read_study(path)
+    with pytest.raises(InputError, match=r"is varied.*\[2\.0, 3\.0\].*\{\"vary\": \{") as caught:
+        study.replace({key: 7.0})
+    assert len(str(caught.value).splitlines()) == 1
+    alone = study.replace({"vary": {key: [7.0]}})
+    without = study.replace({"vary": {}, key: 7.0})
+    for one in (alone, without):
+        assert [c.tables.load["shaker"].force_n for c in one.file.cases] == [7.0]
+
+
 def test_replacing_keys_is_checked_like_the_file(tmp_path):
     study = read_study(write_four_masses(tmp_path))
     assert study.replace({"load.shaker.force_n": 2.0}).model().loads["shaker"].newton == 2.0

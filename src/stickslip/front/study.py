@@ -147,7 +147,7 @@ class Study:
         Raises
         ------
         InputError
-            If there is no such key, or its value is refused.
+            If there is no such key, its value is refused, or it is varied: then replace ``vary``.
         """
         said = [f"{key} = {value!r}" for key, value in sorted(values.items())]
         mark = sha256("\n".join(said).encode()).hexdigest()[:8]

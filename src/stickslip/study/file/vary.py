@@ -73,6 +73,30 @@ def with_values(
     return content
 
 
+def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Refuse single values of keys that [vary] of the content would replace at once.
+
+    Raises
+    ------
+    InputError
+        Naming each of them, and how it is given another list, or none.
+    """
+    given = raw.get("vary", {})
+    tables = given if isinstance(given, list) else [given]
+    varied = {key: found for table in tables for key, found in _flat(place, table, [])}
+    errors = [
+        input_error(
+            f"{place}: {key}",
+            f"is varied, so one value has no effect: [vary] has {shown(lists)}",
+            f'Replace [vary] as a whole: {{"vary": {{"{key}": [{value!r}]}}}} runs this value alone; "vary": {{}} leaves [vary] out.',
+        )
+        for key, value in values.items()
+        if (lists := varied.get(key)) is not None
+    ]
+    if errors:
+        raise together(errors)
+
+
 def label_of(values: Mapping[str, Any]) -> str:
     """Return what is varied as text: ``load.shaker.ratio = 250``."""
     return ", ".join(f"{key} = {_text(value)}" for key, value in values.items())

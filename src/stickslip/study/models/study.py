@@ -13,7 +13,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
-from stickslip.study.file.vary import with_values
+from stickslip.study.file.vary import refuse_varied, with_values
 from stickslip.study.models.checks import refuse
 from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
@@ -94,10 +94,12 @@ class Study:
         Raises
         ------
         InputError
-            If there is no such key, or its value is refused.
+            If there is no such key, its value is refused, or it is varied.
         """
         raw = with_values(self.file.raw, values, keep_vary=True)
-        changed = StudyFile(self.path, self.text, raw, validated(self.path, raw))
+        found = validated(self.path, raw)
+        refuse_varied(str(self.path), raw, values)
+        changed = StudyFile(self.path, self.text, raw, found)
         return _checked(Study(changed, self.memo))
 
     def _case(self, index: int, case: TablesOfCase) -> Case:
