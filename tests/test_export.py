@@ -297,6 +297,14 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
     assert moved.export("frd", of=folder)[0].is_file()
 
 
+def test_all_sectors_go_to_a_folder_beside_that_of_one(wheel, tmp_path):
+    result = ss.Result(wheel[0].data, tmp_path / "result.nc")
+    one, whole = (result.export("frd", of=wheel[1], wheel=all_of_it)[0] for all_of_it in (False, True))  # fmt: skip
+    assert one == tmp_path / "frd_0" / "motion.frd"
+    assert whole == tmp_path / "frd_0_wheel" / "motion.frd"
+    assert one.stat().st_size < whole.stat().st_size
+
+
 def test_every_sector_of_a_mistuned_wheel_moves_as_the_unreduced_wheel_says(wheel):
     model = replace(wheel[1], speed=0.0)
     more = np.array([0.04, -0.03, 0.0, 0.02, -0.05])

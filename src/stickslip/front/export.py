@@ -77,7 +77,7 @@ def export_result(
     motion = motion_of(picked, model, wheel=wanted.wheel)
     forced = tree[picked.analysis].to_dataset() if picked.point is not None else None
     name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"  # fmt: skip
-    place = _place(path, name, folder)
+    place = _place(path, f"{name}_wheel" if wanted.wheel else name, folder)
     count = sum(len(body.nodes.points) for body in motion.bodies)
     sectors = f" of {motion.sectors} sectors" if motion.sectors > 1 else ""
     LOG.info(f"writing {count} nodes{sectors} to {place}")

@@ -145,7 +145,7 @@ class Result:
             ``harmonics.vtu``; ``frd``: harmonics for CalculiX's viewer; ``uff``: deflection shapes and response functions for test
             software.
         folder
-            Made where it is not there; left out: a folder such as ``vtu_0`` beside the result's file.
+            Made where it is not there; left out: a folder such as ``vtu_0`` or ``vtu_0_wheel`` beside the result's file.
         case
             Position among the cases of [vary].
         hz
