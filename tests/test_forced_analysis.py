@@ -39,7 +39,12 @@ from stickslip.solve.newton_method import Newton
 from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
-from stickslip.study.analyses.forced.known import mixed_places, no_resonance, nothing_pressed
+from stickslip.study.analyses.forced.known import (
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+    off_engine_order,
+)
 from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.analyses.forced.section import ForcedResponse
 from stickslip.study.analyses.forced.sweeps import sweep_of
@@ -403,6 +408,19 @@ def test_warnings_of_a_sweep_beside_all_resonances() -> None:
     assert mixed_places(("a.x", "b.y")) == ()
 
 
+def test_a_range_beside_the_engine_order_is_noted() -> None:
+    asked = lifted(omega_range=(495 * HZ, 512 * HZ))
+    wheel = replace(asked.model, sectors=24, engine_order=6, orders={1: 6})
+    (note,) = off_engine_order(replace(asked, model=wheel, rpm=8000.0))
+    assert (note.level, note.word) == ("trusted", "note")
+    assert note.why.startswith(
+        "at 8000 rpm engine order 6 excites at 800 Hz, outside 495 to 512 Hz:"
+    )
+    assert "passes this range at 4950 to 5120 rpm" in note.remedy
+    for other in ({"rpm": 5000.0}, {"rpm": 0.0}, {"rpm": 8000.0, "key": "speed_rpm"}):
+        assert off_engine_order(replace(asked, model=wheel, **other)) == ()
+
+
 # ---- the table, and what is refused ------------------------------------------------------------------------------------
 
 
@@ -410,7 +428,7 @@ def settings(harmonics: dict[str, object] | None = None, **table_: object) -> Si
     return SimpleNamespace(
         forced_response=ForcedResponse(**table_),
         harmonics=Harmonics(**harmonics or {}),
-        solver=SimpleNamespace(evaluator="events"),
+        solver=SimpleNamespace(evaluator="events", rescue="on"),
         limits=SimpleNamespace(memory_gb=4.0, work_s=7200.0),
     )
 

@@ -31,6 +31,7 @@ from stickslip.study.analyses.forced.known import (
     mixed_places,
     no_resonance,
     nothing_pressed,
+    off_engine_order,
 )
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.not_periodic import (
@@ -154,6 +155,7 @@ class ForcedResponseAnalysis:
             cost_line(question),
             *bifurcations_line(question),
             *inside(question),
+            *(f"note: {v.why}. {v.remedy}" for v in off_engine_order(question)),
             *(
                 f"WARNING: {text}"
                 for text in (*of_model, *(f"{v.why}. {v.remedy}" for v in doubts))

@@ -9,7 +9,7 @@ from stickslip.response.free_motion import drift
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.verdict import Verdict, doubt
-from stickslip.units import HZ
+from stickslip.units import HZ, RPM
 
 ROTATIONS = ("rx", "ry", "rz")
 COULOMB = (
@@ -37,6 +37,7 @@ def known(
         *(doubt(text) for text in question.model.warnings),
         *mixed_places(question.model.error_labels),
         *nothing_pressed(question),
+        *off_engine_order(question),
         *_of_drift(question, response),
         *_of_retention(question, response, shift),
     )
@@ -91,6 +92,31 @@ def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
     )
     remedy = "Check gaps, preloads, static loads and the direction in which the speed moves the surfaces."
     return (Verdict("doubtful", why=why, remedy=remedy),)
+
+
+def off_engine_order(question: Question) -> tuple[Verdict, ...]:
+    """Note where an engine order at the speed of rotation excites outside the range of frequencies."""
+    rpm, order = question.rpm, question.model.engine_order
+    if question.over_speed or not order or not rpm:
+        return ()
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    own = order * rpm * RPM / HZ
+    if lowest <= own <= highest:
+        return ()
+    names = " and ".join(question.driven_names)
+    harmonics = question.driven
+    excited = " and ".join(f"{h * own:.6g}" for h in harmonics)
+    ranges = " and ".join(f"{h * lowest:.6g} to {h * highest:.6g} Hz" for h in harmonics)
+    speeds = " to ".join(f"{f * HZ / RPM / order:.0f}" for f in (lowest, highest))
+    why = (
+        f"at {rpm:.6g} rpm {names} excite{'s' * (len(harmonics) == 1)} at {excited} Hz, outside {ranges}: the response is that of the "
+        f"wheel at {rpm:.6g} rpm shaken at another frequency"
+    )
+    remedy = (
+        f'over = "speed" goes along the engine order\'s line, which passes this range at {speeds} rpm; give rotation.speed_rpm the '
+        "speed where [campbell] finds them crossing."
+    )
+    return (Verdict("trusted", why=why, remedy=remedy),)
 
 
 def no_resonance(question: Question) -> tuple[Verdict, ...]:

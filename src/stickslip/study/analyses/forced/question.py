@@ -65,6 +65,8 @@ class Question:
         Seconds of a march where no periodic motion stands for the response; 0: none.
     not_periodic_points
         Most points that are marched so.
+    rpm
+        Speed of rotation, 1/min.
     """
 
     label: str
@@ -79,6 +81,7 @@ class Question:
     bifurcations: Literal["off", "folds", "all", "branches"] = "off"
     not_periodic_s: float = 0.0
     not_periodic_points: int = 2
+    rpm: float = 0.0
 
     @property
     def over_speed(self) -> bool:
@@ -194,6 +197,7 @@ def question_of(case: Case, model: Model) -> Question:
             else 0.0
         ),
         not_periodic_points=settings.forced_response.not_periodic_points,
+        rpm=model.speed / RPM,
     )
 
 
