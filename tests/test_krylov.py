@@ -429,6 +429,23 @@ def test_harmonics_above_all_modes_have_factors_of_their_own(monkeypatch):
     assert isinstance(kept, HarmonicFactors)
 
 
+def test_masses_at_few_coordinates_leave_each_harmonic_its_factors():
+    # fifteen masses have fewer modes than a shared factor wants
+    n = 150
+    chain = 2.5 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    masses = (np.arange(n) % 10 == 0).astype(float)
+    structure = Structure(
+        np.diag(masses), 0.01 * chain, chain, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3)))
+    )
+    law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.3, preload=1.0)
+    interface = Interface(tuple(f"c{i}" for i in range(n // 3)), (law,) * (n // 3), np.eye(n))
+    load = HarmonicLoad(np.zeros(n), {1: masses.astype(complex)})
+    condensed = condense(structure, np.arange(n), load)
+    balance = harmonic_balance(condensed, interface, 3, 64, jacobian="structured")
+    jac = balance.linearise(np.zeros(7 * n), 0.5).jac
+    assert isinstance(jac.preconditioner(), HarmonicFactors)
+
+
 def test_harmonics_have_factors_of_their_own_where_a_shared_one_does_not_do(shared, monkeypatch):
     balance, x = state("lift-off")
     at = balance.linearise(x, OMEGA)

@@ -109,7 +109,7 @@ def _in_its_precision(factor: Factors, solve: Solve, right: FloatArray) -> Float
 def shared_factor(
     linear: CondensedProduct, means: ComplexArray, rows: SparseRows, scale: float
 ) -> SharedFactor | None:
-    """Factorise A and find its low modes; None if A is singular, or too many modes are low.
+    """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are wanted.
 
     Parameters
     ----------
@@ -126,6 +126,8 @@ def shared_factor(
     add_stiffness(means.real.mean(axis=0), rows.columns, rows.values, matrix)
     matrix *= scale
     for single in (True, False):
+        if single and np.abs(matrix).max() > np.finfo(np.float32).max:
+            continue
         factor = factorise(
             matrix.astype(np.float32, order="F") if single else np.array(matrix, order="F")
         )
@@ -149,12 +151,15 @@ def shared_factor(
 def _enough_modes(
     linear: CondensedProduct, factor: Factors, scale: float
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return low modes beyond the highest harmonic, and M times them; None if that takes too many."""
+    """Return low modes beyond the highest harmonic, and M times them; None if that takes too many, or more than the mass has."""
     wanted = scale * (REACH * linear.harmonics[-1] * linear.omega) ** 2
     most = linear.n // MOST_MODES
     count = min(LEAST_MODES, most)
     while True:
-        sizes, modes, weighted = _low_modes(linear, factor, count)
+        found = _low_modes(linear, factor, count)
+        if found is None:
+            return None
+        sizes, modes, weighted = found
         if sizes[int(INNER * (count - 1))] >= wanted:
             return modes, weighted
         if count == most:
@@ -164,8 +169,11 @@ def _enough_modes(
 
 def _low_modes(
     linear: CondensedProduct, factor: Factors, count: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973)."""
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973).
+
+    None if no `count` modes have mass.
+    """
     weighted: FloatArray = np.random.default_rng(0).standard_normal((linear.n, count))
     sizes, modes = np.zeros(count), weighted
     for _ in range(ROUNDS):
@@ -174,7 +182,10 @@ def _low_modes(
         weighted = linear.mass_product(modes)
         mass = modes.T @ weighted
         # of unit mass; the stiffness is symmetric but for friction under a normal force
-        sizes, turn = scipy.linalg.eigh(stiffness + stiffness.T, mass + mass.T)
+        try:
+            sizes, turn = scipy.linalg.eigh(stiffness + stiffness.T, mass + mass.T)
+        except np.linalg.LinAlgError:
+            return None
         turn *= np.sqrt(2.0)
         modes, weighted = modes @ turn, weighted @ turn
     return sizes, modes, weighted
