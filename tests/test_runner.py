@@ -48,6 +48,24 @@ def same(a: xr.DataTree, b: xr.DataTree) -> None:
         np.testing.assert_array_equal(a["toy"][name].values, b["toy"][name].values)
 
 
+def test_another_study_file_does_not_replace_a_result(tmp_path: Path) -> None:
+    first = study(tmp_path)
+    first.path.touch()
+    run_study(first)
+    other = ToyStudy(tmp_path / "resp.toml", factors=(1.25,))
+    other.path.touch()
+    before = (first.folder / "result.nc").read_bytes(), (first.folder / "run.log").read_bytes()
+    with pytest.raises(InputError, match=r"resp\.toml: .* of study\.toml .*--results results_resp") as caught:  # fmt: skip
+        run_study(other)
+    assert len(str(caught.value).splitlines()) == 1
+    assert other.built == []
+    assert before == ((first.folder / "result.nc").read_bytes(), (first.folder / "run.log").read_bytes())  # fmt: skip
+    run_study(other, fresh=True)
+    assert result(other).attrs["study_file"] == "resp.toml"
+    other.path.rename(tmp_path / "renamed.toml")  # the study file goes on under another name
+    assert run_study(ToyStudy(tmp_path / "renamed.toml", factors=(1.25,))).failed == 0
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> ToyStudy:
     made = study(tmp_path_factory.mktemp("whole"))

@@ -93,6 +93,10 @@ def run(
             help="Start over: remove what runs wrote into the results folder, and no other file.",
         ),
     ] = False,
+    results: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the results; left out: that of the study."),
+    ] = None,
     report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the HTML report.")
     ] = True,
@@ -109,14 +113,9 @@ def run(
     with _errors_as_text():
         with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
             result = read(study).run(
-                workers=workers,
-                only=only or (),
-                fresh=fresh,
-                verify=verify,
-                verify_harmonics=verify_harmonics,
-                executor=executor,
-                shard=shard,
-            )
+                workers=workers, only=only or (), fresh=fresh, verify=verify,
+                verify_harmonics=verify_harmonics, folder=results, executor=executor, shard=shard,
+            )  # fmt: skip
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
@@ -313,13 +312,9 @@ def fit(
 
         with on_screen(Screen(console())):
             found = fit_file(
-                loops,
-                normal_load=normal_load,
-                normal_load_deviation=normal_load_deviation,
-                machine_stiffness=machine_stiffness,
-                offset=offset,
-                drift=drift,
-            )
+                loops, normal_load=normal_load, normal_load_deviation=normal_load_deviation,
+                machine_stiffness=machine_stiffness, offset=offset, drift=drift,
+            )  # fmt: skip
         from stickslip.report.loop_fit import write_loop_page
 
         target = page or loops.with_suffix(".fit.html")

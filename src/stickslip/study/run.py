@@ -24,7 +24,7 @@ from stickslip.study.keep.attempts import file_at_work, new_owner
 from stickslip.study.keep.cell import Limits, check_memory_limit
 from stickslip.study.keep.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
 from stickslip.study.keep.journal import SEALED, JobJournal, read_sealed
-from stickslip.study.keep.netcdf import write_tree
+from stickslip.study.keep.netcdf import attributes_there, write_tree
 from stickslip.study.keep.progress import LOG, Interrupted, written_down
 from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
@@ -110,15 +110,18 @@ def run_study(
     asked, place = asked_for(study, only), Place(workers, kind, shard)
     place.check(fresh=fresh)
     log = study.folder / (LOG_FILE if shard is None else shard.log)
-    with locked_folder(study.folder, shared=shard is not None), written_down(log):
-        LOG.info(f"stickslip {__version__}, study {study.path}")
-        try:
-            return _run(study, asked, place, fresh, frozenset(checks))
-        except KeyboardInterrupt:
-            LOG.info("interrupted by the user")
-            raise Interrupted(
-                f"Interrupted. What is finished is kept in {study.folder}. The same command goes on from there."
-            ) from None
+    with locked_folder(study.folder, shared=shard is not None):
+        if not fresh:
+            _refuse_result_of_another(study)
+        with written_down(log):
+            LOG.info(f"stickslip {__version__}, study {study.path}")
+            try:
+                return _run(study, asked, place, fresh, frozenset(checks))
+            except KeyboardInterrupt:
+                LOG.info("interrupted by the user")
+                raise Interrupted(
+                    f"Interrupted. What is finished is kept in {study.folder}. The same command goes on from there."
+                ) from None
 
 
 def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
@@ -166,7 +169,7 @@ def answer(
 def _run(
     study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]
 ) -> Outcome:
-    origin = Provenance(study.title, study.text, library_versions())
+    origin = Provenance(study.title, study.text, library_versions(), study_file=study.path.name)
     book = Book(origin, measured=study.measured)
     store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
@@ -212,6 +215,23 @@ def _run(
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
     return replace(outcome, files=(target, *files, place.log(study.folder)))
+
+
+def _refuse_result_of_another(study: Study) -> None:
+    """Refuse to replace the result of a study file of another name, unless that one was renamed or removed."""
+    target, home, name = study.folder / RESULT, study.path.resolve().parent, study.path.name
+    other = str(attributes_there(target).get("study_file", name))
+    if other == name:
+        return
+    of_home, before = target.resolve().is_relative_to(home), home / other
+    if of_home and (not before.exists() or before.samefile(study.path)):
+        return
+    own = f"{study.folder.name}_{study.path.stem}"
+    raise input_error(
+        str(study.path),
+        f"its results would replace those of {other} in {target}",
+        f'Write [output] folder = "{own}" into {name}, give --results {own}, or put {name} into a folder of its own.',
+    )
 
 
 def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:

@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -60,6 +61,19 @@ def read_tree(path: Path) -> xr.DataTree:
         raise input_error(
             str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN
         ) from None
+
+
+def attributes_there(path: Path) -> dict[str, Any]:
+    """Return the attributes of the root of a file that `write_tree` wrote; none where there is no such file, or a damaged one."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return {}
+    length = content.rfind(MARK)
+    if length < 0 or content[length:] != _sum(content[:length]):
+        return {}
+    with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as root:
+        return dict(root.attrs)
 
 
 def _sum(content: bytes) -> bytes:

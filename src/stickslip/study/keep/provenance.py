@@ -27,6 +27,8 @@ class Provenance:
         Of the libraries that make numbers.
     model_tables
         JSON of the tables that a study file would have of a model of Python; empty for a study.
+    study_file
+        Name of the study's file; empty for a model of Python.
     created
         Beginning of the run that wrote the result.
     began
@@ -37,12 +39,14 @@ class Provenance:
     study_toml: str
     versions: dict[str, str]
     model_tables: str = ""
+    study_file: str = ""
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     began: float = field(default_factory=perf_counter)
 
     def attributes(self, *, complete: bool) -> dict[str, Any]:
         """Return the attributes of the root: texts and numbers only."""
-        told = {"model_tables": self.model_tables} if self.model_tables else {}
+        own = {"model_tables": self.model_tables, "study_file": self.study_file}
+        told = {name: text for name, text in own.items() if text}
         return told | {
             "title": self.title,
             "study_toml": self.study_toml,
