@@ -428,7 +428,7 @@ def settings(harmonics: dict[str, object] | None = None, **table_: object) -> Si
     return SimpleNamespace(
         forced_response=ForcedResponse(**table_),
         harmonics=Harmonics(**harmonics or {}),
-        solver=SimpleNamespace(evaluator="events", rescue="on"),
+        solver=SimpleNamespace(evaluator="events", rescue="all"),
         limits=SimpleNamespace(memory_gb=4.0, work_s=7200.0),
     )
 

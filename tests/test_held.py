@@ -168,3 +168,19 @@ def test_the_command_line_names_part_and_motion(tmp_path: Path, command: str) ->
     assert "translation along x" in said
     path.write_text(changed(FREE, {"contact.brake.between": '["chain.m1", "chain.m2"]'}))
     assert "good to run" in done("check", str(path))
+
+
+def test_a_wheel_that_only_its_shrouds_touch_is_free_and_check_says_so(tmp_path: Path) -> None:
+    from stickslip.study.models.study import read_study
+
+    path = write_shrouded_deck(tmp_path)
+    deck = tmp_path / "sector.inp"
+    lines = deck.read_text().splitlines(keepends=True)
+    at = next(i for i, line in enumerate(lines) if line.upper().startswith("*BOUNDARY"))
+    deck.write_text("".join(lines[:at] + lines[at + 2 :]))
+    with pytest.raises(InputError, match="keeps it from moving along the axis and turning about"):
+        refuse_unheld(read_study(path).model())
+    chain = tmp_path / "chain.toml"
+    chain.write_text(FREE.partition("[contact")[0] + "[modes]\nnumber = 2\n")
+    said = " ".join(done("check", str(chain)).split())
+    assert "note: part.chain: the body of m2 is held by nothing" in said

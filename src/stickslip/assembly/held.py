@@ -13,7 +13,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
 from stickslip.model.rigid.motion import in_words, loose_motions
 
-RANK = 1e-8  # singular value over the largest below which a motion strains nothing
+RANK = 1e-8  # singular value over what rows and motions would give without cancelling, below which a motion strains nothing
 SHARE = 1e-6  # of the largest share of a free motion below which a body takes no part in it
 SLIDERS = ("jenkins", "iwan", "dahl")  # laws of a bounded force that nothing presses
 NAMED = 3  # parts that a message names
@@ -118,11 +118,13 @@ def _moves(model: Model, bodies: list[Loose]) -> FloatArray:
 def _free(model: Model, bodies: list[Loose], holds: BoolArray) -> FloatArray:
     """Return the shares (m, f) of the motions of bodies that make one that strains nothing."""
     moves = _moves(model, bodies)
-    strained = np.vstack([rows @ moves for rows in _holding(model, holds)])
+    rows = _holding(model, holds)
+    strained = np.vstack([one @ moves for one in rows])
+    largest = max((float((abs(one) @ abs(moves)).max(initial=0.0)) for one in rows), default=0.0)
     if len(strained) > moves.shape[1]:
         strained = np.asarray(np.linalg.qr(strained, mode="r"))
     _, values, right = np.linalg.svd(strained, full_matrices=True)
-    rank = int(np.count_nonzero(values > RANK * values.max(initial=0.0)))
+    rank = int(np.count_nonzero(values > RANK * largest))
     return np.asarray(right[rank:].T)
 
 
@@ -143,11 +145,16 @@ def _of_part(part: Part) -> list[tuple[IntArray, FloatArray]]:
         found: list[tuple[IntArray, FloatArray]] = [(np.arange(6), np.eye(6))]
         if part.body is None:
             found = loose_motions(structure.stiffness, structure.dofs)
-        if part.sectors > 1 and any(face in structure.sets for face in part.faces):
+        if part.sectors > 1 and _alike(part):
             found = [(dofs, _with_all_sectors(part, dofs, motions)) for dofs, motions in found]
         part.memo["loose"] = found
     loose: list[tuple[IntArray, FloatArray]] = part.memo["loose"]
     return loose
+
+
+def _alike(part: Part) -> bool:
+    """Whether cyclic faces let a sector move as all others do, and not by itself."""
+    return any(face in part.structure.sets for face in part.faces)
 
 
 def _with_all_sectors(part: Part, dofs: IntArray, motions: FloatArray) -> FloatArray:
@@ -190,6 +197,8 @@ def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
 def _complaint(model: Model, body: Loose, shapes: FloatArray, *, at_rest: bool) -> InputError:
     part = model.parts[body.part]
     words = in_words(model.places.dofs.take(body.dofs), shapes)
+    if part.sectors > 1 and shapes.shape[1] == 2 and _alike(part):
+        words = "moving along the axis and turning about it"
     whole = body.dofs.size == part.structure.n
     which = (
         ""

@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
+
 from stickslip.assembly.forces import first_nodes
+from stickslip.assembly.held import unheld
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.verdict import together
 from stickslip.study.keep.progress import LOG
@@ -26,7 +29,7 @@ def check_study(study: Study) -> tuple[str, ...]:
     for case in study.cases():
         model = case.build()
         with of_task(study, case):
-            lines = [_size(model), *first_nodes(model.places, model.outputs)]
+            lines = [_size(model), *_free(model), *first_nodes(model.places, model.outputs)]
             lines += [*(f"{WARNING}{text}" for text in model.warnings)]
             for one in asked:
                 lines += one.check(case, model)
@@ -50,6 +53,15 @@ def _tell(label: str, lines: list[str]) -> None:
         LOG.info(label)
     for line in lines:
         LOG.info(f"  {line}" if label else line)
+
+
+def _free(model: Model) -> list[str]:
+    """Say which parts nothing holds, though all contacts stick; an analysis that cannot do with that refuses it by itself."""
+    if model.stages is not None:
+        return []
+    return [
+        f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))
+    ]
 
 
 def _size(model: Model) -> str:
