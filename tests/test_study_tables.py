@@ -151,7 +151,14 @@ def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
     }
     if kind in folders:
         written = (EXAMPLES / folders[kind] / "study.toml").read_text(encoding="utf-8")
-        assert example_text(kind) == written
+        own, head = example_text(kind), written.partition("[vary]")[0]
+        assert own == written if kind != "wheel" else own.startswith(f"{head}[vary]")
+        if kind == "wheel":  # the peaks whose stability is undecided are left out, and named
+            few, every = (tomllib.loads(s)["vary"]["contact"]["groove"] for s in (own, written))
+            left_out = set(every["slip_limit_n"]) - set(few["slip_limit_n"])
+            assert {3.0, 3.2, 10.0} < left_out
+            assert set(few["slip_limit_n"]) < set(every["slip_limit_n"])
+            assert "3, 3.2 and 10 N" in own
     else:
         path = tmp_path / "study.toml"
         path.write_text(example_text(kind), encoding="utf-8")
