@@ -2,7 +2,7 @@
 
 import math
 import pickle
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -189,6 +189,24 @@ def test_models_and_what_they_are_assembled_to_survive_pickling():
     np.testing.assert_array_equal(found.load.static, model.assembled(3).load.static)
 
 
+@dataclass(frozen=True)
+class _Pressed(Jenkins):
+    """A law of one's own whose normal force at zero gap is not called `preload`."""
+
+    n0: float = 1.0
+
+
+def test_a_gap_of_an_own_law_names_the_fields_it_goes_into():
+    own = _Pressed(k_t=1.0, k_n=1.0, limit=1.0)
+    one = Contact(between=("chain.m1", "ground"), law=own, acts="normal", gap=-2e-5)
+    with pytest.raises(InputError) as error:
+        replace(four_masses(), contacts={"a": one}).assembled(3)
+    said = str(error.value)
+    assert "interference_m: is given (in Python gap=-2e-05), and the law _Pressed" in said
+    assert "has no field `preload`: " in said
+    assert "`k_n`" in said.partition("Give the law")[2]
+
+
 def test_what_is_wrong_with_a_model_is_named():
     model = four_masses()
 
@@ -213,7 +231,7 @@ def test_what_is_wrong_with_a_model_is_named():
     with pytest.raises(InputError, match=r"contact.a.acts: is missing"):  # before anything is asked
         replace(model, contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)})
     refused(
-        r"contact.a.gap_m: is given, and the law jenkins has a normal force that does not depend on how far",
+        r"contact.a.gap_m: is given \(in Python gap=0.001\), and the law jenkins has a normal force that does not depend on how far",
         contacts={"a": replace(one, between=("chain.m1", "ground"), gap=1e-3)},
     )
     refused("contact: there is none", contacts={})

@@ -148,8 +148,8 @@ def test_a_contact_at_rest_is_one_thing(said, told, tmp_path):
 @pytest.mark.parametrize(
     ("said", "told"),
     [
-        ("jenkins", "interference_m: is given, and the law jenkins has a normal force that does not depend on how far"),
-        ("regularised_coulomb", "interference_m: is given, and the law regularised_coulomb has no normal stiffness here"),
+        ("jenkins", "interference_m: is given \\(in Python gap=-0.0001\\), and the law jenkins has a normal force that does not depend on how far"),
+        ("regularised_coulomb", "interference_m: is given \\(in Python gap=-0.0001\\), and the law regularised_coulomb has no normal stiffness here"),
     ],
 )  # fmt: skip
 def test_an_interference_that_presses_nothing_is_refused(said, told, tmp_path):

@@ -1,6 +1,6 @@
 """What a point of a contact has of its law: the contact's preload and gap in it, and the point's share of the interface."""
 
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
 from stickslip.contact.law import ContactLaw, scaled
-from stickslip.contact.laws import law_name
+from stickslip.contact.laws import LAWS, law_name
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError, input_error
@@ -23,10 +23,10 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
         if contact.preload > 0.0:
             return replace(law, preload=contact.preload)
         return replace(law, initial_gap=law.initial_gap + contact.gap)
-    if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
-        raise _at_rest_alike(
-            key, contact, "has a normal force that does not depend on how far the bodies are apart"
-        )
+    own = {entry.name for entry in fields(law)} if is_dataclass(law) else set()
+    missing = [n for n in ("preload", "k_n") if n not in own or getattr(law, n) is None]
+    if missing:
+        raise _at_rest_alike(key, contact, *_without(law, missing))
     if contact.gap != 0.0 and law.k_n == 0.0:
         raise _at_rest_alike(key, contact, "has no normal stiffness here: its pressure is constant")
     if isinstance(law, UnilateralSpring):
@@ -45,14 +45,31 @@ def _pressed_or_open(law: UnilateralSpring, contact: Contact) -> UnilateralSprin
     return replace(law, preload=max(preload - law.k_n * gap, 0.0), initial_gap=0.0)
 
 
-def _at_rest_alike(key: str, contact: Contact, why: str) -> InputError:
-    """Refuse a preload, gap or interference that makes no difference."""
+def _without(law: Any, missing: list[str]) -> tuple[str, ...]:
+    """Return why a law without fields takes no preload and no gap; and what helps, if it is a law of one's own."""
+    if law_name(law) in tuple(LAWS):
+        return ("has a normal force that does not depend on how far the bodies are apart",)
+    names = " and no field ".join(f"`{name}`" for name in missing)
+    return (
+        f"has no field {names}: the contact's preload and gap go into the law as preload - k_n * gap",
+        "Give the law the fields `preload` (N at zero gap, N) and `k_n` (normal stiffness, N/m), or leave it out and press by the law's own parameters.",
+    )
+
+
+def _at_rest_alike(
+    key: str,
+    contact: Contact,
+    why: str,
+    remedy: str = "Choose a law that is pressed and lifts off, such as elastic_coulomb, or leave it out.",
+) -> InputError:
+    """Refuse a preload, gap or interference that makes no difference, by its key and by what it is in Python."""
     preload = "preload_pa" if contact.share == "area" else "preload_n"
     word = preload if contact.preload else "gap_m" if contact.gap > 0.0 else "interference_m"
+    given = f"preload={contact.preload:g}" if contact.preload else f"gap={contact.gap:g}"
     return input_error(
         f"{key}.{word}",
-        f"is given, and the law {law_name(contact.law)} {why}",
-        "Choose a law that is pressed and lifts off, such as elastic_coulomb, or leave it out.",
+        f"is given (in Python {given}), and the law {law_name(contact.law)} {why}",
+        remedy,
     )
 
 
