@@ -1,5 +1,6 @@
 """The ends of an optimisation curve: those of one Jenkins element in closed form, the words for each kind of damper, the page."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from stickslip.study.analyses.forced.working_range import (
     CurvePeak,
     contacts_at_peak,
     regimes_of,
+    sticks_at,
     with_regimes,
     working_range,
     working_ranges,
@@ -156,13 +158,15 @@ def test_a_damper_that_never_takes_the_peak_down_hardly_damps() -> None:
 
 def test_without_a_stuck_case_the_range_is_that_around_the_smallest_peak() -> None:
     peaks = curve((50, 1.0, SLIPS), (20, 0.3, SLIPS), (10, 0.25, SLIPS), (5, 0.3, SLIDES))
-    own = working_range(peaks)
+    own = working_range(peaks, "load.shaker.ratio")
     assert own is not None
     assert own.regimes == ("stiffens", "works", "works", "works")
     stuck, works, other = range_sentences(own)
     assert stuck.startswith("At no value do all contacts stick at the peak: ")
     assert "within 3 dB of the smallest one, at 10" in works
-    assert other.startswith("The other end was not reached: at  = 5, the last value, ")
+    assert other.startswith(
+        "The other end was not reached: at load.shaker.ratio = 5, the last value, "
+    )
 
 
 def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:
@@ -219,11 +223,64 @@ def test_what_dissipates_is_not_stuck_and_what_does_not_is_no_friction() -> None
     [
         curve((1, 1.0, STICKS), (2, 1.0, STICKS), (3, 1.0, STICKS)),  # nothing slips
         curve((1, 1.0, STICKS), (2, 0.5, SLIPS)),  # too few
-        curve((1, 1.0, SLIPS), (2, 0.9, SLIDES), (3, 1.0, SLIPS)),  # no end sticks more
     ],
 )
 def test_what_has_no_ends_is_not_judged(peaks: list[CurvePeak]) -> None:
     assert working_range(peaks) is None
+
+
+def two_blades() -> list[CurvePeak]:
+    """Return peaks of two blades with a damper at the ratios 3, 5 and 10, where it lifts off and so sticks longest at 3."""
+    told = [(3, 5.87, 0.81, 8.6e-4, 19.2), (5, 5.95, 0.65, 5.3e-4, 3.56), (10, 10.2, 0.77, 4.5e-4, 1.54)]  # fmt: skip
+    return [
+        CurvePeak(v, size, 180.0, ContactsAtPeak(share, False, False), x, per_m * x, force=442 / v)
+        for v, size, share, x, per_m in told
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "end"),
+    [
+        ("load.shaker.ratio", "high"),
+        ("contact.flat.friction_coefficient", "high"),
+        ("contact.flat.tangential_stiffness_n_per_m", None),
+        ("load.pull.force_n", None),  # the excitation does not grow with it
+    ],
+)
+def test_the_stuck_end_is_told_by_what_is_varied_and_not_by_small_differences_of_the_share(
+    key: str, end: str | None
+) -> None:
+    peaks = two_blades()
+    assert sticks_at(peaks, key) == end
+    own = working_range(peaks, key)
+    assert own is not None
+    if end is None:
+        (told,) = range_sentences(own)
+        assert told.startswith(f"Where friction works cannot be told from these values of {key}: ")
+    else:
+        assert own.regimes == ("stiffens", "works", "works")
+        assert f"lies above {key} = 10" in range_sentences(own)[0]
+        assert f"from {key} = 5 to 3" in range_sentences(own)[1]
+
+
+def test_the_stuck_end_of_forces_and_of_other_keys() -> None:
+    grown = [replace(p, value=p.force) for p in two_blades()[::-1]]
+    assert sticks_at(grown, "load.shaker.force_n") == "low"
+    slides = replace(grown[-1], contacts=SLIDES)
+    assert sticks_at([*grown[:-1], slides], "part.blades.pitch_m") == "low"
+    apart = replace(grown[-1], contacts=ContactsAtPeak(0.0, True, False))  # none touches
+    assert sticks_at([*grown[:-1], apart], "contact.flat.gap_m") == "low"
+
+
+def test_nothing_is_shaded_where_the_stuck_end_is_not_known() -> None:
+    data = synthetic_result(ratios=(10, 5, 3), n=24).assign_coords(vary=["contact.flat.gap_m"])
+    data["peak_state"] = data["peak_state"].isel(case=[0, 0, 0]).assign_coords(case=data["case"])
+    (own,) = working_ranges(data)
+    assert not own.judged
+    assert "friction_regime" not in with_regimes(data)
+    plot = optimisation(Response(data))
+    assert plot is not None
+    assert not plot.figure.layout.shapes
 
 
 def test_states_of_a_cycle() -> None:

@@ -21,7 +21,7 @@ def where_friction_works(response: Response) -> Words | None:
 def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:
     """Draw a band over each stretch of values at which friction works; return what the caption says of it, nothing where none is drawn."""
     ranges = working_ranges(response.data)
-    stretches = ranges[0].stretches if len(ranges) == 1 else []
+    stretches = ranges[0].stretches if len(ranges) == 1 and ranges[0].judged else []
     if not stretches:
         return ""
     values = np.unique([p.value for p in ranges[0].peaks])

@@ -23,6 +23,12 @@ Regime = Literal["stuck", "stiffens", "works", "lets go"]
 REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a dataset is its place
 HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
 FEWEST = 3  # peaks of a curve
+HELD_BY = (
+    "ratio", "friction_coefficient", "slip_limit_n", "slip_limit_pa", "preload_n", "preload_pa", "interference_m",
+)  # the more of them, the longer contacts stick; ratio: pull over excitation  # fmt: skip
+FORCE = "force_n"  # of a load
+APART = 0.25  # of the cycle: by so much more an end sticks that is told by its contacts
+SLIDES_MORE = 2.0  # times the loss over the amplitude at the other end
 SETTINGS = (
     "forced_response", "harmonics", "limits", "output", "reduction", "retention", "solver",
 )  # tables of how things are computed: over them no joint goes from stick to slip  # fmt: skip
@@ -79,6 +85,8 @@ class CurvePeak:
         Energy that the contacts dissipate in a cycle of it, J; zero where it is rounding, NaN where it is not known.
     case
         Position along ``case``.
+    force
+        Amplitude of the excitation, N; NaN where it is not known.
     """
 
     value: float
@@ -88,6 +96,7 @@ class CurvePeak:
     amplitude: float = float("nan")
     loss: float = float("nan")
     case: int = -1
+    force: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -97,9 +106,9 @@ class WorkingRange:
     Parameters
     ----------
     peaks
-        From the end where contacts stick to the other.
+        From the end where contacts stick to the other; by rising values where that end is not known.
     regimes
-        One a peak: ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak; ``works``: more; ``lets go``: on the other
+        One a peak, none where it is not known at which end contacts stick: ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak; ``works``: more; ``lets go``: on the other
         side of the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
     key
         What is varied.
@@ -117,6 +126,11 @@ class WorkingRange:
     others: str = ""
     per_force: bool = True
     left_out: tuple[str, ...] = ()
+
+    @property
+    def judged(self) -> bool:
+        """Whether it is known at which end contacts stick."""
+        return bool(self.regimes)
 
     def of(self, *regimes: Regime) -> list[CurvePeak]:
         """Return the peaks of some regimes, from the stuck end on."""
@@ -171,16 +185,56 @@ def regimes_of(peaks: Sequence[CurvePeak]) -> tuple[Regime, ...]:
     return tuple(found)
 
 
-def working_range(peaks: Sequence[CurvePeak]) -> WorkingRange | None:
-    """Put a curve in order and judge it; None where there are too few peaks, no friction, or no end that sticks more than the other."""
+def sticks_at(peaks: Sequence[CurvePeak], key: str = "") -> Literal["low", "high"] | None:
+    """Return at which end of a curve of rising values contacts stick; None where it cannot be told.
+
+    The peak of a linear system tells it, with contacts that stick at one end or none that touches at the other; then the meaning of
+    the varied key; at last `_by_contacts`.
+    """
+    low, high = peaks[0], peaks[-1]
+    stuck = [p.contacts.linear and p.contacts.sticking > 0.0 for p in (low, high)]
+    gone = [p.contacts.linear and p.contacts.sticking == 0.0 for p in (low, high)]
+    if stuck[0] != stuck[1]:
+        return "low" if stuck[0] else "high"
+    if gone[0] != gone[1]:
+        return "low" if gone[1] else "high"
+    name = key.rpartition(".")[2]
+    if low.value > 0.0 and name in HELD_BY:
+        return "high"
+    if low.value > 0.0 and name == FORCE and _excites(low, high):
+        return "low"
+    return _by_contacts(low, high)
+
+
+def _excites(low: CurvePeak, high: CurvePeak) -> bool:
+    """Whether the force that is varied is the excitation: no pull, and none that the excitation grows with."""
+    scaled = np.isclose(high.force * low.value, low.force * high.value, rtol=1e-9)
+    return bool(scaled and not np.isclose(low.size, high.size, rtol=1e-3))
+
+
+def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | None:
+    """Return the end that sticks for a much larger share of the cycle, and where contacts dissipate less over the amplitude.
+
+    A contact that opens slips less, too: small differences of the share tell nothing.
+    """
+    more = low.contacts.sticking - high.contacts.sticking
+    holds, slides = (low, high) if more > 0.0 else (high, low)
+    lost = [p.loss / p.amplitude for p in (holds, slides)]
+    if abs(more) < APART or not lost[1] > SLIDES_MORE * lost[0]:
+        return None
+    return "low" if more > 0.0 else "high"
+
+
+def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | None:
+    """Put a curve over a key in order and judge it; None where there are too few peaks, or no friction."""
     rising = sorted(peaks, key=lambda p: p.value)
     if len(rising) < FEWEST or all(p.contacts.linear or p.loss == 0.0 for p in rising):
         return None
-    low, high = (rising[k].contacts.sticking for k in (0, -1))
-    if low == high:
-        return None
-    ordered = rising if low > high else rising[::-1]
-    return WorkingRange(tuple(ordered), regimes_of(ordered))
+    end = sticks_at(rising, key)
+    if end is None:
+        return WorkingRange(tuple(rising), (), key)
+    ordered = rising if end == "low" else rising[::-1]
+    return WorkingRange(tuple(ordered), regimes_of(ordered), key)
 
 
 def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
@@ -196,15 +250,17 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
         families.setdefault(others, []).append(case)
     found = []
     for others, cases in families.items():
-        known = {c: _peak(data, c, float(values[c]), float(force[c]) if per_force else 1.0) for c in cases}  # fmt: skip
-        own = working_range([p for p in known.values() if p is not None])
+        known = {c: _peak(data, c, float(values[c]), float(force[c]), per_force=per_force) for c in cases}  # fmt: skip
+        own = working_range([p for p in known.values() if p is not None], key)
         if own is not None:
             out = tuple(labels[c] for c, p in known.items() if p is None)
-            found.append(WorkingRange(own.peaks, own.regimes, key, others, per_force, left_out=out))
+            found.append(replace(own, others=others, per_force=per_force, left_out=out))
     return tuple(found)
 
 
-def _peak(data: xr.Dataset, case: int, value: float, force: float) -> CurvePeak | None:
+def _peak(
+    data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool
+) -> CurvePeak | None:
     """Return the peak of a case; None where it is not known, no resonance, or wrong."""
     curve = Curve(data, case)
     wrong = curve.number("case_verdict") == LEVELS.index("wrong")
@@ -217,7 +273,8 @@ def _peak(data: xr.Dataset, case: int, value: float, force: float) -> CurvePeak 
     contacts, loss = contacts_at_peak(state), _loss(curve)
     if loss > 0.0:  # some laws, such as dahl, dissipate before they slip
         contacts = replace(contacts, linear=False)
-    return CurvePeak(value, amplitude / force, curve.peak_hz, contacts, amplitude, loss, case)
+    size = amplitude / force if per_force else amplitude
+    return CurvePeak(value, size, curve.peak_hz, contacts, amplitude, loss, case, force)
 
 
 def _loss(curve: Curve) -> float:
@@ -230,7 +287,7 @@ def _loss(curve: Curve) -> float:
 
 def with_regimes(data: xr.Dataset) -> xr.Dataset:
     """Return the dataset of a forced response with the regime of each case, -1 where it was not judged."""
-    ranges = working_ranges(data)
+    ranges = [own for own in working_ranges(data) if own.judged]
     if not ranges:
         return data
     number = np.full(data.sizes["case"], -1)

@@ -24,11 +24,18 @@ def range_lines(data: xr.Dataset) -> tuple[str, ...]:
 
 def range_sentences(own: WorkingRange) -> tuple[str, ...]:
     """Say where all contacts stick, where friction works and where it lets go; and which cases were left out."""
-    told = [_stuck_end(own), _middle(own), _loose_end(own)]
+    told = [_stuck_end(own), _middle(own), _loose_end(own)] if own.judged else [_unknown(own)]
     if own.left_out:
         them = "; ".join(own.left_out)
         told.append(f"Not judged, as the verdict is wrong or the peak no resonance: {them}.")
     return tuple(text for text in told if text)
+
+
+def _unknown(own: WorkingRange) -> str:
+    return (
+        f"Where friction works cannot be told from these values of {own.key}: at neither end do all contacts stick, and their states "
+        "do not tell which end is nearer to it. Add values beyond both ends."
+    )
 
 
 def _of(own: WorkingRange, peak: CurvePeak) -> str:
