@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
-from stickslip.contact.law import FULLY_COUPLED, PAIRS, ContactLaw
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.law import FULLY_COUPLED, OPEN, PAIRS, STICK, ContactLaw
 from stickslip.errors import InputError, input_error
 
 ALLOWED = (5, 7, 9)
 RELATIVE_STEP = 1e-6
+PART = 1e-3  # of the displacements: how far two gaps lie apart whose pressures are compared
+ROUNDING = 1e-12  # of the largest stiffness: below, one is zero
 KINK = 1e-3  # difference of both sides, relative to the largest outcome, at which a kink is near: nothing is said there
 WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides is a hundred times smaller
 
@@ -15,7 +17,11 @@ WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides
 def check_law(
     law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0
 ) -> None:
-    """Compare the derivatives of a law with differences along a random path.
+    """Compare the derivatives of a law with differences along a random path, and its normal force and stuck stiffness with them.
+
+    A positive normal gap is open: the pressure ``N = -force[2]`` must not grow with it. A law that never opens, such as a spring of negative
+    stiffness, may pull the other way if its `stuck_stiffness` says so. Whether a contact may give the law a preload or gap is not asked: that
+    needs its fields ``preload`` and ``k_n``.
 
     Parameters
     ----------
@@ -31,8 +37,9 @@ def check_law(
     Raises
     ------
     InputError
-        If `pairs` is none of 5, 7, 9 or leaves out a block that differs from zero, an output is not filled, a derivative is wrong, or
-        each point was next to a kink; it names the entry and both numbers.
+        If `pairs` is none of 5, 7, 9 or leaves out a block that differs from zero, an output is not filled, a derivative is wrong,
+        the pressure grows as the bodies part, `stuck_stiffness` is none that the law has where it sticks, or each point was next to a kink; it
+        names the entry and both numbers.
     """
     if law.pairs not in ALLOWED:
         raise _refused(law, f"pairs is {law.pairs}", "Give 5, 7 or 9 (see ContactLaw).")
@@ -43,7 +50,7 @@ def check_law(
         point = np.concatenate(
             [size * rng.standard_normal(3), rate * rng.standard_normal(3), state]
         )
-        out, jac = _step(law, point)
+        out, jac, _ = _step(law, point)
         if not np.any(np.isnan(state)):
             path.append((point, out, jac))
         state = out[3:]
@@ -60,10 +67,70 @@ def check_law(
         raise _refused(
             law, "each point of the path is next to a kink", "Give another `size` or `rate`."
         )
+    stops = [point for point, _, _ in path] + _at_rest(law, size)
+    _check_normal(law, stops, size)
+    _check_stuck(law, stops)
 
 
-def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return force and new state, and their derivatives, at one sample."""
+def _at_rest(law: ContactLaw, size: float) -> list[FloatArray]:
+    """Return the point of no displacement, and one that is pressed, each without velocity and with the state that the first step leaves."""
+    stops = []
+    for gap in (0.0, -size):
+        point = np.concatenate([[0.0, 0.0, gap, 0.0, 0.0, 0.0], law.initial_state()])
+        point[6:] = _step(law, point)[0][3:]
+        stops.append(point)
+    return stops
+
+
+def _check_normal(law: ContactLaw, stops: list[FloatArray], size: float) -> None:
+    """Refuse a pressure that grows as the bodies part, seen where the contact is closed with the least gap."""
+    seen = [(abs(point[2]), i, _step(law, point)) for i, point in enumerate(stops)]
+    closed = [(gap, i) for gap, i, (_, _, status) in seen if not np.any(status == OPEN)]
+    springs = len(closed) == len(stops) and law.stuck_stiffness()[2] < 0.0  # on purpose
+    if not closed or springs:
+        return
+    near = stops[min(closed)[1]]
+    apart = near.copy()
+    apart[2] += PART * size
+    before, after = -_step(law, near)[0][2], -_step(law, apart)[0][2]
+    if after - before > WRONG * PART * max(float(np.abs(out[2])) for _, _, (out, _, _) in seen):
+        raise _refused(
+            law,
+            f"the pressure grows as the bodies part: N = -force[2] is {before:.6g} N at a normal gap of {near[2]:.6g} m, "
+            f"{after:.6g} N at {apart[2]:.6g} m",
+            "A positive normal gap is open: N = preload - k_n * displacement[2], force[2] = -N, jac[2, 2] = k_n.",
+        )
+
+
+def _check_stuck(law: ContactLaw, stops: list[FloatArray]) -> None:
+    """Refuse a stuck stiffness that lies beyond all that the law has where it sticks; of a linear law they are one number."""
+    own = np.asarray(law.stuck_stiffness(), dtype=float)
+    if own.shape != (3,):
+        raise _refused(law, f"stuck_stiffness has the shape {own.shape}", "Return t, w, n.")
+    seen: list[list[float]] = [[], [], []]
+    for point in stops:
+        _, jac, status = _step(law, point)
+        for d in range(3):
+            if np.all(status != OPEN) if d == 2 else status[d] == STICK:
+                seen[d].append(jac[d, d])
+    largest = max((abs(k) for along in seen for k in along), default=0.0)
+    for d, along in enumerate(seen):
+        if not along:
+            continue
+        low, high = min(along), max(along)
+        room = WRONG * max(abs(low), abs(high)) + ROUNDING * largest
+        if not low - room <= own[d] <= high + room:
+            has = f"{low:.6g}" if high - low <= room else f"{low:.6g} to {high:.6g}"
+            raise _refused(
+                law,
+                f"stuck_stiffness[{d}] is {own[d]:.6g} N/m, and jac[{d}, {d}] is {has} N/m where the contact "
+                f"{'is closed' if d == 2 else 'sticks'}",
+                "Return the stiffnesses along t, w, n of the contact that neither slips nor opens.",
+            )
+
+
+def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return force and new state, their derivatives, and what each tangent does, at one sample."""
     n = point.size - 6
     force, new_state = np.full(3, np.nan), np.full(n, np.nan)
     jac, status = np.zeros((3 + n, 6 + n)), np.full(2, -1, dtype=np.int64)
@@ -75,7 +142,7 @@ def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray]:
         raise _refused(
             law, f"the step does not fill {', '.join(names)}", "Fill every output in every branch."
         )
-    return out, jac
+    return out, jac, status
 
 
 def _compare(
