@@ -19,6 +19,7 @@ from stickslip.front.printed import aligned
 from stickslip.front.result import Result
 from stickslip.front.screen import LOG, Screen, by_default, on_screen
 from stickslip.front.study import Study
+from stickslip.study.analyses.forced.summary import _millimetres
 from stickslip.study.file.keys import REQUIRED, table_keys
 from stickslip.study.keep.progress import advance, at_work, sum_up
 
@@ -270,3 +271,9 @@ def test_silence_is_a_matter_of_the_logging_level(
 def test_who_has_a_handler_of_his_own_gets_no_other() -> None:
     with by_default():
         assert LOG.handlers == []  # pytest has put one at the root
+
+
+def test_peaks_of_a_column_are_rounded_once() -> None:
+    assert _millimetres(0.60625159) == "0.6062516"
+    assert aligned([_millimetres(v) for v in (0.60625159, 1.25)]) == ["0.6063", "1.2500"]
+    assert aligned(["0.6062516"]) == ["0.60625"]

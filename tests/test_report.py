@@ -557,7 +557,14 @@ def test_one_case_without_vary_speaks_of_no_cases() -> None:
     assert "Frequency response. First harmonic" in text
     assert "peak of tip1.x" in text
     assert "lost in a cycle at the peak" in text
+    assert "by all contacts together" in text
     assert KEY not in text
+
+
+def test_what_a_tuned_wheel_loses_is_told_of_one_sector() -> None:
+    data = synthetic_result(ratios=(5,)).drop_vars(["vary", "vary_value"])
+    assert Response(data).of_sector == ""
+    assert Response(data.assign_attrs(sectors=24)).of_sector == " of one sector"
 
 
 def test_without_excitation_amplitudes_are_not_divided() -> None:

@@ -31,7 +31,8 @@ from stickslip.study.analyses.forced.in_time import (
     shows_after,
 )
 from stickslip.study.analyses.forced.points import Response, collect
-from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.forced.question import ALONE, Question
+from stickslip.study.analyses.forced.rules import fewer
 from stickslip.study.analyses.forced.stable import (
     Examined,
     cost_line,
@@ -339,6 +340,17 @@ def test_motions_in_time_decide(motion: str, verdict: str) -> None:
     assert (found.verdict, found.motion) == (verdict, motion)
     settled = replace(EXAMINED, verdict="stable")
     assert with_motion(settled, replace(CHECK, motion=motion)) == settled  # type: ignore[arg-type]
+
+
+def test_a_model_too_large_in_time_is_not_sent_there() -> None:
+    assert EXAMINED.sentence.endswith("an integration in time (--verify) tells more")
+    size = "4944 coordinates are more than 600"
+    few, none = (replace(EXAMINED, large=size + more) for more in ("", f", 1944 {ALONE}"))
+    for one in (few, none):
+        assert "--verify" not in one.sentence
+    assert "fewer contact points" in fewer(few.sentence)
+    assert "no fewer modes" in fewer(none.sentence)
+    assert fewer(EXAMINED.sentence) == ""
 
 
 def test_a_poor_balance_without_a_better_one_is_not_called_unstable() -> None:

@@ -13,6 +13,7 @@ from rich.text import Text
 from stickslip.errors import printable
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
+_DECIMALS = 5  # of cells that are printed as they are
 _DIGITS = 5  # of the largest number of a column
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 
@@ -40,7 +41,7 @@ def aligned(cells: Sequence[str]) -> list[str]:
         return list(cells)
     sizes = [abs(float(c)) for c in numbers if float(c) != 0.0]
     each = {len(c.partition(".")[2]) for c in numbers}
-    if not sizes or len(each) == 1:
+    if not sizes or (len(each) == 1 and max(each) <= _DECIMALS):
         return list(cells)
     of_largest, of_smallest = (math.floor(math.log10(v)) for v in (max(sizes), min(sizes)))
     decimals = min(max(each), max(0, _DIGITS - 1 - of_largest, 1 - of_smallest))

@@ -136,6 +136,12 @@ class Response(Node):
         good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
         return np.isin(self.integers("status"), good or [0])
 
+    @property
+    def of_sector(self) -> str:
+        """`` of one sector`` where one sector answers for a tuned wheel; else empty."""
+        tuned = int(self.data.attrs.get("sectors", 1)) > 1 and not self.has("amplification")
+        return " of one sector" if tuned else ""
+
     @cached_property
     def levels(self) -> IntArray:
         """(point,) level of the verdict on each point; a result that tells none trusts what converged."""

@@ -133,7 +133,7 @@ def _energy_caption(response: Response, case: ShownCase) -> str:
     if total <= _NOTHING:
         return "At the peak nothing is dissipated: every point sticks."
     most = int(np.nanargmax(energy))
-    text = f"At the peak {quantity(total, 'J')} are lost in a cycle, {percent(100 * float(energy[most]) / total)} of it at {names[most]}"
+    text = f"At the peak {quantity(total, 'J')} are lost in a cycle by the contacts{response.of_sector}, {percent(100 * float(energy[most]) / total)} of it at {names[most]}"
     shares = {g: 100 * float(np.nansum(energy[at])) / total for g, at in response.groups.items()}
     largest = max(shares, key=lambda g: shares[g])
     return text + (

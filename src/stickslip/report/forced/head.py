@@ -107,7 +107,9 @@ def _loss_card(response: Response) -> Card | None:
     own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
     energy = float(np.nansum(own))
     lost = quantity(energy if energy > 1e-12 else 0.0, "J")
-    return Card(lost, "lost in a cycle at the peak", "by all contacts together")
+    return Card(
+        lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together"
+    )
 
 
 def _alert_cards(response: Response) -> list[Card]:

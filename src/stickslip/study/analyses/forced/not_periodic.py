@@ -17,11 +17,11 @@ from stickslip.response.quasi_periodic.in_time import (
     course,
     statistics,
 )
-from stickslip.response.time.sectors import all_sectors, sectors_in_time
+from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.study.analyses.forced.in_time import GOLDEN, KICK
 from stickslip.study.analyses.forced.points import Accepted, Response
-from stickslip.study.analyses.forced.question import MOST_IN_TIME, TOO_MANY, Question
+from stickslip.study.analyses.forced.question import Question, too_large
 from stickslip.study.analyses.forced.stable import Examined
 from stickslip.units import HZ
 
@@ -136,9 +136,8 @@ def in_time_instead(
         Modulus of that of the balance's motion, which says how long its disturbances take to grow; NaN where it is not known.
     """
     count = question.problem.system.outputs.size
-    size = sectors_in_time(question.model.system) * question.model.system.structure.n
-    if size > MOST_IN_TIME:
-        return _nothing(omega, why, count, f"not integrated: {size} coordinates {TOO_MANY} {MOST_IN_TIME}")  # fmt: skip
+    if large := too_large(question):
+        return _nothing(omega, why, count, f"not integrated: {large}")
     try:
         found = _marched(question, response, omega, budget, multiplier)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:

@@ -31,6 +31,7 @@ IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask f
 STABLE = "stability"  # what every run finds out unless the study says no
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
+ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 
@@ -129,6 +130,18 @@ class Question:
     def said(self, text: str) -> str:
         """Return a sentence about the case, see `said`."""
         return said(self.label, text)
+
+
+def too_large(question: Question) -> str:
+    """Return how many coordinates are too many to be integrated in time; empty where they are not."""
+    system = question.model.system
+    sectors = sectors_in_time(system)
+    size, kept = sectors * system.structure.n, sectors * len(system.retained_labels)
+    if size <= MOST_IN_TIME:
+        return ""
+    return f"{size} coordinates {TOO_MANY} {MOST_IN_TIME}" + f", {kept} {ALONE}" * (
+        kept > MOST_IN_TIME
+    )
 
 
 def peak_first(model: Assembled) -> Assembled:

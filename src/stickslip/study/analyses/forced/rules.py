@@ -11,7 +11,7 @@ from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
 from stickslip.study.analyses.forced.jumps import jumps
-from stickslip.study.analyses.forced.question import MOST_IN_TIME, TOO_MANY
+from stickslip.study.analyses.forced.question import ALONE, MOST_IN_TIME, TOO_MANY
 from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
@@ -22,6 +22,7 @@ LEAVING = dict.fromkeys(
     'forced_response.bifurcations = "branches" follows what leaves there.',
 )
 FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
+OPEN = "No more time helps, and no fewer modes: it stays open. More harmonics make the errors of multipliers smaller."
 IN_TIME = "--verify integrates in time at the peak"
 IN_TIME_TELLS = (
     "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
@@ -197,8 +198,9 @@ def stability(case: Curve) -> Iterator[Finding]:
             yield Finding("wrong", why, remedy, (point,))
         elif said["stability_verdict"] == "undecided" and not case.attained[point]:
             why = f"whether it is stable: {why}"
-            large = any(_too_large(str(s["not_periodic_sentence"])) for s in case.rows("not_periodic"))  # fmt: skip
-            remedy = FEWER if large else f"{_in_time(case, point)}, and sees whether the motion stays."  # fmt: skip
+            told = [why, *(str(s["not_periodic_sentence"]) for s in case.rows("not_periodic"))]
+            known = next(filter(None, map(fewer, told)), "")
+            remedy = known or f"{_in_time(case, point)}, and sees whether the motion stays."
             yield Finding("doubtful", why, remedy, (point,))
 
 
@@ -270,14 +272,16 @@ def not_periodic(case: Curve) -> Iterator[Finding]:
         remedy = "Give it more time: forced_response.not_periodic_s."
         if settled:
             remedy = "That is time integration, no balance."
-        elif _too_large(sentence):
-            remedy = FEWER
+        elif large := fewer(sentence):
+            remedy = large
         yield Finding("trusted" if settled else "doubtful", why, remedy, (point,))
 
 
-def _too_large(sentence: str) -> bool:
-    """Whether a motion was not integrated because the model has too many coordinates, which no more time helps."""
-    return f"coordinates {TOO_MANY} {MOST_IN_TIME}" in sentence
+def fewer(sentence: str) -> str:
+    """Return what to do where a model has too many coordinates to be integrated in time, which no more time helps; empty where it has not."""
+    if f"coordinates {TOO_MANY} {MOST_IN_TIME}" not in sentence:
+        return ""
+    return OPEN if ALONE in sentence else FEWER
 
 
 def at_the_end(case: Curve) -> Iterator[Finding]:

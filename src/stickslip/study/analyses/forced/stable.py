@@ -25,7 +25,7 @@ from stickslip.study.analyses.forced.examination import (
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
-from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.forced.question import Question, too_large
 from stickslip.units import HZ
 
 Word = Literal["stable", "unstable", "undecided", "not examined"]
@@ -54,6 +54,8 @@ class Examined:
         What the verdict rests on.
     motion
         What the motion in time did where the multipliers left the verdict undecided; empty where it was not asked.
+    large
+        Why the model is not integrated in time; empty where it can be.
     """
 
     omega: float
@@ -62,6 +64,7 @@ class Examined:
     error: float
     reason: str
     motion: str = ""
+    large: str = ""
 
     @property
     def doubted(self) -> bool:
@@ -73,6 +76,8 @@ class Examined:
         """What was found and why."""
         told = f"{self.omega / HZ:.3f} Hz: {self.verdict}"
         if self.verdict == "undecided" and not self.motion:
+            if self.large:
+                return f"{told}: {self.reason}; not integrated in time: {self.large}"
             return f"{told}: {self.reason}; an integration in time (--verify) tells more"
         if not self.motion:
             return f"{told}: {self.reason}"
@@ -118,7 +123,14 @@ def examine(question: Question, accepted: Accepted) -> Examined:
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return Examined(omega, "not examined", np.nan, np.nan, f"no multipliers ({error})")
     said = f"{found.reason}{wave}"
-    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
+    return Examined(
+        omega,
+        found.verdict,
+        found.multiplier,
+        found.multiplier_error,
+        said,
+        large=too_large(question),
+    )
 
 
 def _by_hill(question: Question, accepted: Accepted) -> Examined:
@@ -129,7 +141,14 @@ def _by_hill(question: Question, accepted: Accepted) -> Examined:
     if wheel and hill.disturbance is not None and found.verdict != "stable":
         said += _named(question, hill.disturbance)
     omega = accepted.point.omega
-    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
+    return Examined(
+        omega,
+        found.verdict,
+        found.multiplier,
+        found.multiplier_error,
+        said,
+        large=too_large(question),
+    )
 
 
 def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:

@@ -166,12 +166,17 @@ def _always_high(data: xr.Dataset) -> bool:
 def _row(case: xr.Dataset, label: str) -> tuple[str, ...]:
     return (
         label,
-        f"{1e3 * float(case['peak_amplitude']):.5g}",
+        _millimetres(1e3 * float(case["peak_amplitude"])),
         f"{float(case['peak_frequency_hz']):.3f}",
         LEVELS[int(case["case_verdict"])],
         *(str(int(case[name])) for name in COUNTS),
         f"{sum(float(case[name]) for name in SECONDS):.2f}",
     )
+
+
+def _millimetres(size: float) -> str:
+    """Write a peak with more digits than are shown: columns round it, and rounding twice gives another last digit."""
+    return f"{size:.7g}" if size >= 1e-4 else f"{size:.5g}"
 
 
 def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
