@@ -248,6 +248,16 @@ def test_keys_of_a_table_are_told_with_defaults_and_meanings() -> None:
         table_keys("forced_responses")
 
 
+def test_kinds_are_found_by_their_names_alone() -> None:
+    with pytest.raises(InputError, match=r"'stickslip keys part\.wedge'"):
+        table_keys("wedge")
+    with pytest.raises(InputError, match=r"'stickslip keys contact\.jenkins'"):
+        table_keys("jenkins")
+    with pytest.raises(InputError, match=r"Known: beam, .*'stickslip keys part' has all"):
+        table_keys("part.damper")
+    assert table_keys("part.NAME") == table_keys("part")
+
+
 def test_silence_is_a_matter_of_the_logging_level(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,6 +11,7 @@ from stickslip.study.file.contacts import keys_of
 from stickslip.study.file.tables import study_tables
 
 REQUIRED = "required"
+_ANY_NAME = "NAME"  # of a table that the user names
 _LONGEST = 24  # characters of a default that a cell shows
 
 
@@ -47,19 +48,31 @@ def table_keys(name: str) -> list[Keys]:
     """
     schema = study_tables().model_json_schema()
     table, _, kind = name.strip("[]").partition(".")
+    kind = "" if kind == _ANY_NAME else kind
     if table not in schema["properties"]:
-        known = list(schema["properties"])
-        raise input_error(name, "is no table of a study file", did_you_mean(table, known))
+        raise input_error(name, "is no table of a study file", _table_of(schema, table))
     entry = schema["properties"][table]
     below = entry.get("additionalProperties")
-    title = f"{table}.NAME" if isinstance(below, dict) else table
+    title = f"{table}.{_ANY_NAME}" if isinstance(below, dict) else table
     found = dict(_kinds(schema, below if isinstance(below, dict) else entry))
     if table == "contact":
         return [_of_contact(title, found[""], kind)]
     if kind and kind not in found:
-        raise input_error(name, f"is no kind of [{title}]", did_you_mean(kind, list(found)))
+        known = did_you_mean(kind, [word for word in found if word])
+        raise input_error(name, f"is no kind of [{title}]", f"{known} 'stickslip keys {table}' has all.")  # fmt: skip
     chosen = {word: node for word, node in found.items() if not kind or word == kind}
     return [Keys(_title(title, word, node), _rows(node)) for word, node in chosen.items()]
+
+
+def _table_of(schema: Mapping[str, Any], word: str) -> str:
+    """Say which table a word is a kind of, or which table may be meant."""
+    if word in list(ALL_LAWS):
+        return f"It is a law of contacts: 'stickslip keys contact.{word}'."
+    for table, entry in schema["properties"].items():
+        below = entry.get("additionalProperties")
+        if word in dict(_kinds(schema, below if isinstance(below, dict) else entry)):
+            return f"It is a kind of [{table}]: 'stickslip keys {table}.{word}'."
+    return did_you_mean(word, list(schema["properties"]))
 
 
 def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
