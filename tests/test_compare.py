@@ -13,6 +13,7 @@ import stickslip as ss
 from stickslip.cli import app
 from stickslip.front.comparison import Comparison
 from stickslip.report.quantities import column
+from stickslip.report.side_by_side import cards
 
 STUDY = (
     'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'
@@ -113,6 +114,18 @@ def test_each_case_is_drawn_for_the_designs_that_have_it(pair: Comparison) -> No
     assert "compared_optimisation" in pair.plots
     with pytest.raises(ss.InputError, match="is no figure of this comparison"):
         pair.plot("compared_response")
+
+
+def test_the_head_holds_best_against_best_and_names_each_case(pair: Comparison) -> None:
+    head = cards(pair.designs, divided=True)
+    labels = [card.label for card in head]
+    assert labels == ["best peak of a", "best peak of b", f"peak of a at {KEY} = 50", f"peak of b at {KEY} = 50"]  # fmt: skip
+    assert f"for {KEY} = 5;" in head[0].note
+    assert f"for {KEY} = 20;" in head[1].note
+    assert head[1].note.endswith(" than best peak of a")
+    assert head[3].note.endswith(f"; 20 % more than peak of a at {KEY} = 50")
+    alike = ss.compare(design((50, 5), 1.0, 0.6), design((50, 5), 1.2, 0.4), names=("a", "b"))
+    assert [card.label for card in cards(alike.designs, divided=True)] == labels[:2]
 
 
 def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> None:

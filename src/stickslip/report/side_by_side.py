@@ -308,26 +308,39 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
     )
 
 
-def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
-    found: list[Card] = []
-    first, name = float("nan"), ""
+def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
+    """Return the numbers of the head: the best case of each design, then each design at the case that the page opens on, where all have it."""
     offered = choices(designs)
     shown = opening(designs, offered, divided=divided)
-    word = "smallest peak" if shown is None or shown.index == 0 else "peak"
-    for design in designs:
-        case, response = design.best(divided=divided), design.response
-        if shown is not None:
-            case = _case(design, shown, divided=divided)
+    best = [(d, d.best(divided=divided)) for d in designs]
+    unit = unit_of(designs, divided=divided)
+    found = _held(best, "best peak of {}" if offered else "peak of {}", unit, divided=divided)
+    if shown is None or shown.index == 0:
+        return found
+    alike = [(d, _case(d, shown, divided=divided)) for d in designs]
+    if [c and c.label for _, c in alike] == [c and c.label for _, c in best]:
+        return found
+    return [*found, *_held(alike, f"peak of {{}} at {shown.label}", unit, divided=divided)]
+
+
+def _held(
+    pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool
+) -> list[Card]:
+    """Return a card for each design at a case of it, held against the first one."""
+    found: list[Card] = []
+    first, against = float("nan"), ""
+    for design, case in pairs:
+        response = design.response
         if case is None or response is None:
             continue
         height = _peak(response, case, divided=divided)
         note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
-        if not name:
-            first, name = height, design.name
+        if not found:
+            first, against = height, label.format(design.name)
         else:
             off = over_first(height, first)
-            note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {name}"
-        found.append(Card(quantity(height, unit_of(designs, divided=divided)), f"{word} of {design.name}", note))  # fmt: skip
+            note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {against}"
+        found.append(Card(quantity(height, unit), label.format(design.name), note))
     return found
 
 
@@ -365,5 +378,5 @@ def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] =
     chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
     names = [d.name for d in designs]
     made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")  # fmt: skip
-    cards = _cards(designs, divided=per_force(designs, curves))
-    return page_html(f"{joined(names)} compared", made, chapters, cards=cards)
+    head = cards(designs, divided=per_force(designs, curves))
+    return page_html(f"{joined(names)} compared", made, chapters, cards=head)
