@@ -38,6 +38,7 @@ from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.forced.curve import Curve
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
 from stickslip.study.analyses.forced.known import (
     mixed_places,
@@ -46,6 +47,7 @@ from stickslip.study.analyses.forced.known import (
     off_engine_order,
 )
 from stickslip.study.analyses.forced.question import Question, question_of
+from stickslip.study.analyses.forced.rules import twice_the_harmonics
 from stickslip.study.analyses.forced.section import ForcedResponse
 from stickslip.study.analyses.forced.sweeps import sweep_of
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
@@ -212,7 +214,7 @@ def test_checks_of_a_finished_job_agree_and_solve_nothing_again(
     assert told == [
         "Forced response",
         "Where guarded_alert asked for more harmonics",
-        "Against twice as many harmonics",
+        "Against more harmonics",
         "Is it stable?",
         "Against time integration",
     ]
@@ -311,9 +313,28 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert data.verdict_reason[0].item().startswith("its harmonics were not examined")
     assert int(data.case_verdict[0]) >= 1
     again = dataset(solved(replace(asked, checks=frozenset({"verify_harmonics"}))))
-    doubted = ["twice as many harmonics" in text for text in again.verdict_reason.values.tolist()]
+    doubted = [
+        "are predicted to change it, in amplitude or phase, by" in text
+        for text in again.verdict_reason.values.tolist()
+    ]
     np.testing.assert_array_equal(doubted, again.reference_error_percent.values > 0.01)
     assert not any("not examined" in text for text in again.verdict_reason.values.tolist())
+
+
+def test_of_always_low_the_remedy_names_the_selection_and_says_what_was_compared() -> None:
+    few = lifted(low=1, high="auto", selection="always_low", points=4, peak_points=0)
+    data = dataset(solved(replace(few, checks=frozenset({"verify_harmonics"}))))
+    at = int(np.nanargmax(data.reference_error_percent.values))
+    assert "10 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()  # fmt: skip
+    remedy = (
+        'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
+    )
+    assert {f.remedy for f in twice_the_harmonics(Curve(data, 0))} == {f"{remedy}."}
+    (told,) = [t for t in FORCED_RESPONSE.summary(data) if t.title == "Against more harmonics"]
+    (line,) = told.lines
+    assert "10 harmonics, twice the 5 that harmonics.high stands for" in line
+    assert f"{remedy}, and compare; with H = 5 a solution has 11 unknowns a coordinate instead of 3" in line  # fmt: skip
+    assert "Raise harmonics.high" not in line
 
 
 def test_peak_at_the_end_is_no_resonance() -> None:

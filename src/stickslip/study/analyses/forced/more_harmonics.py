@@ -1,15 +1,16 @@
-"""Whether the harmonics of a study are enough at all: each accepted solution against twice as many (``--verify-harmonics``)."""
+"""Whether the harmonics of a study are enough at all: each accepted solution against twice the highest that the study stands for (``--verify-harmonics``)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import Harmonics, named
 from stickslip.response.verification import check_support
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.points import Response
-from stickslip.study.analyses.forced.question import FACTOR, Question
+from stickslip.study.analyses.forced.question import FACTOR, MORE_THAN_LOW, Question
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.units import HZ
 
@@ -34,6 +35,8 @@ class ReferenceDoubt:
         Harmonics of the solution there, as text.
     label
         Where the change is taken that is largest there.
+    only
+        Harmonics of every solution, if the selection keeps the low ones everywhere; else None.
     """
 
     harmonics: int
@@ -43,6 +46,7 @@ class ReferenceDoubt:
     frequency_hz: float = float("nan")
     kept: str = ""
     label: str = ""
+    only: Harmonics | None = None
 
     @property
     def worst(self) -> float:
@@ -65,7 +69,7 @@ class ReferenceDoubt:
         if not self.known:
             return "no solution that could be checked."
         told = (
-            f"against {self.harmonics} harmonics, {self.above} of {self.known} solutions are predicted to change by more than "
+            f"against {self.harmonics} harmonics, twice the {self.high[-1]} that harmonics.high stands for, {self.above} of {self.known} solutions are predicted to change by more than "
             f"{100 * self.limit:g} % of their complex amplitude, phase included; the largest change is {error_text(self.worst)} "
             f"of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
         )
@@ -74,6 +78,12 @@ class ReferenceDoubt:
     @property
     def advice(self) -> str:
         """Which harmonics to keep instead, and what that costs."""
+        if self.only is not None:
+            return (
+                f'With harmonics.selection = "always_low" every solution keeps H = {named(self.only)}, whatever harmonics.high says. {MORE_THAN_LOW}, '
+                f"and compare; with H = {self.high[-1]} a solution has {2 * self.high[-1] + 1} unknowns a coordinate instead of "
+                f"{2 * len(self.only) - 1}, and its cost grows at least as much."
+            )
         left_out = [h for h in range(1, self.high[-1]) if h not in self.high]
         more = self.high[-1] if left_out else min(self.harmonics, HIGHEST)
         if left_out:
@@ -87,13 +97,13 @@ class ReferenceDoubt:
                 f"No study keeps more than {HIGHEST} harmonics: judge the result with that in mind."
             )
         return (
-            f"{told}; a solution then has {2 * more + 1} unknowns a coordinate instead of {2 * len(self.high) - 1}, and its cost "
-            "grows at least as much."
+            f"{told}; a solution then has up to {2 * more + 1} unknowns a coordinate instead of up to {2 * len(self.high) - 1}, and its "
+            "cost grows at least as much."
         )
 
 
 def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
-    """Predict what twice as many harmonics would change.
+    """Predict what twice the highest harmonic of the study would change.
 
     Parameters
     ----------
@@ -106,17 +116,16 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
     errors = np.full(solved.size, np.nan)
     errors[solved] = [c.error for c in checks]
     high = question.sweep.high_harmonics
-    doubt = ReferenceDoubt(FACTOR * high[-1], high, question.limit, errors)
+    low = always_kept(question.problem.strategy) == "low"
+    only = question.sweep.low_harmonics if low else None
+    doubt = ReferenceDoubt(FACTOR * high[-1], high, question.limit, errors, only=only)
     if not checks:
         return doubt
     worst = max(checks, key=lambda c: c.error)
     place = problem.measure.dofs.tolist().index(worst.dof)
-    return ReferenceDoubt(
-        doubt.harmonics,
-        high,
-        question.limit,
-        errors,
-        float(worst.omega / HZ),
-        named(worst.kept),
-        question.model.error_labels[place],
+    return replace(
+        doubt,
+        frequency_hz=float(worst.omega / HZ),
+        kept=named(worst.kept),
+        label=question.model.error_labels[place],
     )

@@ -33,6 +33,9 @@ RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
 ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
+MORE_THAN_LOW = (
+    'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
+)
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 
 

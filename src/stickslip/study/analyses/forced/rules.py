@@ -6,12 +6,19 @@ from itertools import pairwise
 
 import numpy as np
 
+from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
 from stickslip.study.analyses.forced.jumps import jumps
-from stickslip.study.analyses.forced.question import ALONE, MOST_IN_TIME, TOO_MANY
+from stickslip.study.analyses.forced.question import (
+    ALONE,
+    FACTOR,
+    MORE_THAN_LOW,
+    MOST_IN_TIME,
+    TOO_MANY,
+)
 from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
@@ -95,7 +102,7 @@ def _in_time(case: Curve, point: int) -> str:
 def _more(case: Curve, point: int) -> str:
     """Say how a point gets more harmonics: what kept it from them is the study, the response's work, its limits, or the most there are."""
     if not case.auto:
-        return 'Give harmonics.high = "auto", or a larger number'
+        return _of_selection(str(case.data.attrs.get("selection", "")))
     if case.own_error[point] <= case.limit:
         return "Its own error was predicted below harmonics.alert_threshold_percent: lower that, and more harmonics are kept"
     if case.supports[point][-1] < case.cap:
@@ -106,6 +113,15 @@ def _more(case: Curve, point: int) -> str:
     if case.cap < RUNGS[-1]:
         return f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
     return f"There are no more than {case.cap} harmonics to be had"
+
+
+def _of_selection(selection: str) -> str:
+    """Say what gives more harmonics where they are not raised along the branch."""
+    if selection == "always_low":
+        return MORE_THAN_LOW
+    if selection in STRATEGIES and selection not in VERIFYING:  # "auto" is five to them
+        return 'Give a larger harmonics.high, or harmonics.selection = "guarded_alert" with high = "auto"'
+    return 'Give harmonics.high = "auto", or a larger number'
 
 
 def _examination(case: Curve) -> str:
@@ -145,7 +161,10 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
     """Doubt what --verify-harmonics predicts to change."""
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
-            why = f"twice as many harmonics are predicted to change it, in amplitude or phase, by {error_text(case.reference[i])}"
+            why = (
+                f"{FACTOR * case.cap} harmonics instead of H = {case.kept[i]} are predicted to change it, in amplitude or phase, by "
+                f"{error_text(case.reference[i])}"
+            )
             remedy = f"{_more(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]))
 

@@ -47,7 +47,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _of_blades(data, labels),
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data), detail=True),
-        _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
+        _lines("Against more harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", all_lines(data, labels), detail=True),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
         _lines(
