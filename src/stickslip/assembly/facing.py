@@ -246,7 +246,8 @@ def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -
     if not near or min(near)[0] > 0.1 * own:
         return error
     remedy = (
-        f"{error.remedy} {min(near)[1]!r} lies nearer than {second.name!r}: are surfaces swapped?"
+        f"{error.remedy} {min(near)[1]!r} lies nearer than {second.name!r}: are surfaces swapped? "
+        "Or is a part not where it belongs: look at placed."
     )
     return input_error(error.place, error.problem, remedy)
 
