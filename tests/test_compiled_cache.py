@@ -51,6 +51,8 @@ def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(
 ):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(cache, "_PACKAGE", tmp_path)
+    # Python tells files of the same second and size apart by nothing, and would load the first one's bytecode
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     (tmp_path / "user.py").write_text(USER)
     for factor in (2.0, 3.0, 3.0):
         cache._contents.cache_clear()
