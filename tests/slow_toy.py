@@ -1,5 +1,6 @@
 """The toy analysis with records that take their time, so that a process may be lost while one is computed."""
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -8,7 +9,7 @@ from toy_analysis import Term, Toy
 
 from stickslip.study.analyses.analysis import Notes
 
-SECONDS = 0.8  # of a record
+SECONDS = float(os.environ.get("SLOW_TOY_SECONDS", "0.8"))  # of a record
 
 
 class SlowToy(Toy):

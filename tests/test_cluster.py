@@ -200,6 +200,7 @@ def test_dask_cluster_whose_workers_are_killed(
     tmp_path: Path, expected: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(workers, "PATIENCE", 60)
+    monkeypatch.setenv("SLOW_TOY_SECONDS", "3")  # two workers need longer than two kills take
     killed: list[int] = []
     with dask_cluster(tmp_path) as (address, processes):
         with workers.executor(f"dask={address}", 1):
