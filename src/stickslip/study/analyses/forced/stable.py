@@ -122,15 +122,7 @@ def examine(question: Question, accepted: Accepted) -> Examined:
         return Examined(omega, "not examined", np.nan, np.nan, error.problem)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return Examined(omega, "not examined", np.nan, np.nan, f"no multipliers ({error})")
-    said = f"{found.reason}{wave}"
-    return Examined(
-        omega,
-        found.verdict,
-        found.multiplier,
-        found.multiplier_error,
-        said,
-        large=too_large(question),
-    )
+    return _seen(question, accepted, found, f"{found.reason}{wave}")
 
 
 def _by_hill(question: Question, accepted: Accepted) -> Examined:
@@ -140,9 +132,12 @@ def _by_hill(question: Question, accepted: Accepted) -> Examined:
     wheel = isinstance(question.model.system.structure, TunedWheel)
     if wheel and hill.disturbance is not None and found.verdict != "stable":
         said += _named(question, hill.disturbance)
-    omega = accepted.point.omega
+    return _seen(question, accepted, found, said)
+
+
+def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -> Examined:
     return Examined(
-        omega,
+        accepted.point.omega,
         found.verdict,
         found.multiplier,
         found.multiplier_error,
