@@ -1,7 +1,8 @@
 """Two steel plates pressed on each other, with as many contact points as wanted.
 
 The lower plate is clamped at one end, the upper one at the other, and they touch over their whole face, with a rough surface: preload and
-stiffness vary from point to point. Retained are the relative displacements of the contact points alone; all else is condensed.
+stiffness vary from point to point. Retained are the relative displacements of the contact points alone and all else is condensed; or nothing is
+reduced.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from skfem.helpers import ddot, dot, sym_grad, trace
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
@@ -23,6 +25,7 @@ from stickslip.response.system import System
 
 LENGTH, WIDTH, THICKNESS = 0.2, 0.12, 0.008  # m, each plate
 MODES = 40
+DAMPING = 0.01, (200.0, 4000.0)  # Rayleigh: ratio at two frequencies, Hz
 PRESSURE = 1e6  # Pa
 NORMAL, TANGENTIAL = 1e12, 0.7e12  # N/m per m²
 FRICTION = 0.3
@@ -63,6 +66,21 @@ class Plates:
 
 def two_plates(points: int, seed: int = 0) -> Plates:
     """Assemble and reduce the plates with `points` contact points, a key of `GRIDS`."""
+    full, gaps, tip = _assembled(points)
+    reduced = craig_bampton(full, np.concatenate([gaps, tip]), MODES)
+    reduced = rayleigh_damping(reduced, *DAMPING)
+    return _with_contacts(reduced, np.arange(gaps.size), gaps.size + np.arange(3), seed)
+
+
+def unreduced_plates(points: int, seed: int = 0) -> Plates:
+    """Assemble the same plates and reduce nothing: all dofs stay, and their matrices are sparse."""
+    full, gaps, tip = _assembled(points)
+    damped = rayleigh_damping(full, *DAMPING)
+    return _with_contacts(Unreduced(damped), gaps, tip, seed)
+
+
+def _assembled(points: int) -> tuple[Structure, np.ndarray, np.ndarray]:
+    """Return both plates, the dofs that are gaps, contact by contact, and those of the free corner."""
     along, across = GRIDS[points]
     mass, stiffness, places = _plate(along + 2, across)
     n = len(places)
@@ -92,13 +110,13 @@ def two_plates(points: int, seed: int = 0) -> Plates:
     full = Structure(matrices[0], scipy.sparse.csr_array(matrices[0].shape), matrices[1], table)
     gaps = new[(3 * n + 3 * upper[:, None] + np.arange(3)).ravel()]
     corner = np.flatnonzero(top & (places[:, 0] < 1e-9) & (places[:, 1] < 1e-9))[0]
-    tip = new[3 * n + 3 * corner + np.arange(3)]
-    reduced = craig_bampton(full, np.concatenate([gaps, tip]), MODES)
-    reduced = rayleigh_damping(reduced, 0.01, (200.0, 4000.0))
-    return _with_contacts(reduced, points, seed)
+    return full, gaps, new[3 * n + 3 * corner + np.arange(3)]
 
 
-def _with_contacts(structure: Structure, points: int, seed: int) -> Plates:
+def _with_contacts(
+    structure: Structure | Unreduced, gaps: np.ndarray, tip: np.ndarray, seed: int
+) -> Plates:
+    points = gaps.size // 3
     area = LENGTH * WIDTH / points
     rng = np.random.default_rng(seed)
     rough = np.exp(0.5 * rng.standard_normal(points))
@@ -108,9 +126,10 @@ def _with_contacts(structure: Structure, points: int, seed: int) -> Plates:
         )
         for r in rough
     )  # fmt: skip
-    operator = scipy.sparse.eye_array(3 * points, structure.n, format="csr")
+    entries = np.ones(gaps.size), (np.arange(gaps.size), gaps)
+    operator = scipy.sparse.csr_array(entries, shape=(gaps.size, structure.n))
     names = tuple(str(i) for i in range(points))
-    system = System(structure, Interface(names, laws, operator), 3 * points + np.arange(3))
+    system = System(structure, Interface(names, laws, operator), tip)
     return Plates(system, float(PRESSURE * area * rough.sum()))
 
 

@@ -20,3 +20,4 @@ from .selection.strategy import Strategy as Strategy
 from .selection.strategy import Verdict as Verdict
 from .selection.suess_jacobian import SuessJacobian as SuessJacobian
 from .selection.suess_spectral import SuessSpectral as SuessSpectral
+from .sparse_stiffness import Unreduced as Unreduced

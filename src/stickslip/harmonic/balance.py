@@ -20,6 +20,7 @@ from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, Products
+from stickslip.harmonic.sparse_stiffness import SparseStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import (
     Harmonics,
@@ -120,14 +121,15 @@ class HarmonicBalance:
 
     @cached_property
     def structured(self) -> bool:
-        """Whether the Jacobian is given by its products; without harmonics it is an array."""
+        """Whether the Jacobian is given by its products; without harmonics it is an array, unless nothing is condensed."""
         large = self.large if self.jacobian == "auto" else self.jacobian == "structured"
-        return large and self.order > 0
+        return large and (self.order > 0 or isinstance(self.linear, SparseStiffness))
 
     @cached_property
     def _costs(self) -> Costs:
         contacts = self.compiled.n_contacts * self.compiled.pairs
-        return linear_costs(self.linear.n, len(self.harmonics), contacts * self.n_rows**2)
+        sparse = self.linear.entries if isinstance(self.linear, SparseStiffness) else 0
+        return linear_costs(self.linear.n, len(self.harmonics), contacts * self.n_rows**2, sparse)
 
     @property
     def large(self) -> bool:
@@ -281,8 +283,8 @@ class HarmonicBalance:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
         return _product(self.linear, self.harmonics, omega).load
 
-    def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
-        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
+    def linear_block(self, omega: float, harmonic: int) -> Matrix:
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will; sparse where nothing is condensed."""
         return _product(self.linear, self.harmonics, omega).block(harmonic)
 
     def with_order(self, order: int) -> "HarmonicBalance":
@@ -353,7 +355,7 @@ def harmonic_balance(
 
 def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
     """Geometric mean of the contact stiffnesses; of the structure's diagonal where there is no contact."""
-    values = contact[contact > 0] if np.any(contact > 0) else np.abs(np.diagonal(linear.nn[0]))
+    values = contact[contact > 0] if np.any(contact > 0) else np.abs(linear.nn[0].diagonal())
     values = values[values > 0]
     return float(np.exp(np.mean(np.log(values)))) if values.size else 1.0
 

@@ -6,11 +6,14 @@ condensation; one harmonic at a time is formed where it is to be factorised.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.interface import SparseRows
+from stickslip.harmonic.factors import with_contacts
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.spectral import Interior, StateSpace
 from stickslip.harmonic.support import Harmonics, real_rows
@@ -22,6 +25,19 @@ Lossy = tuple[
 # interior dynamic stiffness of each harmonic: its diagonal, or its state-space eigenvectors and ihω, or its LU factors
 InnerOne = ComplexArray | tuple[StateSpace, complex] | tuple[ComplexArray, IntArray]
 Inner = ComplexArray | tuple[InnerOne, ...]  # an array: diagonals
+
+
+class Interiors(Protocol):
+    """Something at one frequency that knows the dynamic stiffness of its interior."""
+
+    @property
+    def omega(self) -> float: ...  # noqa: D102
+
+    @property
+    def frequencies(self) -> FloatArray: ...  # noqa: D102
+
+    @property
+    def inner(self) -> Inner: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +72,10 @@ class CondensedProduct:
     def product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of ``Z q`` for the `rows` of q."""
         s = self.frequencies
-        moved = _solve_inner(self.inner, _dynamic(_onto(self.linear, rows), s))
-        return _dynamic(_near(self.linear, rows), s) - _dynamic(_back(self.linear, moved), s)
+        moved = _solve_inner(self.inner, dynamic_rows(_onto(self.linear, rows), s))
+        return dynamic_rows(_near(self.linear, rows), s) - dynamic_rows(
+            _back(self.linear, moved), s
+        )
 
     @cached_property
     def transposed(self) -> "CondensedProduct":
@@ -80,18 +98,19 @@ class CondensedProduct:
         """Return ``Z q`` and ``∂Z/∂ω q``."""
         s = self.frequencies
         near, far = _near(self.linear, rows), _onto(self.linear, rows)
-        moved = _solve_inner(self.inner, _dynamic(far, s))
+        moved = _solve_inner(self.inner, dynamic_rows(far, s))
         back = _back(self.linear, moved)
         turned = _solve_inner(
-            self.inner, _slope(far, s) - _slope(_inner_parts(self.linear, moved), s)
+            self.inner, slope_rows(far, s) - slope_rows(_inner_parts(self.linear, moved), s)
         )
-        slope = _slope(near, s) - _slope(back, s)
-        slope -= _dynamic(_back(self.linear, turned), s)
-        return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope, self.harmonics)
+        slope = slope_rows(near, s) - slope_rows(back, s)
+        slope -= dynamic_rows(_back(self.linear, turned), s)
+        return dynamic_rows(near, s) - dynamic_rows(back, s), by_omega(slope, self.harmonics)
 
-    def static(self) -> FloatArray:
-        """Return ``Z_0``, (n, n)."""
-        return np.asarray(self.linear.nn[0] - self.linear.nl[0] @ self.linear.far[0].T)
+    def static(self, springs: FloatArray, rows: SparseRows) -> FloatArray:
+        """Return ``Z_0 + Bᵀ k B``, (n, n), with the springs (n_contacts, 3, 3) of the contacts."""
+        own = np.asarray(self.linear.nn[0] - self.linear.nl[0] @ self.linear.far[0].T)
+        return np.asarray(with_contacts(own, springs, rows))
 
     def mass_product(self, vectors: FloatArray) -> FloatArray:
         """Return the mass times `vectors` (n, k), the interior, whose stiffness is one, following them statically."""
@@ -120,7 +139,7 @@ class CondensedProduct:
         )  # fmt: skip
         return replace(self, linear=seen, load=none, load_slope=none)
 
-    def moved_to(self, other: "CondensedProduct") -> "CondensedProduct":
+    def moved_to(self, other: "Interiors") -> "CondensedProduct":
         """Return the same at the frequency of `other`, which has the same interior."""
         if self.omega == other.omega:
             return self
@@ -165,7 +184,7 @@ def at_frequency(
     harmonics
         The harmonics, growing from 0.
     """
-    frequencies = omega * _by_row(harmonics)
+    frequencies = omega * by_row(harmonics)
     near, inner_load = (real_rows(part, harmonics) for part in load)
     inner = _inner(linear, omega, harmonics)
     bare = CondensedProduct(linear, omega, harmonics, frequencies, inner, near, np.zeros_like(near))
@@ -179,10 +198,10 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
     s = bare.frequencies
     moved = _solve_inner(bare.inner, inner_load)
     back = _back(bare.linear, moved)
-    turned = _solve_inner(bare.inner, _slope(_inner_parts(bare.linear, moved), s))
-    slope = _dynamic(_back(bare.linear, turned), s) - _slope(back, s)
+    turned = _solve_inner(bare.inner, slope_rows(_inner_parts(bare.linear, moved), s))
+    slope = dynamic_rows(_back(bare.linear, turned), s) - slope_rows(back, s)
     return CondensedProduct(
-        bare.linear, bare.omega, bare.harmonics, s, bare.inner, bare.load - _dynamic(back, s), _by_omega(slope, bare.harmonics)
+        bare.linear, bare.omega, bare.harmonics, s, bare.inner, bare.load - dynamic_rows(back, s), by_omega(slope, bare.harmonics)
     )  # fmt: skip
 
 
@@ -260,17 +279,17 @@ def _inner_parts(linear: Interior, rows: FloatArray) -> Lossy:
     return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, None
 
 
-def _by_row(harmonics: Harmonics) -> FloatArray:
+def by_row(harmonics: Harmonics) -> FloatArray:
     """Return the (m, 1) harmonic of each real row."""
     return np.repeat(np.array(harmonics, dtype=float), 2)[1:, None]
 
 
-def _by_omega(slope: FloatArray, harmonics: Harmonics) -> FloatArray:
+def by_omega(slope: FloatArray, harmonics: Harmonics) -> FloatArray:
     """Turn a derivative by the frequency ``hω`` of each row into one by ω."""
-    return np.asarray(_by_row(harmonics) * slope)
+    return np.asarray(by_row(harmonics) * slope)
 
 
-def _dynamic(parts: Lossy, s: FloatArray) -> FloatArray:
+def dynamic_rows(parts: Lossy, s: FloatArray) -> FloatArray:
     """Return ``K q + i L q + i s C q - s² M q`` from the products of the matrices with the rows of q; the static row has no L."""
     k, c, m, loss = parts
     moved = s * c
@@ -279,7 +298,7 @@ def _dynamic(parts: Lossy, s: FloatArray) -> FloatArray:
     return k + _turned(moved) - s**2 * m
 
 
-def _slope(parts: Lossy, s: FloatArray) -> FloatArray:
+def slope_rows(parts: Lossy, s: FloatArray) -> FloatArray:
     """Return the derivative of `_dynamic` by s."""
     _, c, m, _ = parts
     return _turned(c) - 2.0 * s * m

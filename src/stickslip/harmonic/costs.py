@@ -17,11 +17,13 @@ CALL, CALL_ENTRY = 6e-5, 1.6e-9
 # new factors of a harmonic: a call, each entry, each entry times the coordinates; with inverses, or without
 INVERSE_CALL, INVERSE_ENTRY, INVERSE_FACTOR = 8e-5, 0.0, 1.4e-9
 FACTORS_CALL, FACTORS_ENTRY, FACTORS_FACTOR = 8e-5, 3e-8, 5e-11
+# sparse matrices: what a product and new factors take of each entry of the stiffness, and of each harmonic
+SPARSE_PRODUCT, SPARSE_FACTORS = 2e-8, 3e-6
 # a Newton iteration: its systems by LU, those by a Krylov method, which leaves a hundredth of the residual, and the products of one of these
 BY_ARRAY, BY_PRODUCTS, PRODUCTS = 4, 6, 8
 
 
-def linear_costs(coordinates: int, harmonics: int, derivatives: int) -> Costs:
+def linear_costs(coordinates: int, harmonics: int, derivatives: int, sparse: int = 0) -> Costs:
     """Estimate the costs of one system.
 
     Parameters
@@ -32,10 +34,14 @@ def linear_costs(coordinates: int, harmonics: int, derivatives: int) -> Costs:
         Their number, the static one counted.
     derivatives
         Numbers that the derivatives of all contact forces consist of.
+    sparse
+        Entries of the sparse stiffness, where nothing is condensed and one factor serves all harmonics; 0: arrays.
     """
     entries = coordinates**2
     unknowns = coordinates * (2 * harmonics - 1)
-    if coordinates <= SMALL:
+    if sparse:
+        one, factors = CALL + SPARSE_PRODUCT * sparse, SPARSE_FACTORS * sparse / harmonics
+    elif coordinates <= SMALL:
         one, factors = (
             LOOP + LOOP_ENTRY * entries,
             INVERSE_CALL + (INVERSE_ENTRY + INVERSE_FACTOR * coordinates) * entries,

@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.compiled import CompiledContacts, compile_contacts
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.interface import Interface, SparseRows, sparse_rows
@@ -112,7 +112,7 @@ class DynamicLagrangian:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
         return self.balance.linear_load(omega)
 
-    def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
+    def linear_block(self, omega: float, harmonic: int) -> Matrix:
         """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
         return self.balance.linear_block(omega, harmonic)
 

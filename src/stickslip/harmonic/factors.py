@@ -1,18 +1,25 @@
 """LU factors that are solved with many times, one right side at a time.
 
 LAPACK's triangular solves work through single columns. Here the diagonal blocks of both triangles are inverted once, so that a solve
-consists of products of blocks with vectors and is as fast as memory delivers the factors.
+consists of products of blocks with vectors and is as fast as memory delivers the factors. Sparse matrices have SuperLU's factors.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.contact.interface import SparseRows
+from stickslip.contact.product import add_stiffness
+from stickslip.errors import input_error
 
 SINGULAR = 5.0  # roundings; smallest pivot over largest below which a matrix has no usable factors
 BLOCK = 64  # rows; blocks half or twice as large cost up to a tenth more
+PIVOTS = 0.01  # a sparse factorisation leaves the diagonal for a pivot more than a hundred times as large
+LARGEST_ARRAY = 4000  # rows of a sparse matrix that is made an array
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +40,11 @@ class Factors:
     order: IntArray
     lower: tuple[FloatArray | ComplexArray, ...]
     upper: tuple[FloatArray | ComplexArray, ...]
+
+    @property
+    def dtype(self) -> Any:
+        """Precision and kind of the numbers."""
+        return self.lu.dtype
 
     def solve(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
         """Solve with one right side (n,) or several (n, k)."""
@@ -67,8 +79,43 @@ class Factors:
         return out
 
 
-def factorise(matrix: FloatArray | ComplexArray) -> Factors | None:
-    """Factorise a (n, n) matrix in Fortran order, which is overwritten; None if it is singular to its precision."""
+@dataclass(frozen=True, eq=False)
+class SparseFactors:
+    """SuperLU's factors of a sparse matrix, in its precision; build them with `factorise`."""
+
+    lu: Any
+    dtype: Any
+
+    def solve(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
+        """Solve with one right side (n,) or several (n, k)."""
+        return np.asarray(self.lu.solve(np.asarray(right, dtype=self.dtype)))
+
+    def solve_transposed(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
+        """Solve with the transposed matrix and one right side (n,) or several (n, k)."""
+        return np.asarray(self.lu.solve(np.asarray(right, dtype=self.dtype), "T"))
+
+
+AnyFactors = Factors | SparseFactors
+
+
+def factorise(matrix: Matrix) -> AnyFactors | None:
+    """Factorise a (n, n) matrix, sparse or an array, which is overwritten and best in Fortran order; None if it is singular to its precision."""
+    return _sparse(matrix) if scipy.sparse.issparse(matrix) else _dense(matrix)
+
+
+def _sparse(matrix: Matrix) -> SparseFactors | None:
+    from scipy.sparse.linalg import splu
+
+    try:
+        lu = splu(
+            scipy.sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=PIVOTS, options={"SymmetricMode": True}
+        )  # fmt: skip
+    except RuntimeError:  # a pivot vanishes
+        return None
+    return SparseFactors(lu, matrix.dtype)
+
+
+def _dense(matrix: FloatArray | ComplexArray) -> Factors | None:
     getrf, invert = scipy.linalg.get_lapack_funcs(("getrf", "trtri"), (matrix,))
     lu, pivots, info = getrf(matrix, overwrite_a=True)
     size = np.abs(np.diagonal(lu))
@@ -90,3 +137,65 @@ def _row_order(pivots: IntArray) -> IntArray:
     for row, other in enumerate(pivots):
         order[row], order[other] = order[other], order[row]
     return order
+
+
+def with_contacts(matrix: Matrix, stiffness: FloatArray | ComplexArray, rows: SparseRows) -> Matrix:
+    """Return ``matrix + Bᵀ k B``: in the place of an array, a new matrix where it is sparse.
+
+    Parameters
+    ----------
+    matrix
+        (n, n).
+    stiffness
+        (n_contacts, 3, 3) k by contact, force and gap, N/m.
+    rows
+        B, the gap operator by contact.
+    """
+    if not scipy.sparse.issparse(matrix):
+        add_stiffness(stiffness, rows.columns, rows.values, matrix)
+        return matrix
+    local = rows.values.transpose(0, 2, 1) @ stiffness @ rows.values
+    place = np.broadcast_to(rows.columns[:, :, None], local.shape)
+    where = place.reshape(-1), place.transpose(0, 2, 1).reshape(-1)
+    added = scipy.sparse.coo_array((local.reshape(-1), where), shape=matrix.shape)
+    return scipy.sparse.csc_array(matrix + added)
+
+
+def real_part(matrix: Matrix) -> Matrix:
+    """Return the real part of a matrix as a new one, an array in Fortran order."""
+    return matrix.real.copy() if scipy.sparse.issparse(matrix) else np.array(matrix.real, order="F")
+
+
+def solved(matrix: Matrix, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
+    """Return the solution (n,) of a system, sparse or an array, that is solved once.
+
+    Raises
+    ------
+    LinAlgError
+        If the matrix is singular.
+    """
+    if not scipy.sparse.issparse(matrix):
+        return np.asarray(np.linalg.solve(matrix, right))
+    factors = factorise(matrix)
+    if factors is None:
+        raise np.linalg.LinAlgError("Singular matrix")
+    return factors.solve(right)
+
+
+def as_array(matrix: Matrix) -> Matrix:
+    """Return a sparse matrix as an array in Fortran order, and an array as it is.
+
+    Raises
+    ------
+    InputError
+        If it is too large for one.
+    """
+    if not scipy.sparse.issparse(matrix):
+        return np.asarray(matrix)
+    if matrix.shape[0] > LARGEST_ARRAY:
+        raise input_error(
+            "unreduced structure",
+            f"this needs its matrices as arrays, and {matrix.shape[0]} dofs are too many",
+            "Reduce it to its contacts (craig_bampton); forced response with always_low or always_high takes it as it is.",
+        )
+    return np.asarray(matrix.toarray(order="F"))

@@ -1,12 +1,15 @@
 """What vibrates, and the same condensed, as the harmonic balance sees it."""
 
 from collections.abc import Hashable
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.contact.interface import SparseRows
 from stickslip.errors import input_error
+from stickslip.harmonic.condensed_product import CondensedProduct, Inner
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
 from stickslip.model.dofs import Dofs
@@ -32,7 +35,7 @@ class LinearSide(Protocol):
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are forces of constraints, which are never condensed."""
+        """Coordinates that are never condensed: forces of constraints, or all where nothing is reduced."""
         ...
 
     def of_harmonic(self, harmonic: int) -> Structure:
@@ -54,8 +57,14 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
     Raises
     ------
     InputError
-        If the harmonics vibrate as different structures, or as one whose matrices are complex.
+        If the harmonics vibrate as different structures, or as one whose matrices are complex, or that is not reduced.
     """
+    if isinstance(side, Unreduced):
+        raise input_error(
+            analysis,
+            f"has no form for an unreduced structure (of {side.n} dofs)",
+            "Reduce it (craig_bampton), or take the forced response.",
+        )
     structure = side.of_harmonic(0)
     if side.of_harmonic(1) is not structure:
         raise input_error(
@@ -112,8 +121,40 @@ class Products(Hashable, Protocol):
         """Return ``Z q`` and ``∂Z/∂ω q``."""
         ...
 
-    def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+    def block(self, harmonic: int) -> Matrix:
+        """Return ``Z_h``, (n, n) complex, to be changed at will: an array in Fortran order, or sparse where nothing is condensed."""
+        ...
+
+
+@runtime_checkable
+class Shareable(Products, Protocol):
+    """Products of one real structure, of which one real factor serves all harmonics (`harmonic.shared_factor`)."""
+
+    @property
+    def omega(self) -> float:
+        """Frequency, rad/s."""
+        ...
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """(m, 1) h ω of each row, rad/s."""
+        ...
+
+    @property
+    def inner(self) -> Inner:
+        """Dynamic stiffness of the interior."""
+        ...
+
+    def static(self, springs: FloatArray, rows: SparseRows) -> Matrix:
+        """Return ``Z_0 + Bᵀ k B``, (n, n), with the springs (n_contacts, 3, 3) of the contacts."""
+        ...
+
+    def mass_product(self, vectors: FloatArray) -> FloatArray:
+        """Return the mass times `vectors` (n, k)."""
+        ...
+
+    def projected(self, vectors: FloatArray) -> CondensedProduct:
+        """Return the same seen from the columns of `vectors` (n, k) alone, without a load."""
         ...
 
 

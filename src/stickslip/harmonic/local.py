@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.interface import Interface, SparseRows
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
@@ -111,7 +111,7 @@ class LocalBalance:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
         return self.balance.linear_load(omega)
 
-    def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
+    def linear_block(self, omega: float, harmonic: int) -> Matrix:
         """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
         return self.balance.linear_block(omega, harmonic)
 

@@ -14,7 +14,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.product import harmonic_means
 from stickslip.harmonic.costs import CALL, linear_costs
-from stickslip.harmonic.factors import Factors, factorise
+from stickslip.harmonic.factors import AnyFactors, factorise
 from stickslip.harmonic.structured import StructuredJacobian, Transposed
 from stickslip.operators import Costs
 
@@ -109,7 +109,7 @@ class RigidFactors:
         (H+1, n_gaps, n) rows at the gaps of the harmonics without rigid contacts.
     """
 
-    factors: tuple[Factors, ...]
+    factors: tuple[AnyFactors, ...]
     rows: ComplexArray
 
 

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import SparseRows
-from stickslip.contact.product import add_stiffness
 from stickslip.harmonic.condensed_product import CondensedProduct
-from stickslip.harmonic.factors import Factors, factorise
+from stickslip.harmonic.factors import AnyFactors, factorise
+from stickslip.harmonic.linear import Shareable
 
 Solve = Callable[[FloatArray | ComplexArray], FloatArray | ComplexArray]
 LEAST_MODES = 24
@@ -50,14 +51,14 @@ class SharedFactor:
         The dynamic stiffness seen from the modes.
     """
 
-    linear: CondensedProduct
-    factor: Factors
+    linear: Shareable
+    factor: AnyFactors
     modes: FloatArray
     weighted: FloatArray
     gaps: FloatArray
     projected: CondensedProduct
 
-    def of(self, linear: CondensedProduct, means: ComplexArray, scale: float) -> "SharedInverses":
+    def of(self, linear: Shareable, means: ComplexArray, scale: float) -> "SharedInverses":
         """Return the approximate inverses at the frequency of `linear`, with the contact stiffness `means` (H+1, n_contacts, 3, 3) in the modes."""
         at = self.projected.moved_to(linear)
         inverses = []
@@ -101,13 +102,13 @@ def _solve(solve: Solve, kept: SharedFactor, inner: ComplexArray, rows: FloatArr
     return out + (low - out @ kept.weighted) @ kept.modes.T
 
 
-def _in_its_precision(factor: Factors, solve: Solve, right: FloatArray) -> FloatArray:
-    single = factor.lu.dtype == np.float32
+def _in_its_precision(factor: AnyFactors, solve: Solve, right: FloatArray) -> FloatArray:
+    single = factor.dtype == np.float32
     return np.asarray(solve(right.astype(np.float32) if single else right), dtype=float)
 
 
 def shared_factor(
-    linear: CondensedProduct, means: ComplexArray, rows: SparseRows, scale: float
+    linear: Shareable, means: ComplexArray, rows: SparseRows, scale: float
 ) -> SharedFactor | None:
     """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are wanted.
 
@@ -122,15 +123,11 @@ def shared_factor(
     scale
         Displacement scale over force scale.
     """
-    matrix = linear.static()
-    add_stiffness(means.real.mean(axis=0), rows.columns, rows.values, matrix)
-    matrix *= scale
+    matrix = scale * linear.static(means.real.mean(axis=0), rows)
     for single in (True, False):
-        if single and np.abs(matrix).max() > np.finfo(np.float32).max:
+        if single and abs(matrix).max() > np.finfo(np.float32).max:
             continue
-        factor = factorise(
-            matrix.astype(np.float32, order="F") if single else np.array(matrix, order="F")
-        )
+        factor = factorise(_copied(matrix, single))
         found = None if factor is None else _enough_modes(linear, factor, scale)
         if factor is None or found is None:
             continue
@@ -148,8 +145,16 @@ def shared_factor(
     return None
 
 
+def _copied(matrix: Matrix, single: bool) -> Matrix:
+    """Return a copy to be factorised, in single or double precision."""
+    kind = np.float32 if single else np.float64
+    if scipy.sparse.issparse(matrix):
+        return matrix.astype(kind)
+    return np.array(matrix, dtype=kind, order="F")
+
+
 def _enough_modes(
-    linear: CondensedProduct, factor: Factors, scale: float
+    linear: Shareable, factor: AnyFactors, scale: float
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return low modes beyond the highest harmonic, and M times them; None if that takes too many, or more than the mass has."""
     wanted = scale * (REACH * linear.harmonics[-1] * linear.omega) ** 2
@@ -168,7 +173,7 @@ def _enough_modes(
 
 
 def _low_modes(
-    linear: CondensedProduct, factor: Factors, count: int
+    linear: Shareable, factor: AnyFactors, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973).
 

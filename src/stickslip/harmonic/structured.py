@@ -12,21 +12,25 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
 from stickslip.contact.law import PAIRS
 from stickslip.contact.product import (
-    add_stiffness,
     contact_product,
     harmonic_means,
     less_means,
     subtract_lower,
     sweep,
 )
-from stickslip.harmonic.condensed_product import CondensedProduct
 from stickslip.harmonic.costs import linear_costs
-from stickslip.harmonic.factors import Factors, factorise
-from stickslip.harmonic.linear import Products
+from stickslip.harmonic.factors import (
+    AnyFactors,
+    as_array,
+    factorise,
+    real_part,
+    with_contacts,
+)
+from stickslip.harmonic.linear import Products, Shareable
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
 from stickslip.harmonic.small_blocks import (
     SMALL,
@@ -34,6 +38,7 @@ from stickslip.harmonic.small_blocks import (
     dynamic_stiffness,
     small_blocks,
 )
+from stickslip.harmonic.sparse_product import SparseProduct
 from stickslip.operators import Costs, JacobianOperator
 
 SHARED = 150  # unknowns a harmonic from which one factor for all harmonics costs less than one each
@@ -60,7 +65,7 @@ class HarmonicFactors:
 
     linear: Products
     means: ComplexArray
-    factors: tuple[Factors, ...]
+    factors: tuple[AnyFactors, ...]
     inverses: SmallBlocks | None
 
     def solve(self, place: int, rows: FloatArray) -> FloatArray:
@@ -135,27 +140,29 @@ class StructuredJacobian:
     @property
     def costs(self) -> Costs:
         """What its linear systems cost."""
-        return linear_costs(self.linear.n, len(self.linear.harmonics), self.blocks.size)
+        sparse = self.linear.entries if isinstance(self.linear, SparseProduct) else 0
+        return linear_costs(self.linear.n, len(self.linear.harmonics), self.blocks.size, sparse)
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
         n = self.linear.n
-        jac = self.scale * real_matrix([self.linear.block(h) for h in self.linear.harmonics])
+        jac = self.scale * real_matrix(
+            [as_array(self.linear.block(h)) for h in self.linear.harmonics]
+        )
         add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
         return jac
 
-    def own_blocks(self) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+    def own_blocks(self) -> Iterator[tuple[ComplexArray, Matrix]]:
         """Yield of each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and ``scale (Z_h + K̂ʰʰ)`` (n, n), to be changed at will."""
         means = harmonic_means(self.blocks)
         for mean, h in zip(means, self.linear.harmonics, strict=True):
-            block = self.linear.block(h)
-            add_stiffness(mean, self.rows.columns, self.rows.values, block)
+            block = with_contacts(self.linear.block(h), mean, self.rows)
             block *= self.scale
             yield mean, block
 
     def preconditioner(self) -> Kept | None:
         """Return one factor for all harmonics where the structure allows it, else those of ``Z_h + K̂ʰʰ``; None where a matrix is singular."""
-        if isinstance(self.linear, CondensedProduct) and self.linear.n >= SHARED:
+        if isinstance(self.linear, Shareable) and self.linear.n >= SHARED:
             shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
             if shared is not None:
                 return shared
@@ -168,7 +175,7 @@ class StructuredJacobian:
     def _harmonic_factors(self) -> HarmonicFactors | None:
         factors, means = [], []
         for h, (mean, matrix) in enumerate(self.own_blocks()):
-            own = factorise(np.array(matrix.real, order="F") if h == 0 else matrix)
+            own = factorise(real_part(matrix) if h == 0 else matrix)
             if own is None:
                 return None
             means.append(mean)
@@ -228,7 +235,7 @@ class StructuredJacobian:
     def _inverses(self, kept: Kept) -> HarmonicFactors | SharedInverses:
         if isinstance(kept, HarmonicFactors):
             return kept
-        assert isinstance(self.linear, CondensedProduct)  # it made what was kept
+        assert isinstance(self.linear, Shareable)  # it made what was kept
         return kept.of(self.linear, harmonic_means(self.blocks), self.scale)
 
     def _sweep(self, own: HarmonicFactors | SharedInverses, right: FloatArray) -> FloatArray:

@@ -21,6 +21,7 @@ from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
 from stickslip.harmonic.mistuned import by_sectors, condense_mistuned
+from stickslip.harmonic.sparse_stiffness import LEAST_SPARSE, Unreduced, keep_all
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
 from stickslip.harmonic.wave_condensation import (
@@ -286,9 +287,11 @@ def condense_side(
 ) -> DynamicStiffness:
     """Prepare the exact condensation of what vibrates, for harmonics up to `order`.
 
-    By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
+    Not at all where it is unreduced (`keep_all`). By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
     `condense_mistuned` where that is a wheel of sectors; by `condense_waves` otherwise.
     """
+    if isinstance(side, Unreduced) and side.n >= LEAST_SPARSE:
+        return keep_all(side.structure, load)
     if isinstance(side, MistunedWheel) and by_sectors(side, retained):
         return condense_mistuned(side, retained, load)
     if isinstance(side, TunedWheel) and side.has_every_wave:

@@ -195,7 +195,8 @@ class TurningProducts:
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
-        return self.here.block(harmonic)
+        block: ComplexArray = self.here.block(harmonic)  # what turns is condensed
+        return block
 
     def _there(self) -> Products:
         return self.linear.beside(self.omega).products(self.omega, self.harmonics)

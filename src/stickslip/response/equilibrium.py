@@ -3,18 +3,20 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, Matrix
 from stickslip.contact.frozen import freezable, left_behind, sharing_friction
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.product import add_stiffness
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.factors import as_array, real_part, solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
 from stickslip.harmonic.local import AnyBalance
+from stickslip.model.fe.factorisation import factorise
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
 from stickslip.solve.linear import solve_dense
@@ -168,16 +170,25 @@ def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArra
     for place, h in enumerate(balance.harmonics):
         if h > 0 and not np.any(load[place]):
             continue
-        matrix = balance.linear_block(omega, h)
-        add_stiffness(springs, rows.columns, rows.values, matrix)
+        matrix = with_contacts(balance.linear_block(omega, h), springs, rows)
         if h == 0:
-            static = solve_dense(np.array(matrix.real, order="F"), load[0].real)
+            static = _static(real_part(matrix), load[0].real)
             if static is None:
-                raise SingularError(_unheld(matrix.real, system))
+                raise SingularError(_unheld(as_array(matrix.real), system))
             q[0] = static
         else:
-            q[h] = np.linalg.solve(matrix, load[place])
+            q[h] = solved(matrix, load[place])
     return balance.unknowns(q)
+
+
+def _static(matrix: Matrix, right: FloatArray) -> FloatArray | None:
+    """Return the solution; None where the matrix is singular."""
+    if not scipy.sparse.issparse(matrix):
+        return solve_dense(matrix, right)
+    try:
+        return np.asarray(factorise(matrix)(right))
+    except SingularError:
+        return None
 
 
 def _unheld(matrix: FloatArray, system: System) -> str:

@@ -11,6 +11,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.travelling import condense_side
 from stickslip.harmonic.turning import condense_line
 from stickslip.model.modes import with_springs
@@ -27,7 +28,7 @@ class System:
     Parameters
     ----------
     structure
-        What vibrates: blades joined with dampers, reduced; or one sector of a tuned wheel.
+        What vibrates: blades joined with dampers, reduced; or one sector of a tuned wheel; or `Unreduced`, with thousands of contacts.
     interface
         Contacts on the structure's dofs.
     outputs
@@ -53,6 +54,12 @@ class System:
                 "System",
                 f"the gap operator has {self.interface.gap_operator.shape[1]} columns for {self.structure.n} dofs",
                 "Build the interface on the joined structure.",
+            )
+        if isinstance(self.structure, Unreduced) and self.interface.rigid:
+            raise input_error(
+                "System",
+                "has a rigid contact on an unreduced structure",
+                "Reduce it (craig_bampton), or give the contact a stiffness.",
             )
         for name in ("outputs", "alert_dofs", "free"):
             given = getattr(self, name)
@@ -130,7 +137,9 @@ class System:
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
-        structure = one_structure(self.structure, "System.stuck_structure")
+        side = self.structure
+        own = side.structure if isinstance(side, Unreduced) else side
+        structure = one_structure(own, "System.stuck_structure")
         return with_springs(structure, b, self.springs.stuck_stiffness())
 
 

@@ -20,10 +20,11 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.contact.product import add_stiffness, contact_product, harmonic_means
+from stickslip.contact.product import contact_product, harmonic_means
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.selection.adjoint import Factored, factored
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, Verdict
@@ -202,10 +203,9 @@ def truncated(
     for h in beyond.harmonics:
         if h in high.harmonics:
             continue
-        matrix = beyond.linear_block(omega, h)
-        add_stiffness(means[h], rows.columns, rows.values, matrix)
+        matrix = with_contacts(beyond.linear_block(omega, h), means[h], rows)
         try:
-            q = -np.linalg.solve(matrix, force[2 * h - 1] - 1j * force[2 * h])
+            q = -solved(matrix, force[2 * h - 1] - 1j * force[2 * h])
         except np.linalg.LinAlgError:
             continue  # a resonance without damping: the Newton steps that follow see it
         moved[2 * h - 1], moved[2 * h] = q.real, -q.imag

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray
+from stickslip.harmonic.factors import solved
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.selection.alert import solve_array
 from stickslip.harmonic.selection.spectrum import above, foretold, padded_solution, spectral_shares
@@ -59,7 +60,7 @@ class SuessSpectral:
             scale = high.force_scale / high.displacement_scale
             for i in np.flatnonzero(missing):
                 block = high.linear_block(step.omega, high.harmonics[i])
-                found[i] = np.linalg.solve(block, scale * right[i])
+                found[i] = solved(block, scale * right[i])
             return to_real(found).reshape(-1)
         rows = np.append(missing[0], np.repeat(missing[1:], 2))
         own = np.repeat(rows, high.linear.n)

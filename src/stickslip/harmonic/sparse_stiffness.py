@@ -1,0 +1,191 @@
+"""A structure that stays as the finite elements made it: all dofs are unknowns, its matrices are sparse, and nothing is condensed.
+
+With thousands of contacts a reduction to their coordinates costs more than it saves: the constraint modes fill n × n_contacts numbers, and the
+reduced matrices are full.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.factors import as_array
+from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.matrices import SYMMETRY, asymmetry
+from stickslip.harmonic.sparse_product import SparseMatrices, SparseProduct
+from stickslip.harmonic.support import Harmonics, real_rows
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+
+LEAST_SPARSE = 150  # dofs below which arrays are as fast
+
+
+@dataclass(frozen=True, eq=False)
+class Unreduced:
+    """A structure none of whose dofs are condensed: what `System` takes in place of a `Structure` with thousands of contacts.
+
+    Parameters
+    ----------
+    structure
+        Its matrices are real, and kept sparse; mass, stiffness and loss symmetric.
+    """
+
+    structure: Structure
+
+    @property
+    def n(self) -> int:
+        """Number of dofs."""
+        return self.structure.n
+
+    @property
+    def dofs(self) -> Dofs:
+        """Table of the dofs."""
+        return self.structure.dofs
+
+    @property
+    def multipliers(self) -> IntArray:
+        """Dofs that are never condensed: all of them."""
+        return np.arange(self.n)
+
+    def of_harmonic(self, harmonic: int) -> Structure:
+        """Return the structure: it vibrates as itself in every harmonic."""
+        return self.structure.of_harmonic(harmonic)
+
+    def feedback_of(self, harmonic: int) -> None:
+        """No force of its own depends on the frequency."""
+
+    def grounded(self, springs: Matrix) -> "Unreduced":
+        """Return the same with springs, a sparse matrix (n, n) in N/m, to the ground."""
+        return Unreduced(self.structure.grounded(springs))
+
+
+@dataclass(frozen=True, eq=False)
+class SparseStiffness:
+    """A sparse structure and its load, all dofs retained; build it with `keep_all`."""
+
+    matrices: SparseMatrices
+    load: HarmonicLoad
+
+    @property
+    def n(self) -> int:
+        """Number of dofs."""
+        return self.matrices.n
+
+    @property
+    def entries(self) -> int:
+        """Entries of the stiffness, for costs."""
+        return self.matrices.entries
+
+    @property
+    def retained(self) -> IntArray:
+        """All dofs."""
+        return np.arange(self.n)
+
+    @property
+    def nn(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Stiffness, damping and mass; for scales."""
+        return self.matrices.stiffness, self.matrices.damping, self.matrices.mass
+
+    @property
+    def most(self) -> None:
+        """Highest harmonic for which there are matrices: any."""
+
+    def load_at(self, _omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N: the same at all."""
+        return self.load
+
+    def with_load(self, load: HarmonicLoad) -> "SparseStiffness":
+        """Return the same structure under another load."""
+        return replace(self, load=load)
+
+    def with_mass_damping(self, rate: float) -> "SparseStiffness":
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        own = self.matrices
+        return replace(self, matrices=replace(own, damping=own.damping + rate * own.mass))
+
+    def condensed(self, omega: float, order: int) -> Condensed:
+        """Return the matrices as arrays, and the load, for harmonics 0..`order` at `omega` (rad/s).
+
+        Raises
+        ------
+        InputError
+            If they are too large for arrays.
+        """
+        at = self.products(omega, tuple(range(order + 1)))
+        stiffness = np.array([as_array(at.block(h)) for h in at.harmonics])
+        slope = np.zeros_like(stiffness)
+        damping, mass = (as_array(a) for a in (self.matrices.damping, self.matrices.mass))
+        for h in at.harmonics:
+            slope[h] = 1j * h * damping - 2.0 * h**2 * omega * mass
+        load = to_complex(at.load)
+        return Condensed(stiffness, slope, load, np.zeros_like(load))
+
+    def products(self, omega: float, harmonics: Harmonics) -> SparseProduct:
+        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        load = real_rows(self.load.coefficients(harmonics[-1]), harmonics)
+        return SparseProduct(self.matrices, omega, harmonics, load)
+
+    def recover(self, _omega: float, q: ComplexArray) -> ComplexArray:
+        """Return the (H+1, n) coefficients of every dof: those given."""
+        return q
+
+    def recover_change(self, _omega: float, dq: ComplexArray) -> ComplexArray:
+        """Return the change of every dof (H+1, n): that given."""
+        return dq
+
+    def output_rows(self, _omega: float, _harmonic: int, dofs: IntArray) -> ComplexArray:
+        """Return the (k, n) matrix that takes the motion of `dofs` (k,) out of that of all."""
+        rows = np.zeros((dofs.size, self.n), dtype=complex)
+        rows[np.arange(dofs.size), dofs] = 1.0
+        return rows
+
+    def strain_energy(self, _omega: float, q: ComplexArray) -> FloatArray:
+        """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
+        twice = np.sum(q.conj() * (self.matrices.stiffness @ q.T).T, axis=1).real
+        return np.asarray((0.25 + 0.25 * (np.arange(len(q)) == 0)) * twice)
+
+
+def keep_all(structure: Structure, load: HarmonicLoad) -> SparseStiffness:
+    """Take a structure as it is, all of its dofs unknown.
+
+    Parameters
+    ----------
+    structure
+        Mass, stiffness and loss must be symmetric, damping may have Coriolis terms.
+    load
+        Load on all dofs of the structure, N.
+
+    Raises
+    ------
+    InputError
+        If a matrix is not real, not finite, or one but the damping not symmetric.
+    """
+    if load.static.size != structure.n:
+        raise input_error(
+            "HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof."
+        )
+    whole = (_sparse(structure, name) for name in ("stiffness", "damping", "mass"))
+    loss = None if structure.loss is None else _sparse(structure, "loss")
+    stiffness, damping, mass = whole
+    return SparseStiffness(SparseMatrices(stiffness, damping, mass, loss), load)
+
+
+def _sparse(structure: Structure, name: str) -> Any:
+    matrix = scipy.sparse.csr_array(getattr(structure, name))
+    wrong = ""
+    if np.iscomplexobj(matrix):
+        wrong = "is complex"
+    elif not np.all(np.isfinite(matrix.data)):
+        wrong = "contains NaN or infinite entries"
+    elif name != "damping" and asymmetry(matrix) > SYMMETRY:
+        wrong = "is not symmetric"
+    if wrong:
+        raise input_error(
+            f"Structure.{name}", wrong, "An unreduced structure takes real, symmetric matrices."
+        )
+    return matrix
