@@ -42,13 +42,18 @@ JacobianForm = Literal["auto", "dense", "structured"]
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Residual and derivatives at one state, all scaled, and the time the contacts took; `jac_p` may be computed when it is asked for."""
+    """Residual and derivatives at one state, all scaled, and the time the contacts took; derivatives may be computed when they are asked for."""
 
     residual: FloatArray  # (size,)
-    jac: FloatArray | StructuredJacobian  # (size, size)
+    by_x: FloatArray | StructuredJacobian | Callable[[], FloatArray]
     by_omega: FloatArray | Callable[[], FloatArray]
     seconds_contact: float
     events: Events | None = None  # of the contacts, where all of them are known
+
+    @cached_property
+    def jac(self) -> FloatArray | StructuredJacobian:
+        """(size, size) derivative of the residual by the unknowns."""
+        return self.by_x() if callable(self.by_x) else self.by_x
 
     @cached_property
     def jac_p(self) -> FloatArray:
@@ -131,7 +136,7 @@ class HarmonicBalance:
         sparse = self.linear.entries if isinstance(self.linear, SparseStiffness) else 0
         return linear_costs(self.linear.n, len(self.harmonics), contacts * self.n_rows**2, sparse)
 
-    @property
+    @cached_property
     def large(self) -> bool:
         """Whether products cost less than an array, where none was asked for."""
         return self.jacobian != "dense" and products_pay(self._costs)
@@ -189,17 +194,18 @@ class HarmonicBalance:
         if period is None:
             period = self.forces(x, omega)
         seconds = perf_counter() - start
-        jac: FloatArray | StructuredJacobian
+        by_x: FloatArray | StructuredJacobian | Callable[[], FloatArray]
         by_omega: FloatArray | Callable[[], FloatArray]
         if self.large or self.structured:
-            linear, slope, jac = self._by_products(x, omega, period)
+            linear, slope, by_x = self._by_products(x, omega, period)
             by_omega = self._with_forces(slope, period.by_omega)
         else:
-            linear, jac = self._by_matrices(x, omega, period.blocks)
+            linear = self._linear_force(x, omega)
+            by_x = partial(self._array, omega, period.blocks)
             by_omega = partial(self._slope, x, omega, period.by_omega)
         return Linearisation(
             self._with_forces(linear, period.coefficients),
-            jac,
+            by_x,
             by_omega,
             seconds,
             period.events if period.events is not None and period.events.whole else None,
@@ -222,14 +228,11 @@ class HarmonicBalance:
 
     def linear_residual(self, x: FloatArray, omega: float) -> FloatArray:
         """Return the (size,) scaled residual without the contact forces."""
-        q = x * self.displacement_scale
         if self.large or self.structured:
             part = _product(self.linear, self.harmonics, omega)
-            force = part.product(q.reshape(self.n_rows, -1)) - part.load
-        else:
-            own = _linear_part(self.linear, self.harmonics, omega)
-            force = own.matrix @ q - own.load
-        return force.reshape(-1) / self.force_scale
+            q = x.reshape(self.n_rows, -1) * self.displacement_scale
+            return (part.product(q) - part.load).reshape(-1) / self.force_scale
+        return self._linear_force(x, omega).reshape(-1) / self.force_scale
 
     def by_mass_damping(
         self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]
@@ -249,17 +252,19 @@ class HarmonicBalance:
         condensed = self.linear.with_load(load).products(omega, self.harmonics).load
         return -condensed.reshape(-1) / self.force_scale
 
-    def _by_matrices(
-        self, x: FloatArray, omega: float, blocks: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return linear forces (m, n), and the Jacobian as an array."""
-        factor = self.displacement_scale / self.force_scale
+    def _linear_force(self, x: FloatArray, omega: float) -> FloatArray:
+        """Return the (m, n) coefficients of the equations without the contact forces, N."""
         part = _linear_part(self.linear, self.harmonics, omega)
-        jac = factor * part.matrix
+        force = part.matrix @ (self.displacement_scale * x)
+        force -= part.load
+        return force.reshape(self.n_rows, -1)
+
+    def _array(self, omega: float, blocks: FloatArray) -> FloatArray:
+        """Return the (size, size) Jacobian as an array."""
+        factor = self.displacement_scale / self.force_scale
+        jac = factor * _linear_part(self.linear, self.harmonics, omega).matrix
         add_contact_jacobian(blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac)  # fmt: skip
-        linear = part.matrix @ (self.displacement_scale * x)
-        linear -= part.load
-        return linear.reshape(self.n_rows, -1), jac
+        return jac
 
     def _slope(self, x: FloatArray, omega: float, contacts: FloatArray | None) -> FloatArray:
         """Return the (size,) derivative of the scaled residual by ω, from that of the contact forces."""

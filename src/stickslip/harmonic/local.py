@@ -104,7 +104,7 @@ class LocalBalance:
         at = self.balance.linearise(self.whole(x), omega)
         jac = np.asfortranarray(at.dense_jac()[np.ix_(self.own, self.own)])
         return replace(
-            at, residual=at.residual[self.own], jac=jac, by_omega=at.jac_p[self.own], events=None
+            at, residual=at.residual[self.own], by_x=jac, by_omega=at.jac_p[self.own], events=None
         )
 
     def linear_load(self, omega: float) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.response.branch import Curve, Followed, Judged, Kind, Route
-from stickslip.solve.branch import Latest
+from stickslip.solve.branch import Latest, upward
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
@@ -89,8 +89,8 @@ def fresh(
     solution = curve.fresh(level, p, near, most)
     latest = Latest(curve.problem(level))
     following = curve.following(level)
-    upward = np.append(np.zeros(solution.x.size), 1.0)
-    point = Point(solution.x, p, upward, following.control.first, solution, 0.0)
+    growing = upward(solution.x.size + 1)
+    point = Point(solution.x, p, growing, following.control.first, solution, 0.0)
     if solution.status.converged:
         point = replace(start_point(latest, solution.x, p, following), solution=solution)
         if route.forward < 0.0 and not route.listed:

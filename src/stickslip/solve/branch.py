@@ -1,5 +1,6 @@
 """What a branch of ``F(x, p) = 0`` is made of: the equation, its points, their distances, and how it is to be followed."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, get_args
 
@@ -89,7 +90,7 @@ class Following:
         What a step prescribes: ``arc_length``: the way along the direction of travel (Keller 1977); ``local``: the unknown, or p, that
         changes most (Rheinboldt & Burkardt 1983); ``natural``: p, which stops at folds with `Status.STEP_TOO_SMALL`.
     predictor
-        Direction of travel: ``tangent``, which costs a linear system a point and sees corners and folds at once; or ``secant`` through
+        Direction of travel: ``tangent``, which costs a linear system a point at most and sees corners and folds at once; or ``secant`` through
         the last two points, which costs nothing; or ``parabola``: the tangent, bent as the branch was between the last two points.
     corrector
         ``newton``, or ``kept_factors``: Newton steps whose factors are kept while they serve, for the tangent too where the branch hardly turned.
@@ -153,18 +154,22 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """Weights that make lengths: of x (per entry) and of p."""
+    """Weights (n + 1,) of x and p that make lengths."""
 
-    x: FloatArray
-    p: float
+    weights: FloatArray
+
+    @property
+    def p(self) -> float:
+        """Weight of p."""
+        return float(self.weights[-1])
 
     def of(self, vector: FloatArray) -> float:
         """Return the length of a vector (n + 1,)."""
-        return float(np.sqrt(self.row(vector) @ vector))
+        return math.sqrt(self.row(vector) @ vector)
 
     def row(self, vector: FloatArray) -> FloatArray:
         """Return the row whose product with another vector is their inner product."""
-        return np.append(self.x**2 * vector[:-1], self.p**2 * vector[-1])
+        return self.weights**2 * vector
 
     def cosine(self, a: FloatArray, b: FloatArray) -> float:
         """Return the cosine of the angle between two vectors (n + 1,)."""
@@ -173,9 +178,18 @@ class Measure:
 
 def measure_at(x: FloatArray, following: Following) -> Measure:
     """Return how lengths are measured near `x`: changes of x by its own size, changes of p by the scale of the step control."""
-    weights = following.weights
-    size = float(np.linalg.norm(weights * x))
-    return Measure(weights / size if size > 0 else weights, 1.0 / following.control.scale)
+    weights = np.append(following.weights, 1.0 / following.control.scale)
+    size = float(np.linalg.norm(following.weights * x))
+    if size > 0.0:
+        weights[:-1] /= size
+    return Measure(weights)
+
+
+def upward(size: int) -> FloatArray:
+    """Return the direction (size,) in which p alone grows."""
+    direction = np.zeros(size)
+    direction[-1] = 1.0
+    return direction
 
 
 def tangent_at(
@@ -204,10 +218,10 @@ def tangent_at(
     if at is None:
         at = problem.linearise(y[:-1], float(y[-1]))
     row = measure.row(previous)
-    right = np.zeros(y.size)
-    right[-1] = 1.0
     linear = following.newton.linear
-    tangent, sign = linear.solve_bordered(at.jac, at.jac_p, row[:-1], float(row[-1]), right)
+    tangent, sign = linear.solve_bordered(
+        at.jac, at.jac_p, row[:-1], float(row[-1]), upward(y.size)
+    )
     if tangent is None:
         return previous, 0.0
     return tangent / measure.of(tangent), sign

@@ -19,7 +19,9 @@ from stickslip.solve.branch import (
     measure_at,
     reversed_point,
     tangent_at,
+    upward,
 )
+from stickslip.solve.last_factors import LastFactors
 from stickslip.solve.marks import FOLD, Mark, between, located, with_tangent
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
@@ -48,14 +50,18 @@ __all__ = [
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
     latest = problem if isinstance(problem, Latest) else Latest(problem)
-    solution = newton(lambda v: latest.linearise(v, p), x, following.newton)
-    upward = np.zeros(x.size + 1)
-    upward[-1] = 1.0
-    first = following.control.first
+    factors = LastFactors(following.newton.linear)
+    solution = newton(lambda v: latest.linearise(v, p), x, following.newton, linear=factors)
+    first, growing = following.control.first, upward(x.size + 1)
     if not solution.status.converged:
-        return Point(solution.x, p, upward, first, solution, 0.0)
-    at = latest.known(solution.x, p)
-    tangent, sign = tangent_at(problem, np.append(solution.x, p), upward, following, at)
+        return Point(solution.x, p, growing, first, solution, 0.0)
+    at, inverse = latest.known(solution.x, p), factors.at(solution)
+    if at is None or inverse is None:
+        y = np.append(solution.x, p)
+        tangent, sign = tangent_at(problem, y, growing, following, at)
+    else:
+        along = np.append(inverse(-at.jac_p), 1.0)
+        tangent, sign = along / measure_at(solution.x, following).of(along), inverse.sign
     return Point(solution.x, p, tangent, first, solution, sign)
 
 

@@ -105,6 +105,7 @@ def newton(
     x: FloatArray,
     options: Newton,
     globalisation: Globalisation | None = None,
+    linear: LinearSolver | None = None,
 ) -> Solution:
     """Solve ``residual(x) = 0``.
 
@@ -118,6 +119,8 @@ def newton(
         Tolerance, limits, globalisation and linear solver.
     globalisation
         A new one in place of that of the options, such as `NaturalLevel` for a start that is known to be near.
+    linear
+        A solver in place of that of the options, such as one that remembers its factors.
 
     Returns
     -------
@@ -125,7 +128,7 @@ def newton(
         The solution, or the iterate with the smallest residual, and why the iteration ended. Its rung is `Rung.DAMPED_STEP` if
         a step was ever refused.
     """
-    work = Work(evaluate, options.linear)
+    work = Work(evaluate, linear or options.linear)
     globalisation = globalisation or GLOBALISATIONS[options.globalisation]()
     now = best = work.at(x)
     iterations = 0

@@ -17,8 +17,10 @@ from stickslip.solve.branch import (
     StepControl,
     measure_at,
     tangent_at,
+    upward,
 )
 from stickslip.solve.kept import KeptFactors
+from stickslip.solve.last_factors import LastFactors
 from stickslip.solve.linear import Factored
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
@@ -100,12 +102,13 @@ def take_step(
     passes = (guess[-1] - end) * (point.p - end) <= 0.0
     if passes:
         guess = y + (end - point.p) / unit[-1] * unit
-        row = _natural_row(measure, y.size)
+        row = measure.p * upward(y.size)
     value = float(row @ guess)
     latest = Latest(problem)
     own = following.newton
     kept = KeptFactors(own.tolerance) if _keeps(following, step) else None
-    solution = newton(lambda v: across(latest, v, row, value), guess, own, kept)
+    last = LastFactors(own.linear)
+    solution = newton(lambda v: across(latest, v, row, value), guess, own, kept, last)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
     near = measure.of(solution.x - y) <= NEAR * reach and (p - end) * (point.p - end) >= 0.0
@@ -113,13 +116,12 @@ def take_step(
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status
         return replace(point, solution=replace(found, x=point.x, status=status))
+    inverse = last.at(solution) if following.predictor != "secant" else None
+    if kept is not None and measure.of(solution.x - guess) < CLOSE * step:
+        inverse = kept.inverse
     known = None
-    if (
-        kept is not None
-        and kept.inverse is not None
-        and measure.of(solution.x - guess) < CLOSE * step
-    ):
-        known = _by_factors(kept.inverse, point, solution.x, unit, following)
+    if inverse is not None:
+        known = _by_factors(inverse, point, solution.x, unit, following)
     tangent, sign = known or _direction(latest, point, solution.x, unit, following)
     return Point(x, p, tangent, step, found, sign, bend=_bend(solution.x, y, tangent, following))
 
@@ -134,7 +136,7 @@ def _by_factors(
 ) -> tuple[FloatArray, float] | None:
     """Return direction and orientation by the factors of a Jacobian beside `y`; None where the branch turns, and that beside it tells too little."""
     measure = measure_at(y[:-1], following)
-    tangent = inverse(np.eye(1, y.size, y.size - 1)[0])
+    tangent = inverse(upward(y.size))
     tangent = tangent / measure.of(tangent)
     straight = measure.cosine(unit, tangent) > STRAIGHT and inverse.sign * before.orientation > 0.0
     return (tangent, inverse.sign) if straight else None
@@ -152,10 +154,6 @@ def _bend(
     return np.asarray((back + length * tangent) / length**2)
 
 
-def _natural_row(measure: Measure, size: int) -> FloatArray:
-    return np.append(np.zeros(size - 1), measure.p)
-
-
 def _prediction(
     point: Point, unit: FloatArray, step: float, measure: Measure, following: Following
 ) -> tuple[FloatArray, FloatArray] | None:
@@ -165,12 +163,11 @@ def _prediction(
         # beside a fold a small change of p asks for a long way, whose end has nothing to do with this branch
         if step > LONGEST * following.control.largest * share:
             return None
-        return step / share * unit, _natural_row(measure, unit.size)
+        return step / share * unit, measure.p * upward(unit.size)
     if following.parametrisation == "local":
-        weights = np.append(measure.x, measure.p)
-        largest = int(np.argmax(np.abs(weights * unit)))
+        largest = int(np.argmax(np.abs(measure.weights * unit)))
         row = np.zeros(unit.size)
-        row[largest] = weights[largest]
+        row[largest] = measure.weights[largest]
         return step * unit, row
     ahead = step * unit
     if point.bend is not None and unit @ point.tangent > 0.0:

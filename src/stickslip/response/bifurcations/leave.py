@@ -33,7 +33,7 @@ def open_directions(
     at = balance.linearise(point.x, point.p)
     jac = at.dense_jac()
     measure = measure_at(point.x, following)
-    scale = np.append(np.full(point.x.size, np.max(measure.x)), measure.p)
+    scale = np.append(np.full(point.x.size, np.max(measure.weights[:-1])), measure.p)
     row = measure.row(point.tangent / measure.of(point.tangent)) / scale
     matrix = np.vstack([np.column_stack([jac, at.jac_p]) / scale, row * np.max(np.abs(jac)) / scale[0]])  # fmt: skip
     matrix += BESIDE * np.max(np.abs(matrix)) * np.eye(len(matrix))

@@ -1,0 +1,66 @@
+"""The factors of the last Newton step, which tell the tangent as well where the Jacobian of the solution is the same."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.operators import Bordered, Corner, Jacobian
+from stickslip.solve.krylov import Automatic
+from stickslip.solve.linear import Dense, Factored, LinearSolver, factorised
+from stickslip.solve.newton_method import Solution
+
+SAME = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
+
+
+@dataclass(eq=False)
+class LastFactors:
+    """A solver of linear systems that remembers the last factors of an array.
+
+    The part of the residual that a Newton step leaves is the change of the Jacobian on its way over the Jacobian itself. Where no contact
+    changes its state it is nearly nothing.
+
+    Parameters
+    ----------
+    linear
+        Solves the systems; factors are remembered of one that factorises arrays.
+
+    Attributes
+    ----------
+    inverse
+        The factors; None where there are none.
+    before
+        Largest entry of the residual at which they were made.
+    """
+
+    linear: LinearSolver
+    inverse: Factored | None = None
+    before: float = 0.0
+
+    def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
+        """Solve ``jac x = right``; see `LinearSolver`."""
+        if self._factorises(jac):
+            return self._solved(jac, right)
+        return self.linear.solve(jac, right)
+
+    def solve_bordered(
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
+    ) -> tuple[FloatArray | None, float]:
+        """Solve the bordered system; see `LinearSolver`."""
+        if not self._factorises(jac):
+            return self.linear.solve_bordered(jac, column, row, corner, right)
+        found = self._solved(Bordered(jac, column, row, corner), right)
+        return found, 0.0 if self.inverse is None else self.inverse.sign
+
+    def at(self, solution: Solution) -> Factored | None:
+        """Return the factors if they are those of the Jacobian at a solution, too."""
+        return self.inverse if solution.residual_norm <= SAME * self.before else None
+
+    def _factorises(self, jac: Jacobian) -> bool:
+        return isinstance(jac, np.ndarray) and isinstance(self.linear, Dense | Automatic)
+
+    def _solved(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
+        known = factorised(self.linear, jac)
+        self.inverse = known if isinstance(known, Factored) else None
+        self.before = float(np.abs(right).max())
+        return None if self.inverse is None else self.inverse(right)
