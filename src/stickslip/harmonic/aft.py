@@ -53,6 +53,7 @@ class ContactPeriod:
 @dataclass(frozen=True, eq=False)
 class _Tables:
     basis: FloatArray  # (samples, m)
+    synthesis: FloatArray  # (m, samples), its transpose in C order
     slope: FloatArray  # (samples, m), derivative by τ = ω t
     cos: FloatArray
     sin: FloatArray
@@ -68,7 +69,7 @@ def _tables(order: int, samples: int) -> _Tables:
     slope = np.zeros_like(basis)
     slope[:, 1::2] = -h * basis[:, 2::2]
     slope[:, 2::2] = h * basis[:, 1::2]
-    return _Tables(basis, slope, cos_table, sin_table, analysis)
+    return _Tables(basis, np.ascontiguousarray(basis.T), slope, cos_table, sin_table, analysis)
 
 
 def contact_forces(
@@ -108,7 +109,7 @@ def contact_forces(
     tables = _tables((m - 1) // 2, samples)
     gap_coefficients = contacts.from_sliders(gap_coefficients)
     # one row a gap, so that an evaluator runs along it
-    gap = (gap_coefficients.T @ tables.basis.T).reshape(contacts.n_contacts, 3, samples)
+    gap = (gap_coefficients.T @ tables.synthesis).reshape(contacts.n_contacts, 3, samples)
     parts = []
     if contacts.piecewise.size:
         own = contacts.piecewise

@@ -37,9 +37,9 @@ class ModeTerms:
     right: FloatArray  # (J, n)
     polynomial: FloatArray  # (4, n, n) P
     direct: FloatArray  # (n, l); the load takes ``left diag(v(p)) source + p direct f_L``
-    ratio: FloatArray  # (l,) κ
-    damping: FloatArray  # (l,)
-    mass: FloatArray  # (l,)
+    ratio: ComplexArray  # (l,) κ; real numbers kept as complex ones, which `p` is multiplied by in a third of the time
+    damping: ComplexArray  # (l,)
+    mass: ComplexArray  # (l,)
     symmetric: bool = True
 
     def weights(self, p: ComplexArray) -> ComplexArray:
@@ -283,10 +283,10 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
     if np.any(np.sum(np.abs(c - ratio * m), axis=0) > PARALLEL * largest):
         return None
     polynomial = np.concatenate([whole, np.zeros((1, *whole.shape[1:]))])
-    damping, mass = np.diagonal(ll[1]), np.diagonal(ll[2])
     return ModeTerms(
-        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio, damping, mass
-    )
+        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio.astype(complex),
+        np.diagonal(ll[1]).astype(complex), np.diagonal(ll[2]).astype(complex),
+    )  # fmt: skip
 
 
 def _poles(interior: Interior, states: StateSpace) -> Poles:

@@ -335,13 +335,12 @@ class Transposed:
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
     """Return the harmonic-major real form of complex (n, n) `blocks`, one a harmonic, the static one first, in Fortran order."""
-    order, n = len(blocks) - 1, blocks[0].shape[0]
-    matrix = np.zeros((n * (2 * order + 1), n * (2 * order + 1)), order="F")
-    matrix[:n, :n] = blocks[0].real
-    for h in range(1, order + 1):
-        cos, sin = slice((2 * h - 1) * n, 2 * h * n), slice(2 * h * n, (2 * h + 1) * n)
-        real, imag = blocks[h].real, blocks[h].imag
-        matrix[cos, cos] = matrix[sin, sin] = real
-        matrix[cos, sin] = imag
-        np.negative(imag, out=matrix[sin, cos])
-    return matrix
+    m, n = 2 * len(blocks) - 1, blocks[0].shape[0]
+    columns = np.zeros((m, n, m, n))  # of the matrix, whose rows come last
+    cos, sin = slice(1, None, 2), slice(2, None, 2)
+    each = np.transpose(blocks, (0, 2, 1))
+    own = np.einsum("hihj->hij", columns)
+    own[0], own[cos], own[sin] = each[0].real, each[1:].real, each[1:].real
+    np.einsum("hihj->hij", columns[sin, :, cos])[:] = each[1:].imag
+    np.einsum("hihj->hij", columns[cos, :, sin])[:] = -each[1:].imag
+    return columns.reshape(m * n, m * n).T

@@ -62,7 +62,8 @@ def rows_of(harmonics: Harmonics) -> IntArray:
 
 def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
     """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros where it has none."""
-    return to_real(padded(coefficients, harmonics[-1])[list(harmonics)])
+    whole = coefficients if len(coefficients) == harmonics[-1] + 1 else padded(coefficients, harmonics[-1])  # fmt: skip
+    return to_real(whole if is_full(harmonics) else whole[list(harmonics)])
 
 
 def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:

@@ -1,6 +1,6 @@
 """The factors of the last Newton step, which tell the tangent as well where the Jacobian of the solution is the same."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,13 +29,13 @@ class LastFactors:
     ----------
     inverse
         The factors; None where there are none.
-    before
-        Largest entry of the residual at which they were made.
+    residual
+        Where they were made, or its negative.
     """
 
     linear: LinearSolver
     inverse: Factored | None = None
-    before: float = 0.0
+    residual: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
@@ -54,7 +54,8 @@ class LastFactors:
 
     def at(self, solution: Solution) -> Factored | None:
         """Return the factors if they are those of the Jacobian at a solution, too."""
-        return self.inverse if solution.residual_norm <= SAME * self.before else None
+        before = float(np.abs(self.residual).max())
+        return self.inverse if solution.residual_norm <= SAME * before else None
 
     def _factorises(self, jac: Jacobian) -> bool:
         return isinstance(jac, np.ndarray) and isinstance(self.linear, Dense | Automatic)
@@ -62,5 +63,5 @@ class LastFactors:
     def _solved(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         known = factorised(self.linear, jac)
         self.inverse = known if isinstance(known, Factored) else None
-        self.before = float(np.abs(right).max())
+        self.residual = right
         return None if self.inverse is None else self.inverse(right)

@@ -154,7 +154,7 @@ def newton(
 
 
 def _ended(now: Iterate, iterations: int, options: Newton) -> Status | None:
-    if not np.isfinite(now.norm):
+    if not math.isfinite(now.norm):
         return Status.NOT_FINITE
     if now.norm <= options.tolerance:
         return Status.CONVERGED

@@ -278,5 +278,5 @@ def of_forced(curve: ForcedCurve, point: ForcedPoint) -> Followed:
     level = curve.supports.index(point.support)
     start = point.start if point.start.size else None
     judged = Judged(point.predicted_error, tuple(int(h) for h in point.asked), start)
-    there = curve.forced.branch_point(point)
+    there = curve.forced.branch_point(point, curve.problem(level))
     return Followed(kind, point.index, level, there, judged, point.seconds_total)

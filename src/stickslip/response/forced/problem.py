@@ -239,9 +239,9 @@ class ForcedProblem:
         anew = self.sweep.rescue == "all" or point.support != self.high.harmonics
         return (self.repeats and not point.converged and anew) or self.alerted(point)
 
-    def branch_point(self, point: ForcedPoint) -> Point:
-        """Return a point of a branch as one that it goes on from."""
-        x = self.balance(point.support).unknowns(point.coefficients)
+    def branch_point(self, point: ForcedPoint, balance: Balance | None = None) -> Point:
+        """Return a point of a branch as one that it goes on from; `balance` has its harmonics."""
+        x = (balance or self.balance(point.support)).unknowns(point.coefficients)
         contact, linear = point.seconds_contact, point.seconds_linear
         solution = Solution(
             x, point.status, point.iterations, 0.0, contact, linear, rung=point.rescue
