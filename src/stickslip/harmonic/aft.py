@@ -57,19 +57,20 @@ class _Tables:
     slope: FloatArray  # (samples, m), derivative by τ = ω t
     cos: FloatArray
     sin: FloatArray
-    analysis: FloatArray  # (samples, m)
+    analysis: FloatArray  # (m, samples)
 
 
 @lru_cache(maxsize=32)
 def _tables(order: int, samples: int) -> _Tables:
     basis, cos_table, sin_table = prefix_sums(order, samples)
-    analysis = basis * (2.0 / max(samples, 1))
-    analysis[:, 0] *= 0.5
+    synthesis = np.ascontiguousarray(basis.T)
+    analysis = synthesis * (2.0 / max(samples, 1))
+    analysis[0] *= 0.5
     h = np.arange(1, order + 1)
     slope = np.zeros_like(basis)
     slope[:, 1::2] = -h * basis[:, 2::2]
     slope[:, 2::2] = h * basis[:, 1::2]
-    return _Tables(basis, np.ascontiguousarray(basis.T), slope, cos_table, sin_table, analysis)
+    return _Tables(basis, synthesis, slope, cos_table, sin_table, analysis)
 
 
 def contact_forces(
@@ -152,7 +153,7 @@ def _on_samples(
         contact_period_threads(shares, *arrays)
     else:
         contact_period(*arrays)
-    coefficients = tables.analysis.T @ force.reshape(3 * n, samples).T
+    coefficients = tables.analysis @ force.reshape(3 * n, samples).T
     return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
 
 
@@ -230,9 +231,9 @@ def _marched(
         rate, omega, force, state, blocks, by_omega, periods,
     )  # fmt: skip
     return ContactPeriod(
-        tables.analysis.T @ force.reshape(3 * n, samples).T,
+        tables.analysis @ force.reshape(3 * n, samples).T,
         blocks,
-        tables.analysis.T @ by_omega.reshape(3 * n, samples).T,
+        tables.analysis @ by_omega.reshape(3 * n, samples).T,
         gap,
         force,
         state,
