@@ -116,6 +116,8 @@ class _SolvedAt:
 
     def load(self, near: ComplexArray, far: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         (_, nl, _, _), (_, g_nl, _, g_ll) = self.D, self.G
+        if not np.any(far):
+            return near, np.zeros_like(near)
         moved = self._solve(far)
         slope = nl @ self._solve(g_ll @ moved) - g_nl @ moved
         return np.asarray(near - nl @ moved), np.asarray(slope)
@@ -153,6 +155,11 @@ class ModalWave:
     loss: Array
     modes: Array
 
+    @cached_property
+    def back(self) -> Array:
+        """(l, n) conjugate transpose of `across`; every frequency multiplies with it."""
+        return np.ascontiguousarray(self.across.conj().T)
+
     def with_mass_damping(self, rate: float) -> "ModalWave":
         """Return the same wave with `rate` (1/s) times its mass added to its damping: its modes stay what they are."""
         k, c, m, loss = self.nn
@@ -189,19 +196,19 @@ class _ModalAt:
         wave, s = self.wave, self.s
         k, c, m, loss = wave.nn
         scaled = wave.across * self._weights[1]
-        return np.asarray(
-            k + 1j * (s * c + (s != 0) * loss) - s**2 * m - scaled @ wave.across.conj().T
-        )
+        return np.asarray(k + 1j * (s * c + (s != 0) * loss) - s**2 * m - scaled @ wave.back)
 
     def slope(self, q: Array) -> ComplexArray:
         wave, by_s = self.wave, self._weights[3]
-        amplitudes = wave.across.conj().T @ q
+        amplitudes = wave.back @ q
         amplitudes = amplitudes * (by_s if q.ndim == 1 else by_s[:, None])
         _, c, m, _ = wave.nn
         return np.asarray(1j * (c @ q) - 2 * self.s * (m @ q) - wave.across @ amplitudes)
 
     def load(self, near: ComplexArray, far: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         wave, (per, _, by_s, _) = self.wave, self._weights
+        if not np.any(far):
+            return near, np.zeros_like(near)
         modal = wave.modes.conj().T @ far
         moved = near - wave.static @ modal - wave.across @ (per * modal)
         return moved, -wave.across @ (by_s * modal)
@@ -213,7 +220,7 @@ class _ModalAt:
         if q.ndim > 1:
             d, per = d[:, None], per[:, None]
         modal = (wave.modes.conj().T @ far) / d
-        modal = modal - per * (wave.across.conj().T @ q) - wave.static.conj().T @ q
+        modal = modal - per * (wave.back @ q) - wave.static.conj().T @ q
         return np.asarray(wave.modes @ modal)
 
 
