@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic.find import swept
@@ -24,6 +25,7 @@ from stickslip.response.quasi_periodic.tone import (
 )
 from stickslip.response.stability import stability
 from stickslip.response.time.start import start_from_harmonics
+from stickslip.solve.krylov import Krylov
 
 MASS = np.eye(2)
 STIFFNESS = np.array([[3e4, -1e4], [-1e4, 4e4]])
@@ -178,6 +180,44 @@ def test_derivatives_are_those_of_the_residual() -> None:
         (1e-2 * at.by_second, [residual(x, omegas[0], omegas[1] + s * 1e-2) for s in (1, -1)]),
     ):
         assert found == pytest.approx((ends[0] - ends[1]) / 2, abs=1e-5 * np.abs(found).max())
+
+
+def test_the_jacobian_by_its_parts_is_the_array() -> None:
+    """Two masses have few coordinates: the parts are asked for, and they and their borders lead to the same motions."""
+    omegas = 140.0, 180.0
+    problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
+    x, path = problem.solve(omegas).x, problem.path(omegas[1] / omegas[0])
+    forms = [replace(problem.balance, jacobian=form) for form in ("dense", "structured")]
+    whole, parts = (form.linearise(x, omegas, path).jac for form in forms)
+    assert isinstance(parts, StructuredJacobian)
+    v = np.random.default_rng(5).normal(size=x.size)
+    size = np.abs(whole).max()
+    assert parts.matvec(v) == pytest.approx(whole @ v, abs=1e-13 * size)
+    assert parts.rmatvec(v) == pytest.approx(v @ whole, abs=1e-13 * size)
+    krylov = Krylov(tolerance=1e-10)
+    found = krylov.solve(parts, v)
+    assert found == pytest.approx(
+        np.linalg.solve(whole, v), rel=1e-7, abs=1e-8 * np.abs(found).max()
+    )
+    assert krylov.counts.products < 40
+
+
+def test_a_second_tone_by_parts_is_that_with_arrays() -> None:
+    stuck = STIFFNESS + SPRING * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    squares, shapes = np.linalg.eigh(stuck)
+    fed = shapes @ np.diag([3.0, -2.0]) @ shapes.T
+    problem = two_tones(rubbing_pair(fed), tone(6.0, 0.0), NONE, 3)
+    motions = []
+    for form in ("dense", "structured"):
+        own = replace(problem, balance=replace(problem.balance, jacobian=form))
+        begin = beginnings(own, forced_motion(own, 135.0), [float(np.sqrt(squares[1]))])[0]
+        motion = second_tone(begin)
+        assert motion is not None
+        told = off_by(own, motion, closed_path(motion.omegas[1] / 135.0, 5), half_plane(5)[12:])
+        motions.append((motion.omegas[1], told, np.abs(motion.coefficients)))
+    for one, other in zip(*motions, strict=True):
+        assert one == pytest.approx(other, rel=1e-3, abs=1e-6 * np.max(other))
+    assert motions[0][0] == pytest.approx(motions[1][0], rel=1e-8)
 
 
 @pytest.mark.parametrize("most", [1, 3])

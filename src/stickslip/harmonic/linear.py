@@ -79,8 +79,8 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
     return structure
 
 
-class Products(Hashable, Protocol):
-    """A condensed dynamic stiffness and its load at one frequency, by its products.
+class StiffnessProducts(Hashable, Protocol):
+    """A condensed dynamic stiffness at one frequency, or at one combined frequency for each place of the support, by its products.
 
     Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
     """
@@ -95,16 +95,6 @@ class Products(Hashable, Protocol):
         """The support."""
         ...
 
-    @property
-    def load(self) -> FloatArray:
-        """(m, n) load, N."""
-        ...
-
-    @property
-    def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
-        ...
-
     def same(self, other: object) -> bool:
         """Whether `other` has the same dynamic stiffness; loads may differ."""
         ...
@@ -117,12 +107,26 @@ class Products(Hashable, Protocol):
         """Return the rows of the product with the transpose of the real form of Z."""
         ...
 
-    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ``Z q`` and ``∂Z/∂ω q``."""
-        ...
-
     def block(self, harmonic: int) -> Matrix:
         """Return ``Z_h``, (n, n) complex, to be changed at will: an array in Fortran order, or sparse where nothing is condensed."""
+        ...
+
+
+class Products(StiffnessProducts, Protocol):
+    """A condensed dynamic stiffness and its load at one frequency, by its products."""
+
+    @property
+    def load(self) -> FloatArray:
+        """(m, n) load, N."""
+        ...
+
+    @property
+    def load_slope(self) -> FloatArray:
+        """(m, n) its derivative by ω."""
+        ...
+
+    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``Z q`` and ``∂Z/∂ω q``."""
         ...
 
 

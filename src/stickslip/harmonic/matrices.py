@@ -10,6 +10,7 @@ from stickslip.model.structure import Structure
 PROPORTIONAL = (
     1e-13  # share of a row's largest damping by which the sum of stiffness and mass may differ
 )
+ROWS = 64  # that are compared at a time: matrices of thousands of rows need no copies
 SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
 
 
@@ -69,7 +70,9 @@ def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, f
     if not np.all(size > 0.0):
         return None
     a, b = np.linalg.lstsq(own / size, np.diagonal(c), rcond=None)[0] / size
-    for stiff, damped, inert in zip(k, c, m, strict=True):
-        if np.max(np.abs(a * stiff + b * inert - damped)) > PROPORTIONAL * np.max(np.abs(damped)):
+    for first in range(0, len(c), ROWS):
+        stiff, damped, inert = (matrix[first : first + ROWS] for matrix in (k, c, m))
+        off = np.max(np.abs(a * stiff + b * inert - damped), axis=1)
+        if np.any(off > PROPORTIONAL * np.max(np.abs(damped), axis=1)):
             return None
     return float(a), float(b)

@@ -45,7 +45,7 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     # without damping a harmonic may meet a resonance exactly, where there is no inverse
     inverse = np.linalg.inv(stiffness + 1j * LOSS * largest * np.eye(linear.n))
     compliance = np.diagonal(inverse, axis1=1, axis2=2)
-    slope = -np.einsum("hgi,hij,hjg->hg", inverse, part.derivative[h], inverse)
+    slope = -np.sum((inverse @ part.derivative[h]) * inverse.swapaxes(1, 2), axis=2)
     value = (
         (highest + 1)
         / np.e

@@ -15,6 +15,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.product import harmonic_means
 from stickslip.harmonic.costs import CALL, linear_costs
 from stickslip.harmonic.factors import AnyFactors, factorise
+from stickslip.harmonic.small_blocks import SMALL
 from stickslip.harmonic.structured import StructuredJacobian, Transposed
 from stickslip.operators import Costs
 
@@ -107,10 +108,19 @@ class RigidFactors:
         Of each harmonic.
     rows
         (H+1, n_gaps, n) rows at the gaps of the harmonics without rigid contacts.
+    inverses
+        (H+1, n, n) of the same matrices, where they are small.
     """
 
     factors: tuple[AnyFactors, ...]
     rows: ComplexArray
+    inverses: ComplexArray | None
+
+    def solve(self, harmonic: int, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
+        """Solve a harmonic for its right side (n,)."""
+        if self.inverses is not None:
+            return np.asarray(self.inverses[harmonic] @ right)
+        return self.factors[harmonic].solve(right)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +201,11 @@ class RigidJacobian:
             if made is None:
                 return None
             factors.append(made)
-        return RigidFactors(tuple(factors), np.array(rows))
+        inverses = None
+        if self.soft.linear.n <= SMALL:
+            unit = np.eye(self.soft.linear.n, dtype=complex)
+            inverses = np.array([one.solve(unit) for one in factors])
+        return RigidFactors(tuple(factors), np.array(rows), inverses)
 
     def preconditioned_by(self, kept: RigidFactors) -> tuple[Solve, Product]:
         """Return how to solve ``P x = y``, and ``J v`` as a function of v and ``P v``."""
@@ -220,15 +234,17 @@ class RigidJacobian:
         predicted = np.zeros((laws.column.size, len(rows)))
         gap = np.zeros((len(soft.blocks), 3, len(rows)))
         before = first = 0
-        for h, factors in enumerate(kept.factors):
+        for h in range(laws.order + 1):
             last = 2 * h + 1
             soft.subtract_below((before, first, last), gap, rows)
-            below = predicted[:, :first, None]
-            force = laws.own[:, first:last, :first] @ below
-            force[laws.tangent] += laws.by_normal[:, first:last, :first] @ below[laws.normal]
-            rows[first:last, laws.column] -= laws.factor * force[:, :, 0].T
+            below = predicted[:, :first]
+            force = _each_product(laws.own[:, first:last, :first], below)
+            force[laws.tangent] += _each_product(
+                laws.by_normal[:, first:last, :first], below[laws.normal]
+            )
+            rows[first:last, laws.column] -= laws.factor * force.T
             right_side = rows[0] if h == 0 else rows[first] - 1j * rows[first + 1]
-            x = factors.solve(right_side)
+            x = kept.solve(h, right_side)
             found = self._penalty(h) * x[laws.column] - kept.rows[h] @ x / laws.factor
             if h == 0:
                 rows[0], predicted[:, 0] = x.real, found.real
@@ -260,6 +276,11 @@ class RigidLinearisation:
     def dense_jac(self) -> FloatArray:
         """Return the Jacobian as an array."""
         return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
+
+
+def _each_product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return (n, k) products of matrices (n, k, m) with vectors (n, m); NumPy's own would call BLAS for each."""
+    return np.asarray(np.einsum("gkm,gm->gk", matrices, vectors))
 
 
 def derivative(order: int) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.product import multiply_blocks
-from stickslip.harmonic.linear import Products
+from stickslip.harmonic.linear import StiffnessProducts
 
 SMALL = 96  # unknowns a harmonic up to which this is faster than LAPACK and BLAS for each
 
@@ -42,6 +42,6 @@ def small_blocks(matrices: list[ComplexArray]) -> SmallBlocks:
 
 
 @lru_cache(maxsize=2)
-def dynamic_stiffness(linear: Products) -> SmallBlocks:
+def dynamic_stiffness(linear: StiffnessProducts) -> SmallBlocks:
     """Return the dynamic stiffness of all harmonics at one frequency, N/m; kept, because a Krylov method multiplies with it many times."""
     return small_blocks([linear.block(h) for h in linear.harmonics])

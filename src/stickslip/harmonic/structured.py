@@ -30,7 +30,7 @@ from stickslip.harmonic.factors import (
     real_part,
     with_contacts,
 )
-from stickslip.harmonic.linear import Products, Shareable
+from stickslip.harmonic.linear import Shareable, StiffnessProducts
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
 from stickslip.harmonic.small_blocks import (
     SMALL,
@@ -63,7 +63,7 @@ class HarmonicFactors:
         The inverses, where the matrices are small.
     """
 
-    linear: Products
+    linear: StiffnessProducts
     means: ComplexArray
     factors: tuple[AnyFactors, ...]
     inverses: SmallBlocks | None
@@ -103,7 +103,7 @@ class StructuredJacobian:
         Displacement scale over force scale.
     """
 
-    linear: Products
+    linear: StiffnessProducts
     blocks: FloatArray
     rows: SparseRows
     scale: float

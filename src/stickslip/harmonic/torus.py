@@ -1,7 +1,8 @@
 """Harmonic balance of motions with two frequencies: ``q(t) = Re Σ Q_jk e^{i(jω1 + kω2)t}``, with the static term.
 
 Each combined frequency has its own condensed dynamic stiffness; contacts are marched along characteristics of the torus
-(`stickslip.harmonic.torus_path`), and their derivatives with them, so that the Jacobian is that of the equations that are solved.
+(`stickslip.harmonic.torus_path`), and their derivatives with them, so that the Jacobian is that of the equations that are solved. It has the
+parts of that of a harmonic balance, combined frequencies in place of harmonics, and is kept by them where that costs less.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +16,10 @@ from stickslip.contact.compiled import CompiledContacts, MarchedLaws
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.contact.march import period_march
 from stickslip.errors import input_error
-from stickslip.harmonic.balance import check_retained
+from stickslip.harmonic.balance import JacobianForm, check_retained
+from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.structured import real_matrix
+from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.torus_path import (
     Indices,
     TorusPath,
@@ -25,6 +27,7 @@ from stickslip.harmonic.torus_path import (
     torus_basis,
     torus_rates,
 )
+from stickslip.harmonic.torus_products import CombinedProducts
 from stickslip.harmonic.torus_side import TorusSide
 
 MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
@@ -60,11 +63,15 @@ class TorusLinearisation:
     """Residual and derivatives at one state, all scaled."""
 
     residual: FloatArray
-    jac: FloatArray
+    jac: FloatArray | StructuredJacobian
     by_first: FloatArray
     by_second: FloatArray
     seconds_contact: float
     unsettled: int
+
+    def dense_jac(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +88,14 @@ class TorusBalance:
     indices: Indices
     displacement_scale: float
     force_scale: float
+    jacobian: JacobianForm = "auto"
+
+    @property
+    def structured(self) -> bool:
+        """Whether the Jacobian is given by its products."""
+        derivatives = self.compiled.n_contacts * self.compiled.pairs * self.n_rows**2
+        pays = products_pay(linear_costs(self.side.n, len(self.indices), derivatives))
+        return pays if self.jacobian == "auto" else self.jacobian == "structured"
 
     @property
     def order(self) -> int:
@@ -107,7 +122,8 @@ class TorusBalance:
 
     def with_indices(self, indices: Indices) -> "TorusBalance":
         """Return the same with other combined frequencies."""
-        return replace(self, indices=indices)
+        # rows of its own: they tell a solver which Jacobians can share a preconditioner
+        return replace(self, indices=indices, rows=replace(self.rows))
 
     def from_other(self, other: "TorusBalance", x: FloatArray) -> FloatArray:
         """Return the unknowns of a motion that was found with other indices."""
@@ -163,10 +179,7 @@ class TorusBalance:
         factor = self.displacement_scale / self.force_scale
         stiffness, slopes = self.side.stiffness(self.indices, omegas, rate)
         load, load_first, load_second = self.side.load(self.indices, omegas)
-        jac = factor * real_matrix(stiffness)
-        add_contact_jacobian(
-            forces.blocks, self.rows.columns, self.rows.values, self.side.n, factor, jac
-        )
+        jac = StructuredJacobian(CombinedProducts(stiffness), forces.blocks, self.rows, factor)
         q = self.coefficients(x)[:, :, None]
         residual = to_real((stiffness @ q)[..., 0] - load)
         self.rows.add_forces(forces.coefficients, residual)
@@ -179,7 +192,7 @@ class TorusBalance:
         scale = self.force_scale
         return TorusLinearisation(
             residual.reshape(-1) / scale,
-            jac,
+            jac if self.structured else jac.dense(),
             by[0].reshape(-1) / scale,
             by[1].reshape(-1) / scale,
             seconds,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -55,23 +56,7 @@ class TorusSide:
         rate
             1/s: so many times the mass is taken away from the damping wherever the second frequency takes part.
         """
-        values = np.zeros((len(indices), self.n, self.n), dtype=complex)
-        slopes = np.zeros_like(values)
-        values[0] = self.first.condensed(omegas[0], 0).stiffness[0]
-        damped: dict[int, DynamicStiffness] = {}
-        for place, (j, k) in enumerate(indices):
-            if place == 0:
-                continue
-            omega = j * omegas[0] + k * omegas[1]
-            # a frequency below zero is the conjugate of one above that travels the other way
-            wave = self.wave(j, k) if omega >= 0.0 else self.wave(-j, -k)
-            linear = self.still[wave]
-            if k != 0 and rate != 0.0:
-                linear = damped.setdefault(wave, linear.with_mass_damping(-rate))
-            part = linear.condensed(abs(omega), 1)
-            values[place] = part.stiffness[1] if omega >= 0.0 else part.stiffness[1].conj()
-            slopes[place] = part.derivative[1] if omega >= 0.0 else -part.derivative[1].conj()
-        return values, slopes
+        return _stiffness(self, indices, omegas, rate)
 
     def load(
         self, indices: Indices, omegas: tuple[float, float]
@@ -112,3 +97,27 @@ class TorusSide:
                 found = self.still[wave].recover_change(abs(omega), rows)[1]
                 own[place] = found if omega >= 0.0 else found.conj()
         return np.array(own)
+
+
+@lru_cache(maxsize=2)
+def _stiffness(
+    side: TorusSide, indices: Indices, omegas: tuple[float, float], rate: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return what `TorusSide.stiffness` does; kept, because a Newton iteration at fixed frequencies asks for it at every step."""
+    values = np.zeros((len(indices), side.n, side.n), dtype=complex)
+    slopes = np.zeros_like(values)
+    values[0] = side.first.condensed(omegas[0], 0).stiffness[0]
+    damped: dict[int, DynamicStiffness] = {}
+    for place, (j, k) in enumerate(indices):
+        if place == 0:
+            continue
+        omega = j * omegas[0] + k * omegas[1]
+        # a frequency below zero is the conjugate of one above that travels the other way
+        wave = side.wave(j, k) if omega >= 0.0 else side.wave(-j, -k)
+        linear = side.still[wave]
+        if k != 0 and rate != 0.0:
+            linear = damped.setdefault(wave, linear.with_mass_damping(-rate))
+        part = linear.condensed(abs(omega), 1)
+        values[place] = part.stiffness[1] if omega >= 0.0 else part.stiffness[1].conj()
+        slopes[place] = part.derivative[1] if omega >= 0.0 else -part.derivative[1].conj()
+    return values, slopes

@@ -156,9 +156,9 @@ class ModalWave:
     modes: Array
 
     @cached_property
-    def back(self) -> Array:
+    def back(self) -> ComplexArray:
         """(l, n) conjugate transpose of `across`; every frequency multiplies with it."""
-        return np.ascontiguousarray(self.across.conj().T)
+        return np.asarray(self.across.conj().T, dtype=complex, order="C")
 
     def with_mass_damping(self, rate: float) -> "ModalWave":
         """Return the same wave with `rate` (1/s) times its mass added to its damping: its modes stay what they are."""

@@ -18,10 +18,13 @@ from stickslip.harmonic.torus import (
 from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.harmonic.torus_side import TorusSide
 from stickslip.harmonic.travelling import condense_side
+from stickslip.operators import Bordered, Jacobian
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import preload
 from stickslip.response.quasi_periodic.motion import TorusMotion
 from stickslip.response.system import NO_DOFS, System
+from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.linear import solve_with
 from stickslip.solve.newton_method import Newton, Solution, newton
 
 LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
@@ -29,6 +32,7 @@ MOST_RAISES = 6
 FAINT = (
     0.01  # of the coordinate that moves most: the change of one that moves less counts against that
 )
+STEP_LEAVES = 1e-4  # of that step's right side, where a Krylov method solves for it
 STEP_MORE = 40  # combined frequencies more in the Newton step that says how far off a motion is
 BEYOND = 4  # sums of harmonics above the largest, that are looked at but not taken
 SHARE = 0.5  # of the tolerance, below which together combined frequencies stay out
@@ -37,7 +41,7 @@ SHARE = 0.5  # of the tolerance, below which together combined frequencies stay 
 @dataclass(frozen=True, eq=False)
 class _Evaluation:
     residual: FloatArray
-    jac: FloatArray
+    jac: Jacobian
     seconds_contact: float
 
 
@@ -322,10 +326,14 @@ def off_by(
     wider = problem.balance.with_indices((*motion.indices, *more[:few]))
     x = wider.from_other(problem.balance, motion.x)
     at = wider.linearise(x, motion.omegas, path)
-    jac, right = at.jac, at.residual
+    jac: Jacobian = at.jac
+    right = at.residual
     if not any(np.any(force) for force in wider.side.second.load.harmonics.values()):
         jac, right = _with_free_tone(wider, x, at)
-    step = np.linalg.solve(jac, right)[: x.size]
+    found = solve_with(to_tolerance(problem.newton.linear, STEP_LEAVES), jac, right)
+    if found is None:
+        return np.inf
+    step = found[: x.size]
     size = np.linalg.norm(wider.coefficients(x)[1:], axis=0)
     change = np.linalg.norm(wider.coefficients(step)[1:], axis=0)
     return float(np.max(change / np.maximum(size, FAINT * np.max(size))))
@@ -333,14 +341,11 @@ def off_by(
 
 def _with_free_tone(
     balance: TorusBalance, x: FloatArray, at: TorusLinearisation
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Bordered, FloatArray]:
     """Return a Jacobian and residual with the second frequency among the unknowns, and no step along the phase of the second tone."""
     own = balance.coefficients(x)
     along = balance.unknowns(np.array([1j * k * row for (_, k), row in zip(balance.indices, own, strict=True)]))  # fmt: skip
-    jac = np.zeros((x.size + 1, x.size + 1))
-    jac[:-1, :-1], jac[:-1, -1] = at.jac, at.by_second
-    jac[-1, :-1] = along
-    return jac, np.append(at.residual, 0.0)
+    return Bordered(at.jac, at.by_second, along, 0.0), np.append(at.residual, 0.0)
 
 
 def room(problem: TwoTones) -> int:

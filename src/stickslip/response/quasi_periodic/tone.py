@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.torus_path import TorusPath
+from stickslip.operators import Bordered, Jacobian
 from stickslip.response.quasi_periodic.motion import TorusMotion
 from stickslip.response.quasi_periodic.problem import TwoTones
 from stickslip.solve.newton_method import Solution, newton
@@ -89,7 +90,7 @@ class ToneOfAmplitude:
 @dataclass(frozen=True, eq=False)
 class _Evaluation:
     residual: FloatArray
-    jac: FloatArray
+    jac: Jacobian
     seconds_contact: float
 
 
@@ -137,7 +138,7 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
     found = []
     for guess in guesses:
         omegas = forced.omegas[0], float(guess)
-        jac = balance.linearise(x, omegas, problem.path(guess / omegas[0])).jac
+        jac = balance.linearise(x, omegas, problem.path(guess / omegas[0])).dense_jac()
         second = _of_second(problem)
         _, sizes, right = np.linalg.svd(jac[np.ix_(second, second)])
         unit = np.zeros(balance.size)
@@ -248,10 +249,9 @@ def solve_free(
             return _out_of_bounds(v)
         now = omegas[0], omegas[1] * float(np.exp(log_omega))
         at = balance.linearise(v[:-1], now, used)
-        jac = np.zeros((v.size, v.size), order="F")
-        jac[:-1, :-1], jac[:-1, -1] = at.jac, now[1] * at.by_second
-        jac[-1, row * balance.side.n + position] = 1.0
-        held = v[row * balance.side.n + position]
+        place = row * balance.side.n + position
+        jac = Bordered(at.jac, now[1] * at.by_second, _one_at(place, x.size), 0.0)
+        held = v[place]
         return _Evaluation(np.append(at.residual, held), jac, at.seconds_contact)
 
     used = path or problem.path(omegas[1] / omegas[0])
@@ -292,10 +292,10 @@ def _of_amplitude(beginning: Beginning, y: FloatArray, amplitude: float) -> Solu
         rate = level * guess
         x = v[:-2]
         at = balance.linearise(x, omegas, path, rate)
-        jac = np.zeros((v.size, v.size), order="F")
-        jac[:-2, :-2], jac[:-2, -2] = at.jac, omegas[1] * at.by_second
-        jac[:-2, -1] = guess * balance.by_damping(x, omegas, rate, 1e-4 * guess)
-        jac[-2, rows[0]] = jac[-1, rows[1]] = 1.0
+        by_level = guess * balance.by_damping(x, omegas, rate, 1e-4 * guess)
+        columns = np.stack([omegas[1] * at.by_second, by_level], axis=1)
+        own = np.stack([_one_at(place, x.size) for place in rows])
+        jac = Bordered(at.jac, columns, own, np.zeros((2, 2)))
         held = [x[rows[0]] - target, x[rows[1]]]
         return _Evaluation(np.append(at.residual, held), jac, at.seconds_contact)
 
@@ -337,6 +337,11 @@ def _turned(
 def _row(problem: TwoTones) -> int:
     """Return the row of the cosine part of the second frequency."""
     return 2 * problem.balance.indices.index((0, 1)) - 1
+
+
+def _one_at(place: int, size: int) -> FloatArray:
+    """Return the derivative (size,) of one unknown by all."""
+    return np.asarray(np.eye(1, size, place)[0])
 
 
 def _out_of_bounds(v: FloatArray) -> _Evaluation:
