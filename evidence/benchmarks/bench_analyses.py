@@ -31,7 +31,7 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation, branch_in_parameter
 from stickslip.response.rigid import rigid_response
-from stickslip.response.self_excited.curve import at_amplitude
+from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.cycles import solve_cycle
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
@@ -43,10 +43,11 @@ SIZES = ((12, 7), (24, 7), (11, 41))  # contacts and harmonics: 540, 1080 and 27
 GRIDS = {12: (4, 3), 24: (6, 4), 11: (11, 1)}  # contacts of a sector each way
 SAME = 1e-6  # relative difference of two answers ...
 VIBRATION = 1e-4  # ... and of vibrations with rigid contacts: what they stick at depends on how they slid before
+RIGID_SHARE = 0.05  # of the preload: some rigid contacts slip
 SHARE = 0.1  # of the preload: most contacts slip in the resonance
 PEAK = 0.98  # of the first frequency of the stuck plates: about there the response is largest
 FAR, NEAR = 0.06, 0.006  # share of a frequency to both sides, and the same at the largest size
-MODE, CYCLE = (3e-6, 3e-5), 2.5e-6  # m, amplitudes: from micro-slip on, and in it
+MODE = (3e-6, 3e-5)  # m, amplitudes: from micro-slip on
 SAMPLES, LONG = 128, 20  # harmonics above which only a short way is followed
 GOAL = 1.0
 
@@ -67,13 +68,15 @@ def arrays() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def plates_with(contacts: int) -> Plates:
-    """Return the plates with 12 or 24 contacts, or with 11 of the 12: the last point is free."""
+    """Return the plates with 12 or 24 contacts, or with 11 of the 12: one point inside is free."""
     if contacts != 11:
         return two_plates(contacts)
     whole = two_plates(12)
     old = whole.system.interface
-    fewer = Interface(old.names[:11], old.laws[:11], old.gap_operator[:33])
-    return Plates(replace(whole.system, interface=fewer), whole.preload)
+    own = np.delete(np.arange(12), 6)
+    rows = scipy.sparse.csr_array(old.gap_operator)[(3 * own[:, None] + np.arange(3)).ravel()]
+    names, laws = (tuple(every[i] for i in own) for every in (old.names, old.laws))
+    return Plates(replace(whole.system, interface=Interface(names, laws, rows)), whole.preload)
 
 
 def first_frequency(plates: Plates) -> float:
@@ -152,8 +155,8 @@ def rigid(task: Task) -> np.ndarray:
     plates, old = task.plates, task.plates.system.interface
     laws = tuple(RigidCoulomb(mu=0.3) for _ in old.laws)
     system = replace(plates.system, interface=Interface(old.names, laws, old.gap_operator))
-    around = task.around(task.resonance)
-    found = list(rigid_response(system, task.load, around, task.points, task.how))
+    load, around = plates.load(RIGID_SHARE, "slide"), task.around(task.resonance)
+    found = list(rigid_response(system, load, around, task.points, task.how))
     _all_found(p.converged for p in found)
     return np.ravel(found[-1].coefficients[1:])
 
@@ -193,7 +196,7 @@ def cycle(task: Task) -> np.ndarray:
     one, still = _first_mode(task)
     system = task.plates.system
     problem = self_excited_motions(system, still, one, int(system.outputs[0]), task.how)
-    begin = at_amplitude(problem, CYCLE)
+    begin = at_amplitude(problem, 1.5 * slip_amplitude(problem))
     fed = problem.level(begin.level, begin.omega)
     y = np.append(begin.unknowns[:-1], np.log(begin.amplitude))
     for share in np.linspace(1.0, 1.05, task.points):
