@@ -26,7 +26,6 @@ from stickslip.contact.intervals import contact_period, contact_period_threads, 
 from stickslip.contact.threads import thread_shares
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_response
@@ -80,7 +79,7 @@ def balance_of(
 ) -> tuple[HarmonicBalance, np.ndarray]:
     """Return the problem under a load, its Jacobian known by products, and the bonded vibration."""
     system = plates.system
-    linear = condense(system.structure, system.retained, plates.load(share, pull))
+    linear = system.condensed(plates.load(share, pull), order)
     balance = harmonic_balance(
         linear, system.interface, order, max(SAMPLES, 8 * order), jacobian="structured"
     )

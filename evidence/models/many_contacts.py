@@ -88,11 +88,12 @@ def _assembled(points: int) -> tuple[Structure, np.ndarray, np.ndarray]:
     inside = (places[:, 0] > 1e-9) & (places[:, 0] < LENGTH - 1e-9)
     lower, upper = np.flatnonzero(top & inside), np.flatnonzero(bottom & inside)
     # upper = lower + gap at the contact points: their rows of the upper plate become the gaps
-    to_full = scipy.sparse.eye_array(6 * n, format="lil")
-    for low, up in zip(lower, upper, strict=True):
-        for d in range(3):
-            to_full[3 * n + 3 * up + d, 3 * low + d] = 1.0
-    to_full = scipy.sparse.csr_array(to_full)
+    three = np.arange(3)
+    rows = (3 * n + 3 * upper[:, None] + three).ravel()
+    follow = scipy.sparse.coo_array(
+        (np.ones(rows.size), (rows, (3 * lower[:, None] + three).ravel())), shape=(6 * n, 6 * n)
+    )
+    to_full = scipy.sparse.csr_array(scipy.sparse.eye_array(6 * n) + follow)
     free = np.concatenate(
         [np.repeat(places[:, 0] > 1e-9, 3), np.repeat(places[:, 0] < LENGTH - 1e-9, 3)]
     )
@@ -108,9 +109,9 @@ def _assembled(points: int) -> tuple[Structure, np.ndarray, np.ndarray]:
     nodes = np.repeat(np.arange(2 * n), 3)[free]
     table = Dofs(nodes, tuple("xyz"[i % 3] for i in free), np.vstack([places, places])[nodes])
     full = Structure(matrices[0], scipy.sparse.csr_array(matrices[0].shape), matrices[1], table)
-    gaps = new[(3 * n + 3 * upper[:, None] + np.arange(3)).ravel()]
+    gaps = new[rows]
     corner = np.flatnonzero(top & (places[:, 0] < 1e-9) & (places[:, 1] < 1e-9))[0]
-    return full, gaps, new[3 * n + 3 * corner + np.arange(3)]
+    return full, gaps, new[3 * n + 3 * corner + three]
 
 
 def _with_contacts(
