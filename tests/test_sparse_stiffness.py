@@ -1,7 +1,9 @@
 """Structures that are not reduced: sparse products against arrays, and the same motions as after an exact condensation."""
 
+import shutil
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +30,9 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton, newton
+from stickslip.study.models.study import read_study
 
+EXAMPLE = Path(__file__).parents[1] / "examples" / "root_joint"
 ORDER, SAMPLES, OMEGA = 3, 64, 2 * np.pi * 1600.0
 
 
@@ -229,6 +233,34 @@ def test_factors_by_harmonic_hold_all_below_the_harmonics():
 def test_double_precision_where_single_tells_too_little(monkeypatch):
     monkeypatch.setattr(shared_factor_module, "SHARP", 1e-7)
     assert jacobian()[0].preconditioner().factor.dtype == np.float64
+
+
+# ---- from a study file ----------------------------------------------------------------------------------------------------
+
+
+def test_parts_kept_whole_are_not_condensed_where_they_are_too_large(tmp_path, monkeypatch):
+    text = (EXAMPLE / "study.toml").read_text().replace("fixed_interface_modes = 20", 'method = "none"')  # fmt: skip
+    for name in ("blade.inp", "disk.inp"):
+        shutil.copy(EXAMPLE / name, tmp_path)
+    (tmp_path / "study.toml").write_text(text)
+    model = read_study(tmp_path / "study.toml").model()
+    condensed = model.assembled(1)
+    monkeypatch.setattr("stickslip.assembly.build.LARGEST_INTERIOR", 100)
+    whole = model.assembled(1)
+    assert not isinstance(condensed.system.structure, Unreduced)
+    assert isinstance(whole.system.structure, Unreduced)
+    assert relative(whole.static_force, condensed.static_force) < 1e-8
+    sweep = Sweep(
+        omega_range=(2 * np.pi * 1900, 2 * np.pi * 1950), at=(2 * np.pi * 1920,), low=1, high=1, selection="always_high",
+        samples=SAMPLES, evaluator="intervals", peak_points=0, newton=Newton(tolerance=1e-10),
+    )  # fmt: skip
+    found = []
+    for one in (whole, condensed):
+        problem = forced_problem(one.system, one.load, sweep)
+        (point,) = forced_response(one.system, one.load, sweep)
+        assert point.converged
+        found.append(problem.low.linear.recover(point.omega, point.coefficients))
+    assert relative(*found) < 1e-7
 
 
 # ---- what it does not do ------------------------------------------------------------------------------------------------

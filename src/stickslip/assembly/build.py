@@ -27,8 +27,10 @@ from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
 from stickslip.errors import input_error
+from stickslip.harmonic.dynamic_stiffness import LARGEST_INTERIOR
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
@@ -254,7 +256,15 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
         return np.concatenate([part.structure.expand(piece) for part, piece in each])
 
     steady = found.load(few.load(steady))
-    return Linear(structure, gaps, steady, of_dofs, load, of_wave, expand=expand)
+    return Linear(_side(structure, gaps), gaps, steady, of_dofs, load, of_wave, expand=expand)
+
+
+def _side(structure: Structure, gaps: Matrix) -> LinearSide:
+    """Return a structure whose parts are kept whole as it is where it has too many dofs to be condensed."""
+    if structure.is_complex or not scipy.sparse.issparse(structure.stiffness):
+        return structure
+    interior = structure.n - np.unique(gaps.nonzero()[1]).size
+    return Unreduced(structure) if interior > LARGEST_INTERIOR else structure
 
 
 def free_coordinates(model: Model, linear: Linear) -> IntArray | None:

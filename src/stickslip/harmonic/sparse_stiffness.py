@@ -140,9 +140,11 @@ class SparseStiffness:
 
     def output_rows(self, _omega: float, _harmonic: int, dofs: IntArray) -> ComplexArray:
         """Return the (k, n) matrix that takes the motion of `dofs` (k,) out of that of all."""
-        rows = np.zeros((dofs.size, self.n), dtype=complex)
-        rows[np.arange(dofs.size), dofs] = 1.0
-        return rows
+        rows = scipy.sparse.csr_array(
+            (np.ones(dofs.size, dtype=complex), (np.arange(dofs.size), dofs)),
+            shape=(dofs.size, self.n),
+        )
+        return np.asarray(as_array(rows))
 
     def strain_energy(self, _omega: float, q: ComplexArray) -> FloatArray:
         """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
