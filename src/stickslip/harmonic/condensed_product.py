@@ -72,7 +72,7 @@ class CondensedProduct:
     def product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of ``Z q`` for the `rows` of q."""
         s = self.frequencies
-        moved = _solve_inner(self.inner, dynamic_rows(_onto(self.linear, rows), s))
+        moved = _solve_inner(self.inner, dynamic_rows(onto_interior(self.linear, rows), s))
         return dynamic_rows(_near(self.linear, rows), s) - dynamic_rows(
             _back(self.linear, moved), s
         )
@@ -97,7 +97,7 @@ class CondensedProduct:
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ``Z q`` and ``∂Z/∂ω q``."""
         s = self.frequencies
-        near, far = _near(self.linear, rows), _onto(self.linear, rows)
+        near, far = _near(self.linear, rows), onto_interior(self.linear, rows)
         moved = _solve_inner(self.inner, dynamic_rows(far, s))
         back = _back(self.linear, moved)
         turned = _solve_inner(
@@ -256,7 +256,7 @@ def _near(linear: Interior, rows: FloatArray) -> Lossy:
     return stiff, rows @ (c if linear.ln is None else c.T), inert, loss
 
 
-def _onto(linear: Interior, rows: FloatArray) -> Lossy:
+def onto_interior(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products from retained coordinates to the interior."""
     k, c, m = linear.far
     loss = None if linear.loss is None else rows @ linear.loss[1]

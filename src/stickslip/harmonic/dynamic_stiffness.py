@@ -15,7 +15,7 @@ import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
+from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency, onto_interior
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
@@ -201,12 +201,21 @@ class CondensedStiffness:
     def _inside(self, omega: float, q: ComplexArray, f_l: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_interior) modal coordinates of the interior."""
         s = (np.arange(q.shape[0]) * omega)[:, None, None]
-        right = f_l[:, :, None] - self._back(s)[0].transpose(0, 2, 1) @ q[:, :, None]
+        right = (f_l - self._onto(s[:, 0], q))[:, :, None]
         states = self.spectral.states if np.any(s) else None
         if states is None:
             return self._solve_interior(s, right)[:, :, 0]
         each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
         return np.array([states.solve(p, own) for p, own in each])
+
+    def _onto(self, s: FloatArray, q: ComplexArray) -> ComplexArray:
+        """Return the (H+1, n_interior) forces of retained coordinates `q` on the interior; matrices of each harmonic are not formed."""
+        k, c, m, loss = onto_interior(self.spectral, np.concatenate([q.real, q.imag]))
+        size, twice = len(q), np.concatenate([s, s])
+        even, odd = k - twice**2 * m, twice * c
+        if loss is not None:
+            odd += (twice != 0.0) * loss
+        return np.asarray((even[:size] - odd[size:]) + 1j * (even[size:] + odd[:size]))
 
     def modal_loads(self, order: int) -> tuple[ComplexArray, ComplexArray]:
         """Return the load on the retained coordinates (H+1, n) and on the modes of the interior (H+1, l), N."""
