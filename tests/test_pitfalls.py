@@ -7,6 +7,8 @@ the condensation by one eigendecomposition in `test_dynamic_stiffness`, precondi
 `test_solve_correctors`.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import SLIP, STICK, balance_of, bonded, lifting, table
@@ -23,7 +25,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_point
 from stickslip.response.forced.response import Sweep, forced_problem
-from stickslip.response.free_motion import drift
+from stickslip.response.free_motion import SINGULAR, as_array, by_products, drift
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.newton_method import Newton, newton
@@ -216,3 +218,27 @@ def test_free_damper():
     assert "xD" in found[0.0][1].coordinate
     assert found[1e-4][0] is Status.CONVERGED
     assert not found[1e-4][1].undetermined
+
+
+@pytest.mark.parametrize("retention", [0.0, 1e-12, 1e-7])
+def test_free_damper_by_products(retention):
+    # the same question asked of the products: thousands of contacts leave no room for the array
+    system, load = rubbing(retention)
+    balance = forced_problem(
+        system, load, Sweep(omega_range=(0.8, 1.2), selection="always_high", high=3)
+    ).low
+    q = np.zeros((4, system.retained.size), dtype=complex)
+    q[1, 0] = 0.1 / (1.0 - 0.9**2 + 0.02j * 0.9)
+    jac = (
+        replace(balance, jacobian="structured")
+        .linearise(balance.unknowns(q[:, -balance.linear.n :]), 0.9)
+        .jac
+    )
+    ratio, vector = as_array(jac.dense())
+    found = by_products(jac)
+    if retention == 0.0:
+        assert ratio < SINGULAR
+        assert found is None or found[0] < SINGULAR
+    else:
+        assert found[0] == pytest.approx(ratio, rel=0.01)
+        assert abs(found[1] @ vector) > 0.999

@@ -4,15 +4,26 @@ A contact that slips or opens in every cycle forgets its mean position. When all
 normal spring holds may drift: the Jacobian is singular, and the static part of the solution along them means nothing.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.structured import StructuredJacobian
+from stickslip.operators import Jacobian
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.solve.krylov import Krylov
+
+Held = tuple[float, FloatArray]  # smallest over largest singular value, and vector of the smallest
+Product = Callable[[FloatArray], FloatArray]
 
 STEPS = 12  # of each iteration: a vector that nothing holds appears in two or three
+SETTLED = 0.01  # relative change of a singular value at which they end
+MANY = 2000  # unknowns from which products are cheaper than an array's factors
 SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian below which a coordinate counts as undetermined
 
 
@@ -48,37 +59,76 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
         A point of the response, converged or not.
     """
     balance = problem.balance(point.support)
-    jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).dense_jac()
-    # balance rows and columns first: translations and rotations differ by orders of magnitude
-    scale = np.sqrt(np.maximum(np.max(np.abs(jac), axis=0), np.finfo(float).tiny))
-    ratio, held_least = _least_held(jac / scale[:, None] / scale[None, :])
+    at = balance.linearise(balance.unknowns(point.coefficients), point.omega)
+    jac = at.jac
+    found = None
+    if isinstance(jac, StructuredJacobian) and jac.shape[0] >= MANY:
+        found = by_products(jac)
+    ratio, held_least = as_array(at.dense_jac()) if found is None else found
     labels = problem.system.retained_labels
     worst = int(np.argmax(np.abs(held_least)))
     return Drift(ratio, labels[worst % len(labels)])
 
 
-def _least_held(matrix: FloatArray) -> tuple[float, FloatArray]:
-    """Return the smallest over the largest singular value, and the vector of the smallest, by iterations on one LU factorisation.
+def as_array(jac: FloatArray) -> Held:
+    """Find the smallest over the largest singular value, and the vector of the smallest, by iterations on one LU factorisation.
 
-    All singular values of the Jacobian of a mistuned wheel would take longer than its response.
+    Rows and columns are balanced first: translations and rotations differ by orders of magnitude.
     """
+    scale = np.sqrt(np.maximum(np.max(np.abs(jac), axis=0), np.finfo(float).tiny))
+    matrix = jac / scale[:, None] / scale[None, :]
+    matrix /= np.max(np.abs(matrix))
     rng = np.random.default_rng(0)
-    matrix = matrix / np.max(np.abs(matrix))
-    large: FloatArray = rng.standard_normal(len(matrix))
-    largest = inverse = 0.0
-    for _ in range(STEPS):
-        large, _ = _unit(matrix @ large)
-        large, largest = _unit(matrix.T @ large)
+    first, second = rng.standard_normal((2, len(matrix)))
+    largest, _ = _largest(matrix.__matmul__, matrix.T.__matmul__, first)
     lu, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
     tiny = np.finfo(float).eps * largest
     diagonal = np.einsum("ii->i", lu)
     # a singular matrix is told by its vector, not by a division by zero
     diagonal[np.abs(diagonal) < tiny] = tiny
-    small: FloatArray = rng.standard_normal(len(matrix))
-    for _ in range(STEPS):
-        small, _ = _unit(scipy.linalg.lu_solve((lu, pivots), small, trans=1))
-        small, inverse = _unit(scipy.linalg.lu_solve((lu, pivots), small))
+    solve = partial(scipy.linalg.lu_solve, (lu, pivots))
+    inverse, small = _largest(partial(solve, trans=1), solve, second)
     return 1.0 / (inverse * largest), small
+
+
+def by_products(jac: StructuredJacobian) -> Held | None:
+    """Find the same without the array, for which thousands of contacts leave no room; None where an iteration does not converge.
+
+    A coordinate is balanced in each harmonic by what couples it within.
+    """
+    most = [abs(block).max(axis=0) for _, block in jac.own_blocks()]
+    own = np.array([a.toarray().ravel() if scipy.sparse.issparse(a) else a for a in most])
+    scale = np.sqrt(np.maximum(np.repeat(own, 2, axis=0)[1:], np.finfo(float).tiny)).ravel()
+    krylov = Krylov()
+
+    def solve(matrix: Jacobian, right: FloatArray) -> FloatArray:
+        found = krylov.solve(matrix, scale * right)
+        if found is None:
+            raise np.linalg.LinAlgError
+        return np.asarray(scale * found)
+
+    rng = np.random.default_rng(0)
+    first, second = rng.standard_normal((2, scale.size))
+    largest, _ = _largest(
+        lambda v: jac.matvec(v / scale) / scale, lambda v: jac.rmatvec(v / scale) / scale, first
+    )
+    try:
+        inverse, small = _largest(partial(solve, jac.transposed), partial(solve, jac), second)
+    except np.linalg.LinAlgError:
+        return None
+    return 1.0 / (inverse * largest), small
+
+
+def _largest(first: Product, second: Product, vector: FloatArray) -> Held:
+    """Return the largest singular value of the product `second` after `first`, and its vector."""
+    value = 0.0
+    for _ in range(STEPS):
+        before = value
+        vector, _ = _unit(first(vector))
+        vector, value = _unit(second(vector))
+        if abs(value - before) <= SETTLED * value:
+            break
+    return value, vector
 
 
 def _unit(vector: FloatArray) -> tuple[FloatArray, float]:
