@@ -31,35 +31,46 @@ FAST = (
 
 @dataclass(frozen=True, eq=False)
 class ModeTerms:
-    """Sum over modes: real, ``Z = Σ_k P_k p^k - left diag(w(p)) right``, ``w = p² (κ + p)² / d`` with ``d = 1 + p c + p² m``."""
+    """Sum over modes: real, ``Z = Σ_k P_k p^k - left diag(w(p)) right``, ``w = v² / d`` with ``v = p (κ + p)`` and ``d = 1 + p c + p² m``.
+
+    Their derivatives are ``dw/dp = v q / d²`` with ``q = 2 κ + (4 + κ c) p + 3 c p² + 2 m p³``, and ``d(v/d)/dp = r / d²`` with
+    ``r = κ + 2 p + (c - κ m) p²``.
+    """
 
     left: FloatArray  # (n, J)
     right: FloatArray  # (J, n)
     polynomial: FloatArray  # (4, n, n) P
-    direct: FloatArray  # (n, l); the load takes ``left diag(v(p)) source + p direct f_L``
-    ratio: ComplexArray  # (l,) κ; real numbers kept as complex ones, which `p` is multiplied by in a third of the time
-    damping: ComplexArray  # (l,)
-    mass: ComplexArray  # (l,)
+    direct: FloatArray  # (n, l); the load takes ``left diag(v / d) source + p direct f_L``
+    ratio: FloatArray  # (l,) κ
+    damping: FloatArray  # (l,) c
+    mass: FloatArray  # (l,) m
     symmetric: bool = True
 
-    def weights(self, p: ComplexArray) -> ComplexArray:
-        """Return w and dw/dp, (2, H, J), at `p` (H, 1)."""
-        inverse, rate = self._inverse_and_rate(p)
-        v = p * (self.ratio + p)
-        w = v * v * inverse
-        return np.array([w, v * inverse * (2.0 * (self.ratio + 2.0 * p) - v * rate)])
+    def weights(self, powers: ComplexArray) -> ComplexArray:
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p."""
+        d, v, q, _ = powers @ self._coefficients
+        inverse = 1.0 / d
+        over = v * inverse
+        return np.array([v * over, q * inverse * over])
 
-    def load_weights(self, p: ComplexArray) -> ComplexArray:
-        """Return v and dv/dp, (2, H, J), at `p` (H, 1)."""
-        inverse, rate = self._inverse_and_rate(p)
-        v = p * (self.ratio + p) * inverse
-        return np.array([v, (self.ratio + 2.0 * p) * inverse - v * rate])
+    def load_weights(self, powers: ComplexArray) -> ComplexArray:
+        """Return v / d and its derivative by p, (2, H, J), at the `powers` (H, 4) of p."""
+        d, v, _, r = powers @ self._coefficients
+        inverse = 1.0 / d
+        return np.array([v * inverse, r * inverse * inverse])
 
-    def _inverse_and_rate(self, p: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return 1 / d and its negative derivative by p over itself."""
-        scaled = p * self.mass
-        inverse = 1.0 / (1.0 + p * (self.damping + scaled))
-        return inverse, (self.damping + 2.0 * scaled) * inverse
+    @cached_property
+    def _coefficients(self) -> ComplexArray:
+        """(4, 4, J) coefficients of the powers of p in d, v, q and r."""
+        kappa, c, m = self.ratio, self.damping, self.mass
+        none, one = np.zeros_like(c), np.ones_like(c)
+        rows = (
+            (one, c, m, none),
+            (none, kappa, one, none),
+            (2.0 * kappa, 4.0 + kappa * c, 3.0 * c, 2.0 * m),
+            (kappa, 2.0 * one, c - kappa * m, none),
+        )
+        return np.array(rows, dtype=complex)  # as `powers` are, or each product would make it so
 
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
@@ -72,9 +83,9 @@ class ModeTerms:
         residues = (self.left[rows] * self.left[columns]).T
         return np.concatenate([self.polynomial[:, rows, columns], -residues])
 
-    def on_table(self, p: ComplexArray) -> ComplexArray:
+    def on_table(self, powers: ComplexArray) -> ComplexArray:
         """Return the `weights` of the rows of `table` beyond the polynomial."""
-        return self.weights(p)
+        return self.weights(powers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +121,16 @@ class Poles:
     states: StateSpace
     symmetric: bool
 
-    def weights(self, p: ComplexArray) -> ComplexArray:
-        """Return w and dw/dp, (2, H, J), at `p` (H, 1)."""
+    def weights(self, powers: ComplexArray) -> ComplexArray:
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p."""
+        p = powers[:, 1:2]
         e = 1.0 / (1.0 - p * self.states.nu)
         w = np.where(self.power == 2, p**4, p * p) * e
         return np.array([w, w * (2.0 * self.power / p + self.states.nu * e)])
 
-    def load_weights(self, p: ComplexArray) -> ComplexArray:
-        """Return ``v = p^a / (1 - p ν)`` and dv/dp, (2, H, J), at `p` (H, 1)."""
+    def load_weights(self, powers: ComplexArray) -> ComplexArray:
+        """Return ``v = p^a / (1 - p ν)`` and dv/dp, (2, H, J), at the `powers` (H, 4) of p."""
+        p = powers[:, 1:2]
         e = 1.0 / (1.0 - p * self.states.nu)
         v = np.where(self.power == 2, p * p, p) * e
         return np.array([v, v * (self.power / p + self.states.nu * e)])
@@ -140,11 +153,12 @@ class Poles:
         polynomial = self.polynomial[:, rows, columns]
         return np.concatenate([polynomial, -own, -2.0 * paired.real, 2.0 * turned.real])
 
-    def on_table(self, p: ComplexArray) -> ComplexArray:
+    def on_table(self, powers: ComplexArray) -> ComplexArray:
         """Return what the `weights` are for the rows of `table` beyond the polynomial.
 
         A pair of poles adds up to ``g (2 Re R - 2 p Re(ν* R))`` with ``g = p^2a / (1 - 2 p Re ν + p² |ν|²)``.
         """
+        p = powers[:, 1:2]
         fast, sums, size, twice = self._denominators
         x, own = p.imag * size, fast.size
         inverse = 1.0 / np.subtract((1.0 - x) * (1.0 + x), p * sums, dtype=complex)
@@ -284,8 +298,8 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
         return None
     polynomial = np.concatenate([whole, np.zeros((1, *whole.shape[1:]))])
     return ModeTerms(
-        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio.astype(complex),
-        np.diagonal(ll[1]).astype(complex), np.diagonal(ll[2]).astype(complex),
+        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio,
+        np.diagonal(ll[1]), np.diagonal(ll[2]),
     )  # fmt: skip
 
 
@@ -351,30 +365,32 @@ def summed(
     p = omega * rate
     matrices = np.empty((2, order + 1, n, n), dtype=complex)
     matrices[0, 0], matrices[1, 0] = terms.polynomial[0], 0.0
-    _fill(terms, p, rate, matrices[:, 1:])
+    powers = _powers(p)
+    _fill(terms, powers, rate, matrices[:, 1:])
     loads = np.zeros((2, order + 1, n), dtype=complex)
     loaded = min(order + 1, len(source))
     if loaded > 1:
         own, p = loads[:, 1:loaded], p[: loaded - 1]
-        np.matmul(terms.load_weights(p) * -source[1:loaded], terms.left.T, out=own)
+        weights = terms.load_weights(powers[0, : loaded - 1])
+        np.matmul(weights * -source[1:loaded], terms.left.T, out=own)
         own[0] -= p * direct[1:loaded]
         own[1] -= direct[1:loaded]
         own[1] *= rate[: loaded - 1]
     return matrices, loads
 
 
-def _fill(terms: Terms, p: ComplexArray, rate: ComplexArray, out: ComplexArray) -> None:
-    """Write ``Σ_k P_k p^k - Σ w R`` and `rate` times its derivative by `p` (H, 1) to `out` (2, H, n, n)."""
+def _fill(terms: Terms, powers: ComplexArray, rate: ComplexArray, out: ComplexArray) -> None:
+    """Write ``Σ_k P_k p^k - Σ w R`` and `rate` (H, 1) times its derivative by p to `out` (2, H, n, n), from the `_powers` of p."""
     n, size = terms.left.shape
     if not terms.symmetric or size * n * (n + 1) / 2 > LARGEST_TABLE:
-        weights = terms.weights(p)
-        scaled = (terms.left * weights[:, :, None]).reshape(2 * p.size * n, size)
+        weights = terms.weights(powers[0])
+        scaled = (terms.left * weights[:, :, None]).reshape(2 * rate.size * n, size)
         products = (scaled @ terms.right).reshape(out.shape)
-        polynomial = _powers(p) @ terms.polynomial.reshape(4, -1)
+        polynomial = powers @ terms.polynomial.reshape(4, -1)
         np.subtract(polynomial.reshape(out.shape), products, out)
         out[1] *= rate[:, :, None]
         return
-    weights = np.concatenate([_powers(p), terms.on_table(p)], axis=2)
+    weights = np.concatenate([powers, terms.on_table(powers[0])], axis=2)
     weights[1] *= rate
     rows = np.array([weights.real, weights.imag]).reshape(-1, 4 + size)
     full = (rows @ terms.table).take(_places(n), axis=1).reshape(2, *out.shape)
