@@ -15,7 +15,8 @@ from stickslip.harmonic import spectral
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
-from stickslip.harmonic.spectral import ModeTerms, Poles, StateSpace
+from stickslip.harmonic.spectral import ModeTerms, Poles
+from stickslip.harmonic.state_space import StateSpace
 from stickslip.harmonic.structured import real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.matrices import lumped
