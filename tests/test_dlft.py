@@ -24,7 +24,7 @@ from stickslip.harmonic.rigid_jacobian import RigidJacobian
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.krylov import Automatic, Krylov
+from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton, newton
 
 TWO_MASSES = lumped(
@@ -127,7 +127,7 @@ def test_products_of_the_jacobian_are_those_of_the_array(seed, size, made):
 @pytest.mark.parametrize("made", [mixed, lambda: pressed(7, 64), lambda: rubbing(7, 64)])
 def test_newton_by_products_finds_the_same_motion(made):
     problem, krylov = made(), Krylov()
-    options = Newton(max_iterations=100, tolerance=1e-12, linear=Automatic(krylov=krylov))
+    options = Newton(max_iterations=100, tolerance=1e-12, linear=krylov)
     expected, _ = solution(problem, 1.5)
     for order in (
         problem.order,

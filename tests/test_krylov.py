@@ -15,6 +15,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
 from stickslip.errors import InputError
 from stickslip.harmonic import balance as balance_module
+from stickslip.harmonic import matrix_products as matrix_products_module
 from stickslip.harmonic import shared_factor as shared_factor_module
 from stickslip.harmonic import structured as structured_module
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
@@ -373,6 +374,7 @@ def test_preconditioner_holds_all_below_the_harmonics(relative):
 @pytest.fixture
 def shared(monkeypatch):
     monkeypatch.setattr(structured_module, "SHARED", 0)
+    monkeypatch.setattr(matrix_products_module, "SMALL", 0)  # small matrices are not formed
     monkeypatch.setattr(shared_factor_module, "REACH", 0.0)  # as many modes as there may be
 
 
@@ -424,6 +426,7 @@ def test_transposed_system_takes_the_shared_factor(name, shared):
 
 def test_harmonics_above_all_modes_have_factors_of_their_own(monkeypatch):
     monkeypatch.setattr(structured_module, "SHARED", 0)
+    monkeypatch.setattr(matrix_products_module, "SMALL", 0)
     balance, x = state("lift-off")  # the third harmonic is above a quarter of the modes
     kept = balance.linearise(x, OMEGA).jac.preconditioner()
     assert isinstance(kept, HarmonicFactors)
@@ -674,11 +677,9 @@ def test_harmonic_without_stiffness_has_no_preconditioner():
     balance, x = state("stick")
     at = balance.linearise(x, OMEGA)
     loose = replace(at.jac, blocks=np.zeros_like(at.jac.blocks))
-    nothing = (np.zeros((balance.linear.n,) * 2),) * 3
-    linear = replace(
-        loose.linear,
-        linear=replace(loose.linear.linear, nn=nothing, nl=tuple(0 * a for a in balance.linear.nl)),
-    )
+    matrices = loose.linear.condensed
+    nothing = replace(matrices, stiffness=np.zeros_like(matrices.stiffness))
+    linear = replace(loose.linear, condensed=nothing)
     krylov = Krylov()
     assert krylov.solve(replace(loose, linear=linear), at.residual) is None
     assert krylov.counts.failures == 1
@@ -736,28 +737,31 @@ def priced(monkeypatch, product: float, array: float) -> None:
     """Let systems cost what a test wants."""
     costs = Costs(product, 0.0, array)
     monkeypatch.setattr(structured_module, "linear_costs", lambda *_: costs)
+    monkeypatch.setattr(structured_module, "reduced_cost", lambda *_, **__: np.inf)
 
 
 def test_what_costs_more_by_products_is_factorised_for_a_while(monkeypatch):
     balance, x = state("gross slip")
-    at = balance.linearise(x, OMEGA)
     right = np.random.default_rng(0).standard_normal(balance.size)
-    exact = np.linalg.solve(at.jac.dense(), right)
-    dear, automatic = [], Automatic()
-    priced(monkeypatch, 1.0, 1.5)
+    exact = np.linalg.solve(balance.linearise(x, OMEGA).jac.dense(), right)
+    dear, automatic = [], Automatic(krylov=Krylov(tolerance=1e-13))
+    priced(monkeypatch, 1.0, 13.0)
+    at = balance.linearise(x, OMEGA)
     for _ in range(20):
         before = automatic.krylov.counts.systems
         found = automatic.solve(at.jac, right)
         dear.append(automatic.krylov.counts.systems > before)
         if not dear[-1]:
             assert_same(found, exact, 1e-9)
-    # products are tried once, and again after a longer while
-    assert np.flatnonzero(dear).tolist() == [0, 5, 14]
-    priced(monkeypatch, 1.0, 1000.0)
-    automatic = Automatic()
-    for _ in range(10):
-        automatic.solve(at.jac, right)
-    assert automatic.krylov.counts.systems == 10
+    # products are tried until they owe an array, and again after a longer while
+    assert np.flatnonzero(dear).tolist() == [0, 1, 6, 7, 16, 17]
+    # where few unknowns are left, products are not tried, and where they cost much less, nothing else
+    for array, tried in ((1.0, 0), (1000.0, 10)):
+        priced(monkeypatch, 1.0, array)
+        automatic = Automatic()
+        for _ in range(10):
+            assert_same(automatic.solve(balance.linearise(x, OMEGA).jac, right), exact, 0.1)
+        assert automatic.krylov.counts.systems == tried
 
 
 def test_what_a_krylov_method_does_not_solve_is_factorised():

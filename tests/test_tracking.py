@@ -28,7 +28,7 @@ from stickslip.response.parameter import (
 from stickslip.response.resonances.tracking import smallest_peak, track_peak
 from stickslip.response.system import System
 from stickslip.solve.continuation import start_point, trace
-from stickslip.solve.krylov import Automatic, Krylov
+from stickslip.solve.krylov import Krylov
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import Newton, newton
 
@@ -243,7 +243,7 @@ def test_many_unknowns_are_tracked_by_products_as_by_arrays(by, monkeypatch):
     monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     assert how.balance(system, load, NONE).structured
     krylov = Krylov()
-    how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))
+    how = replace(how, newton=Newton(linear=krylov))
     products = list(track_peak(system, load, "mu", values, (0.8, 1.6), by, discretisation=how))
     assert krylov.counts.products > 0
     for one, other in zip(products, arrays, strict=True):

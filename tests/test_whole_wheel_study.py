@@ -22,7 +22,7 @@ from stickslip.model.deck import write_deck
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
-from stickslip.solve.krylov import Automatic, Krylov
+from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study
 
@@ -175,7 +175,7 @@ def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatc
     assert all(point.converged and point.is_maximum for point in arrays)
     krylov = Krylov()
     monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
-    how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))
+    how = replace(how, newton=Newton(linear=krylov))
     products = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
     assert krylov.counts.products > 0
     for one, other in zip(arrays, products, strict=True):

@@ -7,6 +7,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 
+# a Newton iteration: its systems by LU, those by a Krylov method, which leaves a hundredth of the residual, and the products of one of these
+BY_ARRAY, BY_PRODUCTS, PRODUCTS = 4, 6, 8
+FEW = 500  # unknowns up to which a whole array is had without asking what it costs
+
 
 class JacobianOperator(Protocol):
     """A Jacobian that is known by its products."""
@@ -33,12 +37,17 @@ class Costs:
     factors
         A new preconditioner.
     array
-        The matrix put together and factorised.
+        The matrix put together and factorised, or what is left of it without the unknowns that are easily solved for.
     """
 
     product: float
     factors: float
     array: float
+
+    @property
+    def products_pay(self) -> bool:
+        """Whether a Newton iteration costs less by products than by arrays, where few contacts slip."""
+        return self.factors + BY_PRODUCTS * PRODUCTS * self.product < BY_ARRAY * self.array
 
 
 Jacobian = FloatArray | JacobianOperator
@@ -50,6 +59,38 @@ class Inverse(Protocol):
 
     def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray | None:
         """Return the solution for the right side (n,), of the transposed system where that is asked for; None if there is none."""
+        ...
+
+
+class Elimination(Protocol):
+    """What is left of a square matrix J of some unknowns after those are eliminated that are easily solved for.
+
+    With these R and the others A it is ``S = J_AA - J_AR J_RR⁻¹ J_RA``. ``J x = b`` is solved by ``S x_A = b_A - J_AR J_RR⁻¹ b_R``. A transposed
+    system is eliminated alike, in the same unknowns.
+    """
+
+    @property
+    def size(self) -> int:
+        """Unknowns that are left."""
+        ...
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of J_RR."""
+        ...
+
+    def array(self) -> FloatArray:
+        """Return S, (size, size), as a new array in Fortran order."""
+        ...
+
+    def reduced(
+        self, right: FloatArray, *, transposed: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the right sides (size, j) that are left of `right` (n, j), and ``J_RR⁻¹ b_R`` (n, j), zero at what is left."""
+        ...
+
+    def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Return ``x_A`` and ``-J_RR⁻¹ J_RA x_A``, (n, j), of what is left, (size, j)."""
         ...
 
 

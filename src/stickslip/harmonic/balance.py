@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Literal, get_args
 
@@ -12,16 +12,16 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.compiled import CompiledContacts
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.event_integrals import Events
-from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
+from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
 from stickslip.harmonic.costs import linear_costs, products_pay
-from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.linear import DynamicStiffness, Products
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.matrix_products import matrices, products
 from stickslip.harmonic.sparse_stiffness import SparseStiffness
-from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+from stickslip.harmonic.structured import StructuredJacobian, real_form
 from stickslip.harmonic.support import (
     Harmonics,
     complex_rows,
@@ -36,6 +36,8 @@ from stickslip.harmonic.vector_forces import (
     mass_damping_slope,
 )
 from stickslip.operators import Costs
+
+REDUCED = 250  # unknowns from which leaving out what rests can cost less than the whole array
 
 JacobianForm = Literal["auto", "dense", "structured"]
 
@@ -63,27 +65,6 @@ class Linearisation:
     def dense_jac(self) -> FloatArray:
         """Return the Jacobian as an array."""
         return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
-
-
-@dataclass(frozen=True, eq=False)
-class _LinearPart:
-    condensed: Condensed  # of the harmonics kept
-    matrix: FloatArray  # (n m, n m) real form of the block-diagonal dynamic stiffness
-    load: FloatArray  # (n m,)
-
-
-@lru_cache(maxsize=4)
-def _linear_part(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> _LinearPart:
-    """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
-    part = linear.condensed(omega, harmonics[-1])
-    if not is_full(harmonics):
-        part = part.kept(list(harmonics))
-    return _LinearPart(part, real_matrix(part.stiffness), to_real(part.load).reshape(-1))
-
-
-@lru_cache(maxsize=2)
-def _product(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Products:
-    return linear.products(omega, harmonics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +116,11 @@ class HarmonicBalance:
         contacts = self.compiled.n_contacts * self.compiled.pairs
         sparse = self.linear.entries if isinstance(self.linear, SparseStiffness) else 0
         return linear_costs(self.linear.n, len(self.harmonics), contacts * self.n_rows**2, sparse)
+
+    @cached_property
+    def reduced(self) -> bool:
+        """Whether a Jacobian whose systems are solved as arrays is given by its parts, for the solver to leave out what rests."""
+        return self.jacobian == "auto" and self.order > 0 and self.size >= REDUCED
 
     @cached_property
     def large(self) -> bool:
@@ -201,7 +187,8 @@ class HarmonicBalance:
             by_omega = self._with_forces(slope, period.by_omega)
         else:
             linear = self._linear_force(x, omega)
-            by_x = partial(self._array, omega, period.blocks)
+            own = partial(self._array, omega, period.blocks)
+            by_x = self._parts(omega, period.blocks) if self.reduced else own
             by_omega = partial(self._slope, x, omega, period.by_omega)
         return Linearisation(
             self._with_forces(linear, period.coefficients),
@@ -229,7 +216,7 @@ class HarmonicBalance:
     def linear_residual(self, x: FloatArray, omega: float) -> FloatArray:
         """Return the (size,) scaled residual without the contact forces."""
         if self.large or self.structured:
-            part = _product(self.linear, self.harmonics, omega)
+            part = products(self.linear, self.harmonics, omega)
             q = x.reshape(self.n_rows, -1) * self.displacement_scale
             return (part.product(q) - part.load).reshape(-1) / self.force_scale
         return self._linear_force(x, omega).reshape(-1) / self.force_scale
@@ -254,21 +241,27 @@ class HarmonicBalance:
 
     def _linear_force(self, x: FloatArray, omega: float) -> FloatArray:
         """Return the (m, n) coefficients of the equations without the contact forces, N."""
-        part = _linear_part(self.linear, self.harmonics, omega)
-        force = part.matrix @ (self.displacement_scale * x)
+        part, q = matrices(self.linear, self.harmonics, omega), self.displacement_scale * x
+        if self.reduced:
+            return part.product(q.reshape(self.n_rows, -1)) - part.load
+        force = (real_form(part) @ q).reshape(self.n_rows, -1)
         force -= part.load
-        return force.reshape(self.n_rows, -1)
+        return force
 
     def _array(self, omega: float, blocks: FloatArray) -> FloatArray:
         """Return the (size, size) Jacobian as an array."""
-        factor = self.displacement_scale / self.force_scale
-        jac = factor * _linear_part(self.linear, self.harmonics, omega).matrix
-        add_contact_jacobian(blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac)  # fmt: skip
-        return jac
+        return self._parts(omega, blocks).dense()
+
+    def _parts(self, omega: float, blocks: FloatArray) -> StructuredJacobian:
+        """Return the Jacobian by its parts."""
+        part = matrices(self.linear, self.harmonics, omega)
+        return StructuredJacobian(
+            part, blocks, self.rows, self.displacement_scale / self.force_scale
+        )
 
     def _slope(self, x: FloatArray, omega: float, contacts: FloatArray | None) -> FloatArray:
         """Return the (size,) derivative of the scaled residual by ω, from that of the contact forces."""
-        part = _linear_part(self.linear, self.harmonics, omega).condensed
+        part = matrices(self.linear, self.harmonics, omega).condensed
         q = to_complex(x.reshape(self.n_rows, self.linear.n)) * self.displacement_scale
         slope = (part.derivative @ q[:, :, None])[..., 0] - part.load_derivative
         return self._with_forces(to_real(slope), contacts)
@@ -277,7 +270,7 @@ class HarmonicBalance:
         self, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
         """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
-        part = _product(self.linear, self.harmonics, omega)
+        part = products(self.linear, self.harmonics, omega)
         q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
         factor = self.displacement_scale / self.force_scale
@@ -286,11 +279,11 @@ class HarmonicBalance:
 
     def linear_load(self, omega: float) -> FloatArray:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
-        return _product(self.linear, self.harmonics, omega).load
+        return products(self.linear, self.harmonics, omega).load
 
     def linear_block(self, omega: float, harmonic: int) -> Matrix:
         """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will; sparse where nothing is condensed."""
-        return _product(self.linear, self.harmonics, omega).block(harmonic)
+        return products(self.linear, self.harmonics, omega).block(harmonic)
 
     def with_order(self, order: int) -> "HarmonicBalance":
         """Return the same problem with harmonics 0..`order`."""

@@ -6,13 +6,11 @@ A motion ``Re sum_h X_h e^{hλt}`` is the power series of one that decays as ``e
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.matrix_products import MatrixProducts
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
 
@@ -73,9 +71,9 @@ class DecayingStiffness:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
         return self.steady.condensed(self._at(omega), order)
 
-    def products(self, omega: float, harmonics: Harmonics) -> "DecayingProducts":
+    def products(self, omega: float, harmonics: Harmonics) -> MatrixProducts:
         """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
-        return DecayingProducts(self.condensed(omega, harmonics[-1]), harmonics)
+        return MatrixProducts(self.condensed(omega, harmonics[-1]).kept(list(harmonics)), harmonics)
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (H+1, n)."""
@@ -96,50 +94,3 @@ class DecayingStiffness:
     def _at(self, omega: float) -> float:
         # all that is asked of it is analytic in the frequency
         return complex(omega, self.rate)  # type: ignore[return-value]
-
-
-@dataclass(frozen=True, eq=False)
-class DecayingProducts:
-    """A condensed structure at a complex frequency, by its products; see `Products`."""
-
-    condensed: Condensed
-    harmonics: Harmonics
-
-    @property
-    def n(self) -> int:
-        """Number of retained coordinates."""
-        return int(self.condensed.load.shape[1])
-
-    @property
-    def load(self) -> FloatArray:
-        """(m, n) load, N."""
-        return to_real(self.condensed.load[list(self.harmonics)])
-
-    @property
-    def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
-        return to_real(self.condensed.load_derivative[list(self.harmonics)])
-
-    def same(self, other: object) -> bool:
-        """Whether `other` has the same dynamic stiffness; loads may differ."""
-        return isinstance(other, DecayingProducts) and other.condensed is self.condensed
-
-    def product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of ``Z q`` for the `rows` of q."""
-        return self._times(self.condensed.stiffness, rows)
-
-    def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z."""
-        return self._times(self.condensed.stiffness.conj().transpose(0, 2, 1), rows)
-
-    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ``Z q`` and ``∂Z/∂ω q``."""
-        return self.product(rows), self._times(self.condensed.derivative, rows)
-
-    def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
-        return np.array(self.condensed.stiffness[harmonic], order="F")
-
-    def _times(self, matrices: ComplexArray, rows: FloatArray) -> FloatArray:
-        product = matrices[list(self.harmonics)] @ to_complex(rows)[:, :, None]
-        return to_real(product[..., 0])

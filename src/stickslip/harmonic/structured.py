@@ -8,6 +8,7 @@ it do at the contacts: block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``, which h
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,7 +23,7 @@ from stickslip.contact.product import (
     subtract_lower,
     sweep,
 )
-from stickslip.harmonic.costs import linear_costs
+from stickslip.harmonic.costs import linear_costs, reduced_cost
 from stickslip.harmonic.factors import (
     AnyFactors,
     as_array,
@@ -31,6 +32,14 @@ from stickslip.harmonic.factors import (
     with_contacts,
 )
 from stickslip.harmonic.linear import Shareable, StiffnessProducts
+from stickslip.harmonic.matrix_products import MatrixProducts
+from stickslip.harmonic.resting import (
+    Coupling,
+    Resting,
+    TransposedElimination,
+    coupling,
+    known,
+)
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
 from stickslip.harmonic.small_blocks import (
     SMALL,
@@ -41,6 +50,7 @@ from stickslip.harmonic.small_blocks import (
 from stickslip.harmonic.sparse_product import SparseProduct
 from stickslip.operators import Costs, JacobianOperator
 
+KEPT = 1000  # unknowns up to which the array of a dynamic stiffness is kept
 SHARED = 150  # unknowns a harmonic from which one factor for all harmonics costs less than one each
 
 Solve = Callable[[FloatArray], FloatArray]
@@ -137,18 +147,40 @@ class StructuredJacobian:
         """Its transpose."""
         return Transposed(self)
 
-    @property
+    @cached_property
+    def coupling(self) -> Coupling:
+        """Which contact forces couple harmonics."""
+        return coupling(self.blocks, self.rows, self.linear.n)
+
+    @cached_property
     def costs(self) -> Costs:
         """What its linear systems cost."""
-        sparse = self.linear.entries if isinstance(self.linear, SparseProduct) else 0
-        return linear_costs(self.linear.n, len(self.linear.harmonics), self.blocks.size, sparse)
+        n, harmonics = self.linear.n, len(self.linear.harmonics)
+        if isinstance(self.linear, SparseProduct):
+            return linear_costs(n, harmonics, self.blocks.size, self.linear.entries)
+        own = linear_costs(n, harmonics, self.blocks.size)
+        return Costs(own.product, own.factors, min(own.array, self._reduced_cost))
+
+    @cached_property
+    def _reduced_cost(self) -> float:
+        """What one costs that is solved by an array without what rests."""
+        rested = known(self.linear, self.rows).knows(self.coupling, self.scale)
+        return reduced_cost(self.linear.n, self.coupling.counts, known=rested)
+
+    def eliminated(self) -> Resting | None:
+        """Return what is left without the unknowns that contacts at rest do not couple; None where that costs as much as the whole array."""
+        if isinstance(self.linear, SparseProduct) or self.costs.array < self._reduced_cost:
+            return None
+        return known(self.linear, self.rows).without_resting(self.coupling, self.rows, self.scale)
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
-        n = self.linear.n
-        jac = self.scale * real_matrix(
-            [as_array(self.linear.block(h)) for h in self.linear.harmonics]
-        )
+        n, linear = self.linear.n, self.linear
+        if isinstance(linear, MatrixProducts) and self.shape[0] <= KEPT:
+            jac = self.scale * real_form(linear)
+        else:
+            jac = real_matrix([as_array(linear.block(h)) for h in linear.harmonics])
+            jac *= self.scale
         add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
         return jac
 
@@ -312,6 +344,13 @@ class Transposed:
         """What its linear systems cost."""
         return self.transposed.costs
 
+    def eliminated(self) -> TransposedElimination | None:
+        """Return what is left without the unknowns that contacts at rest do not couple."""
+        if not isinstance(self.transposed, StructuredJacobian):
+            return None
+        own = self.transposed.eliminated()
+        return None if own is None else TransposedElimination(own)
+
     def dense(self) -> FloatArray:
         """Return it as an array."""
         return self.transposed.dense().T
@@ -344,3 +383,9 @@ def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
     np.einsum("hihj->hij", columns[sin, :, cos])[:] = each[1:].imag
     np.einsum("hihj->hij", columns[cos, :, sin])[:] = -each[1:].imag
     return columns.reshape(m * n, m * n).T
+
+
+@lru_cache(maxsize=4)
+def real_form(linear: MatrixProducts) -> FloatArray:
+    """Return the real form of the dynamic stiffness at one frequency, N/m; kept, because a Newton iteration at fixed frequency asks for it at every step."""
+    return real_matrix(linear.condensed.stiffness)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -19,12 +20,13 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import JacobianForm, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.resting import known
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping, integrate
-from stickslip.solve.krylov import Automatic
+from stickslip.solve.krylov import Automatic, Krylov
 
 SPRING = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5, preload=1.0)
 PLANAR = CoupledCoulomb(k_t=1.0, k_n=1.0, mu=0.5, preload=1.0)
@@ -124,5 +126,10 @@ def _balanced(jacobian: JacobianForm) -> None:
         Automatic().solve(here.jac, here.residual)
         if isinstance(here.jac, StructuredJacobian):
             here.jac.dense()
+            slipping = replace(here.jac, blocks=np.ones_like(here.jac.blocks))
+            known(here.jac.linear, here.jac.rows).without_resting(
+                slipping.coupling, slipping.rows, slipping.scale
+            ).array()
             here.jac.matvec(here.residual)
-            Automatic().solve(here.jac.transposed, here.residual)
+            Krylov().solve(here.jac, here.residual)
+            Krylov().solve(here.jac.transposed, here.residual)

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.operators import Jacobian, array_of
-from stickslip.solve.linear import LinearSolver, solve_with
+from stickslip.operators import Jacobian
+from stickslip.solve.linear import LinearSolver, solve_with, whole_array
 from stickslip.solve.status import Status
 
 EPS = float(np.finfo(float).eps)
@@ -125,7 +125,7 @@ def column_scale(jac: Jacobian, before: FloatArray | None) -> FloatArray:
 
 
 def _column_squares(jac: Jacobian) -> FloatArray:
-    array = array_of(jac)
+    array = whole_array(jac)
     return np.ones(jac.shape[1]) if array is None else np.einsum("ij,ij->j", array, array)
 
 

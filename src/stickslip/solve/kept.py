@@ -11,10 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.operators import Bordered, Inverse, Jacobian
+from stickslip.operators import Inverse
+from stickslip.solve.eliminated import Reduced
+from stickslip.solve.factors import Factored
 from stickslip.solve.iterate import Globalisation, Iterate, Work
 from stickslip.solve.line_search import MEMORY, LineSearch
-from stickslip.solve.linear import Factored, factorised
+from stickslip.solve.linear import Signed, factorised, is_factorised
 from stickslip.solve.status import Status
 
 SMALLER = 0.5  # part of a correction that the next one by the same factors may be
@@ -30,7 +32,7 @@ class KeptFactors:
     tolerance
         Of the corrector: corrections end where the residual is as small.
     then
-        What goes on after a few refused trials, or where the Jacobian is no array; None: the correction is given up after them, for a shorter step along
+        What goes on after a few refused trials, or where the Jacobian is not factorised; None: the correction is given up after them, for a shorter step along
         a branch costs less.
     known
         Factors of a Jacobian nearby, which are tried first.
@@ -42,9 +44,9 @@ class KeptFactors:
     """
 
     def __init__(
-        self, tolerance: float, then: Globalisation | None = None, known: Factored | None = None
+        self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None
     ) -> None:
-        self.inverse: Factored | None = None
+        self.inverse: Signed | None = None
         self._known = known
         self._tolerance = tolerance
         self._then = then
@@ -61,7 +63,7 @@ class KeptFactors:
             trial = work.at(now.x + step)
             if trial.norm < now.norm:
                 return self._corrected(work, known, step, trial)
-        if self._over or not _is_array(now.at.jac):
+        if self._over or not is_factorised(now.at.jac):
             self._then = self._then or LineSearch()
             return self._then.advance(work, now)
         self._norms = [*self._norms[1 - MEMORY :], now.norm]
@@ -99,13 +101,6 @@ class KeptFactors:
             steps.append(step)
             here = work.at(here.x + step)
             best = here if here.norm < best.norm else best
-        if best.norm <= self._tolerance and isinstance(solve, Factored):
+        if best.norm <= self._tolerance and isinstance(solve, Factored | Reduced):
             self.inverse = solve
         return best
-
-
-def _is_array(jac: Jacobian) -> bool:
-    """Whether a Jacobian is an array, borders left out."""
-    while isinstance(jac, Bordered):
-        jac = jac.jac
-    return isinstance(jac, np.ndarray)

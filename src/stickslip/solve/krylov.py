@@ -7,7 +7,7 @@ one that Newton sees.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,12 +15,16 @@ import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
-from stickslip.operators import Bordered, Corner, Jacobian, JacobianOperator, array_of, times
+from stickslip.operators import Bordered, Corner, Jacobian, array_of, times
 from stickslip.solve.gmres import gmres
-from stickslip.solve.linear import MOST, Assembling, Dense, LinearSolver, assembled
+from stickslip.solve.linear import (
+    MOST,
+    Assembled,
+    Dense,
+    LinearSolver,
+)
+from stickslip.solve.preconditioned import Preconditioned, is_either, is_graded, is_preconditioned
 
-Solve = Callable[[FloatArray], FloatArray]
-Product = Callable[[FloatArray, FloatArray], FloatArray]
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
 YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
 GAIN = (
@@ -34,33 +38,6 @@ PAUSES = (
 LEAST = 8  # products that are tried
 COARSE = 1e-4  # tolerance above which rounding is no part of what is left
 ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
-
-
-@runtime_checkable
-class Preconditioned(JacobianOperator, Protocol):
-    """A Jacobian known by its products that can make a preconditioner."""
-
-    @property
-    def problem(self) -> object:
-        """What it is the Jacobian of; what is kept from one of its Jacobians serves the others."""
-        ...
-
-    def preconditioner(self) -> object | None:
-        """Return what of a new preconditioner is costly, such as factors; None if there is none."""
-        ...
-
-    def preconditioned_by(self, kept: object) -> tuple[Solve, Product]:
-        """Return how to solve ``P x = y``, with P from what was kept and from this Jacobian, and ``J v`` as a function of v and ``P v``."""
-        ...
-
-
-@runtime_checkable
-class Graded(Preconditioned, Protocol):
-    """One that has a better preconditioner where its own does not do."""
-
-    def better_preconditioner(self, kept: object) -> object | None:
-        """Return what of a better preconditioner than `kept` is costly; None if there is none."""
-        ...
 
 
 @dataclass(eq=False)
@@ -166,7 +143,7 @@ class Krylov:
             solution, left = self._refined(jac, kept, right, tolerance)
             if left <= (max(tolerance, np.sqrt(tolerance)) if self.lenient else tolerance):
                 return solution
-            made = inside.better_preconditioner(made) if isinstance(inside, Graded) else None
+            made = inside.better_preconditioner(made) if is_graded(inside) else None
         self.counts.failures += 1
         return None
 
@@ -263,7 +240,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _preconditioned(jac: Jacobian) -> Preconditioned:
-    if isinstance(jac, Preconditioned):
+    if is_preconditioned(jac):
         return jac
     raise input_error(
         "Newton.linear",
@@ -308,7 +285,7 @@ class Automatic:
     """LU for a Jacobian that is an array. A Krylov method for one that is known by its products, and LU where that was seen to cost more.
 
     What products took is counted, not timed, so that every run decides alike: the costs of a product and of an array are estimated from
-    what can be counted (`Costs`). A Krylov method that takes more than an array, or finds no solution, gives way to LU for some systems of the same
+    what can be counted (`Costs`): an array of few unknowns, where contacts rest, is factorised at once. A Krylov method that takes more than an array, or finds no solution, gives way to LU for some systems of the same
     problem, and is then tried again.
 
     Parameters
@@ -348,19 +325,19 @@ class Automatic:
         if array_of(jac) is not None:
             return by(self.dense, jac)
         inside = jac.flat.jac if isinstance(jac, Bordered) else jac
-        if not (isinstance(inside, Assembling) and isinstance(inside, Preconditioned)):
+        if not is_either(inside):
             return by(self.krylov, jac)
         account = self.accounts.setdefault(inside.problem, {}).setdefault(
             self.krylov.tolerance, _Account()
         )
-        if account.arrays > 0:
-            account.arrays -= 1
-            array = assembled(jac)
-            if array is not None:
-                return by(self.dense, array)
-        costs, counts, before = inside.costs, self.krylov.counts, replace(self.krylov.counts)
+        costs, within = inside.costs, inside.shape[0] <= MOST
+        if account.arrays > 0 or not costs.products_pay:
+            account.arrays = max(account.arrays - 1, 0)
+            if within:
+                return by(Assembled(self.dense), jac)
+        counts, before = self.krylov.counts, replace(self.krylov.counts)
         krylov = self.krylov
-        if inside.shape[0] <= MOST:  # as long as it is worth it: there is another way
+        if within:  # as long as it is worth it: there is another way
             worth = max(int(costs.array / costs.product), LEAST)
             krylov = replace(krylov, max_products=min(krylov.max_products, worth), lenient=False)
         found = by(krylov, jac)
@@ -370,8 +347,7 @@ class Automatic:
         account.took(spent, costs.array, failed=found[0] is None)
         if found[0] is not None:
             return found
-        array = assembled(jac)
-        return found if array is None else by(self.dense, array)
+        return by(Assembled(self.dense), jac) if within else found
 
 
 def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:

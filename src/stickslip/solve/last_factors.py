@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.operators import Bordered, Corner, Jacobian
 from stickslip.solve.krylov import Automatic
-from stickslip.solve.linear import Dense, Factored, LinearSolver, factorised
+from stickslip.solve.linear import Dense, LinearSolver, Signed, factors_of, is_factorised
 from stickslip.solve.newton_method import Solution
 
 SAME = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
@@ -34,7 +34,7 @@ class LastFactors:
     """
 
     linear: LinearSolver
-    inverse: Factored | None = None
+    inverse: Signed | None = None
     residual: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
@@ -52,16 +52,17 @@ class LastFactors:
         found = self._solved(Bordered(jac, column, row, corner), right)
         return found, 0.0 if self.inverse is None else self.inverse.sign
 
-    def at(self, solution: Solution) -> Factored | None:
+    def at(self, solution: Solution) -> Signed | None:
         """Return the factors if they are those of the Jacobian at a solution, too."""
         before = float(np.abs(self.residual).max())
         return self.inverse if solution.residual_norm <= SAME * before else None
 
     def _factorises(self, jac: Jacobian) -> bool:
-        return isinstance(jac, np.ndarray) and isinstance(self.linear, Dense | Automatic)
+        if isinstance(self.linear, Automatic):
+            return is_factorised(jac)
+        return isinstance(self.linear, Dense) and isinstance(jac, np.ndarray)
 
     def _solved(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
-        known = factorised(self.linear, jac)
-        self.inverse = known if isinstance(known, Factored) else None
+        self.inverse = factors_of(jac)
         self.residual = right
         return None if self.inverse is None else self.inverse(right)

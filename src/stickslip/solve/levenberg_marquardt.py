@@ -5,9 +5,10 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, lsmr
 
 from stickslip.arrays import FloatArray
-from stickslip.operators import Jacobian, array_of, times, transposed_times
+from stickslip.operators import Jacobian, times, transposed_times
 from stickslip.solve.iterate import Iterate, Work, column_scale, squared_ratio
 from stickslip.solve.kink import Kinks, slow
+from stickslip.solve.linear import whole_array
 from stickslip.solve.status import Status
 
 FIRST = 1e-3  # damping of the first step, as a share of the squared columns
@@ -99,7 +100,7 @@ def damped_step(
     """
     root = float(np.sqrt(damping))
     n = right.size
-    array = array_of(jac)
+    array = whole_array(jac)
     if array is None:
         scaled = LinearOperator(
             (n, n),

@@ -1,14 +1,14 @@
 """The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeGuard
 
 import numpy as np
-import scipy.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.operators import (
+    FEW,
     Bordered,
     Corner,
     Costs,
@@ -18,9 +18,8 @@ from stickslip.operators import (
     array_of,
     transpose_of,
 )
-
-SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
-
+from stickslip.solve.eliminated import elimination_of, reduced_factors
+from stickslip.solve.factors import lu_factors
 
 SOLUTIONS, PRODUCTS = (
     5,
@@ -29,7 +28,6 @@ SOLUTIONS, PRODUCTS = (
 MOST = 8000  # unknowns of an array, which then takes half a GB
 
 
-@runtime_checkable
 class Assembling(JacobianOperator, Protocol):
     """A Jacobian known by its products that can be had as an array."""
 
@@ -40,6 +38,22 @@ class Assembling(JacobianOperator, Protocol):
 
     def dense(self) -> FloatArray:
         """Return the array."""
+        ...
+
+
+def is_assembling(jac: Jacobian) -> TypeGuard[Assembling]:
+    """Whether a Jacobian known by its products can be had as an array; `isinstance` of a protocol would take longer than a small system."""
+    return hasattr(type(jac), "dense")
+
+
+class Signed(Protocol):
+    """The solution of systems with one matrix that is factorised, and the sign of its determinant."""
+
+    @property
+    def sign(self) -> float: ...  # noqa: D102
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Return the solution; see `Inverse`."""
         ...
 
 
@@ -104,6 +118,35 @@ class Dense:
         return solve_signed(_array(Bordered(jac, column, row, corner)), right)
 
 
+@dataclass(frozen=True, slots=True)
+class Assembled:
+    """LU of a Jacobian known by its products: of what is left without the unknowns that are easily solved for, or of the whole array by `dense`."""
+
+    dense: LinearSolver = Dense()
+
+    def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
+        """Solve ``jac x = right``; see `LinearSolver`."""
+        elimination = elimination_of(jac)
+        if elimination is None:
+            array = assembled(jac)
+            return None if array is None else self.dense.solve(array, right)
+        factors = reduced_factors(elimination)
+        return None if factors is None else factors(right)
+
+    def solve_bordered(
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
+    ) -> tuple[FloatArray | None, float]:
+        """Solve the bordered system and return the sign of its determinant; see `LinearSolver`."""
+        elimination = elimination_of(Bordered(jac, column, row, corner))
+        if elimination is None:
+            array = assembled(jac)
+            if array is None:
+                return None, np.nan
+            return self.dense.solve_bordered(array, column, row, corner, right)
+        factors = reduced_factors(elimination)
+        return (None, 0.0) if factors is None else (factors(right), factors.sign)
+
+
 def _last_known(
     jac: FloatArray, column: FloatArray, corner: float, right: FloatArray
 ) -> tuple[FloatArray | None, float]:
@@ -125,8 +168,8 @@ def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatA
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
-    lu, pivots = _factors(matrix)
-    return None if lu is None else Factored(lu, pivots)(right)
+    factors = lu_factors(matrix)
+    return None if factors is None else factors(right)
 
 
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
@@ -135,27 +178,34 @@ def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
     An array is factorised once, and overwritten. So is a Jacobian known by its products where that costs less than some solutions, for several
     right sides follow; others are solved by `linear` for each of them.
     """
-    matrix = array_of(jac)
-    if matrix is None and isinstance(jac, Assembling) and _array_pays(jac):
-        matrix = jac.dense()
-    if matrix is None:
-        return _Iterated(linear, jac)
-    lu, pivots = _factors(matrix)
-    return None if lu is None else Factored(lu, pivots)
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if isinstance(inside, np.ndarray) or array_pays(jac):
+        return factors_of(jac)
+    return _Iterated(linear, jac)
 
 
-def _array_pays(jac: Assembling) -> bool:
-    costs = jac.costs
+def array_pays(jac: Jacobian) -> bool:
+    """Whether a Jacobian known by its products is to be factorised for some right sides, and can be."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if not is_assembling(inside) or inside.shape[0] > MOST:
+        return False
+    costs = inside.costs
     return costs.array < costs.factors + SOLUTIONS * PRODUCTS * costs.product
 
 
-def assembled(jac: Jacobian) -> FloatArray | None:
-    """Return a Jacobian known by its products as a new array, borders included; None where it cannot be put together, or is too large."""
-    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
-    if not isinstance(inside, Assembling) or inside.shape[0] > MOST:
-        return None
-    array = inside.dense()
-    return replace(jac.flat, jac=array).array() if isinstance(jac, Bordered) else array
+def factors_of(jac: Jacobian) -> Signed | None:
+    """Factorise a Jacobian, an array, which is overwritten, or known by its products, without the unknowns that are easily solved for.
+
+    None if it is singular or cannot be put together.
+    """
+    array = array_of(jac)
+    if array is not None:
+        return lu_factors(array)
+    elimination = elimination_of(jac)
+    if elimination is not None:
+        return reduced_factors(elimination)
+    array = assembled(jac)
+    return None if array is None else lu_factors(array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,42 +218,33 @@ class _Iterated:
         return solve_with(self.linear, jac, right)
 
 
-@dataclass(frozen=True, eq=False)
-class Factored:
-    """An array by its LU factors."""
-
-    lu: FloatArray
-    pivots: FloatArray
-
-    @property
-    def sign(self) -> float:
-        """Sign of its determinant."""
-        swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
-        flips = swaps + np.count_nonzero(np.diagonal(self.lu) < 0.0)
-        return 1.0 if flips % 2 == 0 else -1.0
-
-    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Solve; see `Inverse`."""
-        solution, _ = scipy.linalg.lapack.dgetrs(self.lu, self.pivots, right, trans=int(transposed))
-        return np.asarray(solution)
+def assembled(jac: Jacobian) -> FloatArray | None:
+    """Return a Jacobian known by its products as a new array, borders included; None where it cannot be put together, or is too large."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if not is_assembling(inside) or inside.shape[0] > MOST:
+        return None
+    array = inside.dense()
+    return replace(jac.flat, jac=array).array() if isinstance(jac, Bordered) else array
 
 
-def _factors(matrix: FloatArray) -> tuple[FloatArray | None, FloatArray]:
-    """Return LU factors and pivots; None if the matrix is singular to working precision. `matrix` is overwritten."""
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
-    size = np.abs(lu.diagonal())
-    # neither NaN nor infinity passes
-    usable = info == 0 and size.min() > SINGULAR * size.max()
-    return (lu if usable else None), pivots
+def whole_array(jac: Jacobian) -> FloatArray | None:
+    """Return a Jacobian that is an array, or known by its products and small; None for others."""
+    array = array_of(jac)
+    return assembled(jac) if array is None and jac.shape[0] <= FEW else array
+
+
+def is_factorised(jac: Jacobian) -> bool:
+    """Whether systems with a Jacobian are solved by LU, as it is an array or costs less as one."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if is_assembling(inside):
+        return inside.shape[0] <= MOST and not inside.costs.products_pay
+    return isinstance(inside, np.ndarray)
 
 
 def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
     """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
-    lu, pivots = _factors(matrix)
-    if lu is None:
-        return None, 0.0
-    known = Factored(lu, pivots)
-    return known(right), known.sign
+    known = lu_factors(matrix)
+    return (None, 0.0) if known is None else (known(right), known.sign)
 
 
 def _array(jac: Jacobian) -> FloatArray:

@@ -21,7 +21,7 @@ from stickslip.solve.branch import (
 )
 from stickslip.solve.kept import KeptFactors
 from stickslip.solve.last_factors import LastFactors
-from stickslip.solve.linear import Factored
+from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
@@ -132,7 +132,7 @@ def _keeps(following: Following, step: float) -> bool:
 
 
 def _by_factors(
-    inverse: Factored, before: Point, y: FloatArray, unit: FloatArray, following: Following
+    inverse: Signed, before: Point, y: FloatArray, unit: FloatArray, following: Following
 ) -> tuple[FloatArray, float] | None:
     """Return direction and orientation by the factors of a Jacobian beside `y`; None where the branch turns, and that beside it tells too little."""
     measure = measure_at(y[:-1], following)

@@ -16,7 +16,7 @@ from stickslip.response.self_excited.contacts import contacts_of
 from stickslip.response.self_excited.problem import SelfExcited, levels
 from stickslip.solve.branch import Following
 from stickslip.solve.kept import KeptFactors
-from stickslip.solve.linear import Factored
+from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import (
     GLOBALISATIONS,
     Newton,
@@ -129,7 +129,7 @@ class _Sticking:
     amplitude: float
     y: FloatArray
     noise: float
-    inverse: Factored | None
+    inverse: Signed | None
 
     @classmethod
     def at(
@@ -138,7 +138,7 @@ class _Sticking:
         equation: PeriodicProblem,
         amplitude: float,
         near: Sequence[FloatArray],
-        known: Factored | None = None,
+        known: Signed | None = None,
     ) -> "_Sticking | None":
         """Return the motion at an amplitude, from others that may be near; None if there is none."""
         p = float(np.log(amplitude))

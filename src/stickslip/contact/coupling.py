@@ -1,0 +1,162 @@
+"""How contacts couple harmonics: which rows of their derivatives do, and what these rows add to a matrix of the coordinates they touch.
+
+A contact that sticks or is open all period answers each harmonic of a gap by the same harmonic of a force, with a complex number. One that slips
+couples the harmonics of its tangential forces with those of all gaps; its normal force couples nothing as long as it stays closed.
+"""
+
+import numpy as np
+
+from stickslip.contact.cache import njit
+from stickslip.contact.law import PAIRS
+
+_PAIRS = np.array(PAIRS)  # force and gap direction of each block
+
+
+@njit(cache=True, nogil=True)
+def _strays(block, p):  # type: ignore[no-untyped-def]
+    """Return by how much row `p` of a block, the cosine row of its harmonic, and the sine row after it differ from those of a complex number."""
+    h, rest = (p + 1) // 2, 0.0
+    for row in range(p, p + (1 if p == 0 else 2)):
+        for q in range(block.shape[1]):
+            if (q + 1) // 2 != h:
+                rest = max(rest, abs(block[row, q]))
+    if p > 0:
+        rest = max(rest, abs(block[p, p] - block[p + 1, p + 1]))
+        rest = max(rest, abs(block[p, p + 1] + block[p + 1, p]))
+    return rest
+
+
+@njit(cache=True, nogil=True)
+def _split(block, coupled, mean, left):  # type: ignore[no-untyped-def]
+    """Put the rows of a block that are `coupled` (H+1,) into `left` (m, m), and the complex numbers of the others into `mean` (H+1,)."""
+    left[:] = 0.0
+    for h in range(coupled.size):
+        p = max(2 * h - 1, 0)
+        if coupled[h]:
+            left[p : 2 * h + 1] = block[p : 2 * h + 1]
+        elif h == 0:
+            mean[0] = block[0, 0]
+        else:
+            real = 0.5 * (block[p, p] + block[p + 1, p + 1])
+            mean[h] = real + 0.5j * (block[p, p + 1] - block[p + 1, p])
+
+
+@njit(cache=True, nogil=True)
+def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untyped-def]
+    """Separate forces that depend on other harmonics from those that do not.
+
+    Parameters
+    ----------
+    blocks
+        (n_contacts, P, m, m) derivatives of the contact forces, N/m, in the order of `PAIRS`.
+    rounding
+        Share of a contact's largest derivative that counts as zero.
+    means
+        Out: (H+1, n_contacts, 3, 3) complex numbers by which a harmonic of a force depends on the same one of a gap; zero where it is coupled.
+    left
+        Out: (n_contacts, P, m, m) the derivatives of forces that are coupled, else zero.
+    coupled
+        Out: (n_contacts, 3, H+1) whether a harmonic of a force depends on the gaps in any other way.
+    """
+    n_contacts, n_pairs = blocks.shape[:2]
+    coupled[:] = False
+    means[:] = 0.0
+    for c in range(n_contacts):
+        least = rounding * np.abs(blocks[c]).max()
+        for b in range(n_pairs):
+            row = _PAIRS[b, 0]
+            for h in range(means.shape[0]):
+                # what is no number couples: nothing is eliminated that should not be
+                if not _strays(blocks[c, b], max(2 * h - 1, 0)) <= least:
+                    coupled[c, row, h] = True
+        for b in range(n_pairs):
+            row, col = _PAIRS[b, 0], _PAIRS[b, 1]
+            _split(blocks[c, b], coupled[c, row], means[:, c, row, col], left[c, b])
+
+
+@njit(cache=True, nogil=True)
+def touched(coupled, columns, values, out):  # type: ignore[no-untyped-def]
+    """Set `out` (H+1, n) to the coordinates whose equation in a harmonic holds a force that is `coupled`; the others from `sparse_rows`."""
+    out[:] = False
+    for c in range(columns.shape[0]):
+        for d in range(3):
+            for h in range(coupled.shape[2]):
+                if coupled[c, d, h]:
+                    for j in range(columns.shape[1]):
+                        if values[c, d, j] != 0.0:
+                            out[h, columns[c, j]] = True
+
+
+@njit(cache=True, nogil=True)
+def _followed(columns, values, real, imaginary, kept, gap):  # type: ignore[no-untyped-def]
+    """Set `gap` (2, 3, H+1, most), real and imaginary parts, to what unit amplitudes of the kept coordinates make it at one contact."""
+    gap[:] = 0.0
+    for d in range(3):
+        for j in range(columns.size):
+            value = values[d, j]
+            if value != 0.0:
+                for h in range(kept.size):
+                    for a in range(kept[h]):
+                        gap[0, d, h, a] += value * real[h, columns[j], a]
+                        gap[1, d, h, a] += value * imaginary[h, columns[j], a]
+
+
+@njit(cache=True, nogil=True)
+def _add_row(derivative, gap, kept, first, line):  # type: ignore[no-untyped-def]
+    """Add to `line` (N,) what the kept unknowns make of a force, by its derivatives (m,) and the `gap` (2, H+1, most) that they make."""
+    for a in range(kept[0]):
+        line[a] += derivative[0] * gap[0, 0, a]
+    for h in range(1, kept.size):
+        start, count = first[h], kept[h]
+        cos, sin = derivative[2 * h - 1], derivative[2 * h]
+        for a in range(count):
+            re, im = gap[0, h, a], gap[1, h, a]
+            line[start + a] += cos * re - sin * im
+            line[start + count + a] += cos * im + sin * re
+
+
+@njit(cache=True, nogil=True)
+def _add_force(columns, values, line, place, out):  # type: ignore[no-untyped-def]
+    """Add a force, a row of what the kept unknowns make of it, to the equations of the coordinates it acts on."""
+    for j in range(columns.size):
+        if values[j] != 0.0:
+            equation = out[place[columns[j]]]
+            for q in range(line.size):
+                equation[q] += values[j] * line[q]
+
+
+@njit(cache=True, nogil=True)
+def add_coupling(left, coupled, columns, values, real, imaginary, kept, first, place, out):  # type: ignore[no-untyped-def]
+    """Add what the coupled forces make of the kept unknowns, with those that follow them: ``Bᵀ left B P``.
+
+    Parameters
+    ----------
+    left, coupled
+        From `couplings`, in the scale of the result.
+    columns, values
+        The gap operator by contact, from `sparse_rows`.
+    real, imaginary
+        (H+1, n, most) P: coordinates that unit amplitudes of the kept ones make, harmonic by harmonic.
+    kept, first
+        (H+1,) how many are kept of a harmonic, and where the first of them is among all unknowns that are kept.
+    place
+        (m, n) where an unknown is among those kept.
+    out
+        In and out: (N, N) in C order, a row for each equation that is kept.
+    """
+    n_contacts, n_pairs, m, _ = left.shape
+    gap = np.empty((2, 3, real.shape[0], real.shape[2]))
+    line = np.empty(out.shape[1])
+    for c in range(n_contacts):
+        if not coupled[c].any():
+            continue
+        _followed(columns[c], values[c], real, imaginary, kept, gap)
+        for row in range(3):
+            for p in range(m):
+                if not coupled[c, row, (p + 1) // 2]:
+                    continue
+                line[:] = 0.0
+                for b in range(n_pairs):
+                    if _PAIRS[b, 0] == row:
+                        _add_row(left[c, b, p], gap[:, _PAIRS[b, 1]], kept, first, line)
+                _add_force(columns[c], values[c, row], line, place[p], out)

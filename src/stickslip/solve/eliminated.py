@@ -1,0 +1,126 @@
+"""LU of what is left of a Jacobian after the unknowns that are easily solved for, borders included."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, TypeGuard
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.operators import Bordered, Elimination, Jacobian, JacobianOperator
+from stickslip.solve.factors import Factored, lu_factors
+
+
+class Eliminating(JacobianOperator, Protocol):
+    """A Jacobian some unknowns of which are easily solved for."""
+
+    def eliminated(self) -> Elimination | None:
+        """Return what is left without them; None where that costs as much as the whole array."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class BorderedElimination:
+    """The same in a border, which is left.
+
+    Parameters
+    ----------
+    inside
+        The elimination without it.
+    columns, rows, corner
+        (n, m), (m, n) and (m, m).
+    """
+
+    inside: Elimination
+    columns: FloatArray
+    rows: FloatArray
+    corner: FloatArray
+
+    @property
+    def size(self) -> int:
+        """Unknowns that are left."""
+        return self.inside.size + len(self.corner)
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of what was eliminated."""
+        return self.inside.sign
+
+    @cached_property
+    def _across(self) -> tuple[FloatArray, FloatArray]:
+        return self.inside.reduced(self.columns)
+
+    @cached_property
+    def _down(self) -> tuple[FloatArray, FloatArray]:
+        return self.inside.reduced(self.rows.T, transposed=True)
+
+    def array(self) -> FloatArray:
+        """Return what is left, (size, size)."""
+        n = self.inside.size
+        columns, inner = self._across
+        out = np.empty((self.size, self.size), order="F")
+        out[:n, :n], out[:n, n:] = self.inside.array(), columns
+        out[n:, :n], out[n:, n:] = self._down[0].T, self.corner - self.rows @ inner
+        return out
+
+    def reduced(
+        self, right: FloatArray, *, transposed: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what is left of right sides, and what they make of the eliminated unknowns; see `Elimination`."""
+        n = len(self.columns)
+        rows = self.columns.T if transposed else self.rows
+        left, inner = self.inside.reduced(right[:n], transposed=transposed)
+        return np.vstack([left, right[n:] - rows @ inner]), np.vstack(
+            [inner, np.zeros_like(right[n:])]
+        )
+
+    def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Return all unknowns that those that are left make."""
+        inner = (self._down if transposed else self._across)[1]
+        n = self.inside.size
+        all_of_it = self.inside.spread(x[:n], transposed=transposed)
+        return np.vstack([all_of_it - inner @ x[n:], x[n:]])
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A matrix by the LU factors of what an elimination leaves of it; None where nothing is left."""
+
+    elimination: Elimination
+    factors: Factored | None
+
+    @property
+    def sign(self) -> float:
+        """Sign of its determinant."""
+        return self.elimination.sign * (1.0 if self.factors is None else self.factors.sign)
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solve; see `Inverse`."""
+        left, inner = self.elimination.reduced(right[:, None], transposed=transposed)
+        if self.factors is None:
+            return inner[:, 0]
+        x = self.factors(left[:, 0], transposed=transposed)
+        return (inner + self.elimination.spread(x[:, None], transposed=transposed))[:, 0]
+
+
+def _is_eliminating(jac: Jacobian) -> TypeGuard[Eliminating]:
+    return hasattr(type(jac), "eliminated")
+
+
+def elimination_of(jac: Jacobian) -> Elimination | None:
+    """Return what is left of a Jacobian without the unknowns that are easily solved for, borders included; None where there are none."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if not _is_eliminating(inside):
+        return None
+    own = inside.eliminated()
+    if own is None or not isinstance(jac, Bordered):
+        return own
+    return BorderedElimination(own, *jac.flat.borders)
+
+
+def reduced_factors(elimination: Elimination) -> Reduced | None:
+    """Factorise what is left; None if it is singular to working precision."""
+    if elimination.size == 0:
+        return Reduced(elimination, None)
+    factors = lu_factors(elimination.array())
+    return None if factors is None else Reduced(elimination, factors)

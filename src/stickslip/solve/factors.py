@@ -1,0 +1,39 @@
+"""LU factors of arrays."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from stickslip.arrays import FloatArray
+
+SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """An array by its LU factors."""
+
+    lu: FloatArray
+    pivots: FloatArray
+
+    @property
+    def sign(self) -> float:
+        """Sign of its determinant."""
+        swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
+        flips = swaps + np.count_nonzero(np.diagonal(self.lu) < 0.0)
+        return 1.0 if flips % 2 == 0 else -1.0
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solve; see `Inverse`."""
+        solution, _ = scipy.linalg.lapack.dgetrs(self.lu, self.pivots, right, trans=int(transposed))
+        return np.asarray(solution)
+
+
+def lu_factors(matrix: FloatArray) -> Factored | None:
+    """Factorise an array, which is overwritten; None if it is singular to working precision."""
+    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
+    size = np.abs(lu.diagonal())
+    # neither NaN nor infinity passes
+    usable = info == 0 and size.min() > SINGULAR * size.max()
+    return Factored(lu, pivots) if usable else None
