@@ -692,9 +692,18 @@ def test_array_and_unknown_method_are_refused():
         Krylov().solve(np.eye(2), np.ones(2))
     with pytest.raises(InputError, match=r"Krylov\.method.*'qmr'"):
         Krylov(method="qmr")
-    balance, x = state("stick")
-    with pytest.raises(InputError, match="Dense needs the Jacobian as an array"):
-        Dense().solve(balance.linearise(x, OMEGA).jac, x)
+
+
+def test_dense_puts_together_what_is_known_by_its_parts():
+    balance, x = state("micro-slip")
+    at = balance.linearise(x, OMEGA)
+    array = at.jac.dense()
+    assert_same(Dense().solve(at.jac, x), np.linalg.solve(array, x), 1e-11)
+    right, border = np.append(x, 1.0), (at.jac_p, x, 0.5)
+    found, sign = Dense().solve_bordered(at.jac, *border, right)
+    exact, known_sign = Dense().solve_bordered(array, *border, right)
+    assert_same(found, exact, 1e-11)
+    assert sign == known_sign
 
 
 # ---- problems ------------------------------------------------------------------------------------------------------------

@@ -103,7 +103,7 @@ class LinearSolver(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Dense:
-    """LU with partial pivoting; the Jacobian is an array. The right choice up to about a thousand unknowns."""
+    """LU with partial pivoting of the whole Jacobian, an array or one that can be put together as one."""
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
@@ -249,10 +249,12 @@ def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | No
 
 def _array(jac: Jacobian) -> FloatArray:
     array = array_of(jac)
-    if array is not None:
-        return array
-    raise input_error(
-        "Newton.linear",
-        "Dense needs the Jacobian as an array, and this one is known by its products only",
-        "Give a Krylov solver.",
-    )
+    if array is None:
+        array = assembled(jac)
+    if array is None:
+        raise input_error(
+            "Newton.linear",
+            "Dense needs the Jacobian as an array, and this one is known by its products only, or is too large",
+            "Give a Krylov solver.",
+        )
+    return array

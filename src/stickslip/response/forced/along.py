@@ -26,7 +26,7 @@ from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
-from stickslip.solve.linear import factorised
+from stickslip.solve.linear import factorised, is_factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
@@ -127,9 +127,8 @@ class ForcedCurve:
         kept: list[tuple[_Inverse | None, float]] = []
 
         def solve(jac: Jacobian, right: FloatArray) -> FloatArray | None:
-            # two right sides alone: what is known by its products is not put together for them
-            array = isinstance(jac, np.ndarray)
-            inverse = factorised(linear, jac) if array else partial(linear.solve, jac)
+            # two right sides alone: what is solved by products is not put together for them
+            inverse = factorised(linear, jac) if is_factorised(jac) else partial(linear.solve, jac)
             kept.append((inverse, float(np.linalg.norm(right))))
             return None if inverse is None else inverse(right)
 
