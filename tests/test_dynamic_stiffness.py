@@ -12,6 +12,7 @@ from models import table
 
 from stickslip.errors import InputError
 from stickslip.harmonic import spectral
+from stickslip.harmonic.condensed_once import LARGE, condensed_once
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
@@ -498,3 +499,26 @@ def test_a_matrix_that_is_not_symmetric_is_named(name):
 def test_load_of_another_structure_is_refused():
     with pytest.raises(InputError, match="4 entries for 9 dofs"):
         condense(structure_of("general"), RETAINED, HarmonicLoad(np.zeros(4)))
+
+
+def test_a_structure_is_condensed_once_until_its_matrices_change():
+    rng = np.random.default_rng(0)
+    half = rng.standard_normal((LARGE, LARGE))
+    stiffness = half @ half.T + LARGE * np.eye(LARGE)
+    own = Structure(
+        np.eye(LARGE), 1e-3 * stiffness, stiffness, table(tuple(f"a{i}" for i in range(LARGE)))
+    )
+    first, second = (
+        HarmonicLoad(np.zeros(LARGE), {1: rng.standard_normal(LARGE) + 0j}) for _ in range(2)
+    )
+    retained = np.arange(3)
+    one, two = (condensed_once(own, retained, load) for load in (first, second))
+    assert two.spectral is one.spectral
+    alone = condense(own, retained, second).condensed(2.0, 1)
+    np.testing.assert_array_equal(two.condensed(2.0, 1).stiffness, alone.stiffness)
+    np.testing.assert_array_equal(two.condensed(2.0, 1).load, alone.load)
+    assert condensed_once(own, np.arange(4), first).n == 4
+    own.stiffness[0, 0] += 100.0
+    changed = condensed_once(own, retained, second).condensed(2.0, 1)
+    expected = condense(own, retained, second).condensed(2.0, 1)
+    np.testing.assert_array_equal(changed.stiffness, expected.stiffness)

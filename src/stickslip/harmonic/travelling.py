@@ -12,9 +12,9 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.harmonic.condensed_once import condensed_once
 from stickslip.harmonic.dynamic_stiffness import (
     Condensed,
-    condense,
 )
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
@@ -300,7 +300,7 @@ def condense_side(
     feedback = tuple(side.feedback_of(h) for h in range(order + 1))
     one, still = structures[0], all(force is None for force in feedback)
     if still and all(s is one for s in structures) and is_real_symmetric(one):
-        return condense(one, retained, load)
+        return condensed_once(one, retained, load)
     return condense_waves(structures, retained, load, () if still else feedback)
 
 
