@@ -4,7 +4,7 @@ A motion that repeats itself never has no amplitude, but windows of it are alike
 and root mean square. The march is as long as that needs, or as a budget of time allows; of what it was, the later half counts.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -16,6 +16,7 @@ from stickslip.harmonic.linear import LinearSide
 from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart
+from stickslip.response.time.step_choice import FINE, with_enough_steps
 
 KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared
@@ -45,6 +46,8 @@ class Course:
         Whether it grew beyond all numbers; the periods end before.
     seconds
         That the march took.
+    steps, angle
+        In a period, and by which the fastest contact that opens or closes turns in one of them, rad.
     """
 
     omega: float
@@ -56,6 +59,13 @@ class Course:
     final: TransientStart
     overflowed: bool
     seconds: float
+    steps: int = 0
+    angle: float = 0.0
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the step is too long to follow the impacts of the stiffest contact that opens."""
+        return self.angle > FINE
 
     @property
     def periods(self) -> int:
@@ -130,32 +140,34 @@ def course(  # noqa: PLR0913
     start
         State at t = 0.
     steps
-        In a period.
+        In a period, at least: twice as many, and so on, where contacts open and close that are too stiff for the step.
     budget
         Seconds after which no more periods are begun.
     least, most
         Periods, in any case and at most.
     """
     steps = -(-steps // KEPT) * KEPT
-    marcher = prepared(
-        structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
-    )
-    state, record = marcher.begun(start), marcher.record()
+    marcher = with_enough_steps(
+        lambda n: prepared(structure, contacts.gap_operator, contacts.laws, load, omega, n, contacts.weights),
+        start, steps,
+    )  # fmt: skip
+    steps, state, record = marcher.steps, marcher.begun(start), marcher.record()
     rows = marcher.modes.basis[outputs].T
     found: list[tuple[FloatArray, ...]] = []
-    began, lost, until = perf_counter(), False, least
+    began, lost, until, angle = perf_counter(), False, least, 0.0
     while len(found) < most and perf_counter() - began < budget:
         lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
         if lost:
             break
-        motion = record.motion @ rows
+        motion, angle = record.motion @ rows, max(angle, marcher.turn(record))
         found.append((motion[steps // KEPT - 1 :: steps // KEPT], motion.max(axis=0), motion.min(axis=0), motion.mean(axis=0), np.mean(motion**2, axis=0)))  # fmt: skip
         if len(found) == until:
             if statistics(_course(omega, found, marcher.end(state), False, 0.0)).settled:
                 break
             until = min(2 * until, most)
     end = start if lost else marcher.end(state)
-    return _course(omega, found, end, lost, perf_counter() - began, rows.shape[1])
+    made = _course(omega, found, end, lost, perf_counter() - began, rows.shape[1])
+    return replace(made, steps=steps, angle=angle)
 
 
 def _course(

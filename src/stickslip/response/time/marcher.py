@@ -98,6 +98,16 @@ class Marcher:
         """Steps in a period."""
         return len(self.operators.drive)
 
+    def turn(self, record: Record) -> float:
+        """Return by how much the fastest contact that opens or closes in a record turns within a step, rad: pace times step.
+
+        Where it is large the step cannot follow an impact; see `stickslip.response.time.step_choice`.
+        """
+        shut = record.force[:, :, 2] != 0.0
+        hits = np.any(shut, axis=0) & ~np.all(shut, axis=0)
+        step = 2.0 * np.pi / (self.modes.omega * self.steps)
+        return step * float(np.max(self.modes.paces[2::3][hits], initial=0.0))
+
     def begun(self, start: TransientStart) -> StepState:
         """Return a start in the form that the step takes."""
         states = [np.asarray(s, dtype=float).ravel() for s in start.states]

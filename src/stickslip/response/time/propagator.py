@@ -39,6 +39,7 @@ class ModalCoordinates:
     speed: FloatArray  # (n,) scale of w, which keeps the propagator of a stiff mode near a rotation
     seen: FloatArray  # (2k, 2n): gaps and their rates of a motion
     omega: float
+    paces: FloatArray  # (k,) frequency of a gap on its contact's spring and the mass that moves with it alone, rad/s
 
     def motion(self, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return (q, w) of physical displacement and velocity."""
@@ -64,14 +65,8 @@ def _dense(matrix: Matrix) -> FloatArray:
     return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
 
 
-def _linear_springs(
-    structure: Structure, gap_operator: FloatArray, stuck: FloatArray, omega: float
-) -> FloatArray:
-    """Return the springs of contacts that belong to the linear structure, 0 for those that are too fast.
-
-    As a part of it a spring that does not slip is exact; one that slips acts like a mass ``k h²/12`` too little. That must
-    be little of the mass that it acts on, of which ``1 / B M⁻¹ Bᵀ`` moves with the gap alone.
-    """
+def _paces(structure: Structure, gap_operator: FloatArray, stuck: FloatArray) -> FloatArray:
+    """Return how fast each gap vibrates on its contact's spring, rad/s: of the mass ``1 / B M⁻¹ Bᵀ`` moves with the gap alone."""
     mass = _dense(structure.mass)
     try:
         root = scipy.linalg.cholesky(mass, lower=True)
@@ -84,12 +79,15 @@ def _linear_springs(
             "Time integration needs a mass on every coordinate: condense the massless ones.",
         ) from error
     moved = scipy.linalg.solve_triangular(root, gap_operator.T, lower=True)
-    own = np.sqrt(np.maximum(stuck, 0.0) * np.sum(moved**2, axis=0))
-    return np.where(own > FAST * omega, 0.0, stuck)
+    return np.asarray(np.sqrt(np.maximum(stuck, 0.0) * np.sum(moved**2, axis=0)))
 
 
 def _coordinates(
-    structure: Structure, stiffness: FloatArray, gap_operator: FloatArray, omega: float
+    structure: Structure,
+    stiffness: FloatArray,
+    gap_operator: FloatArray,
+    paces: FloatArray,
+    omega: float,
 ) -> ModalCoordinates:
     mass = _dense(structure.mass)
     values, basis = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
@@ -97,7 +95,7 @@ def _coordinates(
     gaps = gap_operator @ basis
     none = np.zeros_like(gaps)
     seen = np.block([[gaps, none], [none, omega * gaps * speed]])
-    return ModalCoordinates(basis, basis.T @ mass, speed, seen, omega)
+    return ModalCoordinates(basis, basis.T @ mass, speed, seen, omega, paces)
 
 
 def step_operators(
@@ -126,9 +124,12 @@ def step_operators(
         )
     gap_operator = _dense(gap_operator)
     _check(structure.n, gap_operator, stuck.size, load, omega, caller)
-    springs = _linear_springs(structure, gap_operator, stuck, omega)
+    paces = _paces(structure, gap_operator, stuck)
+    # as a part of the linear structure a spring that does not slip is exact; one that slips acts like a mass k h²/12 too little,
+    # which must be little of the mass that it acts on
+    springs = np.where(paces > FAST * omega, 0.0, stuck)
     stiffness = _dense(structure.stiffness) + gap_operator.T @ (springs[:, None] * gap_operator)
-    modes = _coordinates(structure, stiffness, gap_operator, omega)
+    modes = _coordinates(structure, stiffness, gap_operator, paces, omega)
     n, k, m, seen = structure.n, gap_operator.shape[0], 2 * structure.n, modes.seen
     damping = modes.basis.T @ _dense(structure.damping) @ modes.basis
     motion = _motion_matrix(modes.basis.T @ stiffness @ modes.basis, damping, modes)

@@ -23,6 +23,7 @@ from stickslip.response.time.marcher import Marcher, Record, prepared
 from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.settling import Progress, SettlingStatus, overflowed, period_harmonics
 from stickslip.response.time.start import TransientStart, check_start, rest
+from stickslip.response.time.step_choice import FINE
 from stickslip.units import check_quantities, quantity
 
 MOST_STEPS = 10_000_000  # a period of which fills the memory of a large machine
@@ -109,6 +110,9 @@ class TransientResult:
         (steps, n_outputs) displacements over the last period, at t = T/steps, 2T/steps, ... T; m.
     gap, contact_force
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
+    step_angle
+        By which the fastest contact that opens or closes in the last period turns within a step, rad: frequency of its stiffness on the mass
+        that moves with it alone, times the step. See `stickslip.response.time.step_choice`.
     """
 
     status: SettlingStatus
@@ -128,6 +132,12 @@ class TransientResult:
     outputs: FloatArray
     gap: FloatArray
     contact_force: FloatArray
+    step_angle: float = float("nan")
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the step is too long to follow the impacts of the stiffest contact that opens: harmonics may be off by a percent."""
+        return self.step_angle > FINE
 
     @property
     def settled(self) -> bool:
@@ -249,6 +259,7 @@ def _result(
         outputs=motion[:, outputs],
         gap=record.gap,
         contact_force=record.force,
+        step_angle=marcher.turn(record),
     )
 
 

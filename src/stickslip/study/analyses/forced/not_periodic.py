@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,8 @@ from stickslip.study.analyses.forced.question import Question, too_large
 from stickslip.study.analyses.forced.stable import Examined
 from stickslip.units import HZ
 
-STEPS = 512
+STEPS = 512  # in a period, at least
+AGREE = 0.1  # relative difference of a root mean square with half the step that counts as none
 TURNS = 128  # periods whose amplitudes are kept for the picture
 SAME = 1e-3  # relative difference of the amplitudes of all periods that counts as none
 NEAR, AT = (
@@ -83,11 +85,12 @@ class Answer:
 
 @dataclass(frozen=True)
 class _March:
-    """A course, how far its last period is from the balance it began on (NaN where it began elsewhere), and the periods that leaving takes."""
+    """A course, how far its last period is from the balance it began on (NaN where it began elsewhere), the periods that leaving takes, and what follows with half the step."""
 
     course: Course
     away: float
     needed: float
+    finer: Course | None = None
 
     @property
     def stayed(self) -> bool:
@@ -166,14 +169,16 @@ def _marched(
         start = _disturbed(start, omega * np.abs(motion[1:]).sum(axis=0))
     needed = _needed(multiplier)
     least = LEAST if np.isinf(needed) else int(np.clip(needed, LEAST, MOST_PERIODS))
-    found = course(
-        structure, contacts, load, omega, system.outputs, start, steps=STEPS, budget=budget, least=least,
-        most=max(MOST, min(2 * least, MOST_PERIODS)),
-    )  # fmt: skip
+    march = partial(course, structure, contacts, load, omega, system.outputs)
+    most = max(MOST, min(2 * least, MOST_PERIODS))
+    found = march(start, steps=STEPS, budget=budget, least=least, most=most)
+    finer = None
+    if found.angle > 0.0 and not found.overflowed:  # what opens and closes may depend on the step
+        finer = march(found.final, steps=2 * found.steps, budget=budget, most=LEAST)
     away = np.nan
     if near is not None and motion is not None and near.point.omega == omega:
         away = _away(found, motion[:, system.outputs])
-    return _March(found, away, needed)
+    return _March(found, away, needed, finer)
 
 
 def _needed(multiplier: float) -> float:
@@ -214,7 +219,8 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
     label = question.model.output_labels[own]
     head = f"{omega / HZ:.3f} Hz: {why}; in time"
     counted = f"over {of.periods} periods after {found.periods - of.periods}"
-    settled = of.settled and not (alike and march.stayed)
+    doubt = _of_the_step(march, own)
+    settled = of.settled and not (alike and march.stayed) and not doubt
     if alike and march.stayed:
         body = (
             f"it has not left the motion that it started on by more than {100 * march.away:.2g} %, {label} {1e3 * of.largest[own]:.4g} mm {counted}; "
@@ -229,6 +235,7 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
         )
         body += f"; besides multiples of the frequency {', '.join(strange)}" if strange else ""
         body += _settledness(of.spread, of.settled)
+    body += doubt
     return Answer(
         omega, why, of.largest, of.least, of.mean, of.rms, of.extreme, of.spread, found.periods, found.seconds,
         settled, alike and settled, lines, of.peaks[own], amplitudes, f"{head} {body}",
@@ -247,6 +254,18 @@ def _settledness(spread: float, settled: bool) -> str:
     if settled:
         return f"; four windows differ by {100 * spread:.2g} %"
     return f"; not settled: four windows differ by {100 * spread:.2g} %, more time (forced_response.not_periodic_s) tells more"
+
+
+def _of_the_step(march: _March, own: int) -> str:
+    """Return why a march is not to be trusted for its step; empty where it is."""
+    if march.finer is None or not np.isfinite(rms := float(statistics(march.course).rms[own])):
+        return ""
+    if march.finer.coarse:
+        return f"; a contact that opens is too stiff for {march.finer.steps} steps a period"
+    fine = float(statistics(march.finer).rms[own])
+    if np.isfinite(fine) and abs(fine - rms) <= AGREE * max(fine, rms):
+        return ""
+    return f"; with half the step the root mean square is {1e3 * fine:.4g} mm: too few steps, or too few periods"
 
 
 def _off(hertz: float, own: float) -> bool:
