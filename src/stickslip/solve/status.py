@@ -13,6 +13,7 @@ class Status(IntEnum):
     NOT_FINITE = 4
     STEP_TOO_SMALL = 5
     LOCAL_MINIMUM = 6
+    NOT_PERIODIC = 7
 
     @property
     def converged(self) -> bool:
@@ -34,6 +35,7 @@ _ADVICE = {
     Status.NOT_FINITE: "the iteration left the finite numbers; check loads and stiffnesses",
     Status.STEP_TOO_SMALL: "the continuation step shrank below its smallest value",
     Status.LOCAL_MINIMUM: "the residual has a minimum that is not zero; start nearer to the solution",
+    Status.NOT_PERIODIC: "integrated in time from rest the motion does not repeat itself in the period of the load, nor does it with half the step: no balance stands for it",
 }
 
 
@@ -45,3 +47,4 @@ class Rung(IntEnum):
     SHORTER_STEP = 2
     OTHER_GLOBALISATION = 3
     HOMOTOPY = 4
+    IN_TIME = 5

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stickslip.response.forced.problem import ForcedPoint, Stage
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.problem import ForcedPoint
 
 # relative difference of two vibrations below which a branch has come back to the other
 ALIKE = 0.25
@@ -14,7 +15,8 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     """Return the points that make up the response, each with the low-order point it repeats or is.
 
     In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
-    all converge the branch with many harmonics, where that reached the other side. Peak points come last.
+    all converge the branch with many harmonics, where that reached the other side. What is missing then is taken from the motion
+    in time. Peak points come last.
     """
     pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
     if any(p.stage == "point" for p in points):
@@ -31,6 +33,8 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
         (again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low)
         for p, low in pairs
     ]
+    in_time = {p.omega: p for p in points if p.stage == "in_time"}
+    pairs = [(p if p.converged else in_time.get(p.omega, p), low) for p, low in pairs]
     return pairs + [
         (p, None) for omega, p in best.items() if again.get(omega) is p or not p.converged
     ]

@@ -14,11 +14,11 @@ from stickslip.harmonic.support import Harmonics
 from stickslip.operators import Jacobian
 from stickslip.response.branch import Followed, Judged, Kind, Route
 from stickslip.response.follow import follow
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import (
     Balance,
     ForcedPoint,
     ForcedProblem,
-    Stage,
     forced_point,
     with_stiffness,
 )

@@ -77,7 +77,7 @@ class _Second:
             run, branch = self.low[first : last + 1], list[ForcedPoint]()
             for order in (run, run[::-1]):
                 yield from self._again(order, None, branch)
-            if self.problem.sweep.rescue == "off":
+            if self.problem.sweep.rescue != "all":
                 continue
             if self._left(run):
                 yield from _followed(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, s
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import Judged, following_vibration
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, start_point, step_to
@@ -33,7 +33,6 @@ from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
 
 Balance = HarmonicBalance | DynamicLagrangian
-Stage = Literal["low", "high", "branch", "peak", "point", "audit", "trial", "found", "check"]
 FAINTEST = 1e-7  # excitation over static load: a thousand times the residual tolerance, which swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 SAMPLES_A_HARMONIC = 8  # at least, whatever the sweep says
@@ -51,7 +50,7 @@ class ForcedPoint:
         With ``high = "auto"`` the kinds of `stickslip.response.follow.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
         passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
         repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
-        ``peak`` solved with more harmonics, to compare.
+        ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time.
     index
         Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
         first repeat that it replaces.
@@ -79,6 +78,8 @@ class ForcedPoint:
         (H+1, n_retained) coefficients from which it is solved again, m; empty: the strategy has none, or asks for nothing.
     kept
         (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, 0 where it does not; empty: all keep all.
+    marched
+        What the motion in time did, in the order of `stickslip.response.forced.from_time.Marched`; empty: not marched.
     """
 
     stage: Stage
@@ -99,6 +100,7 @@ class ForcedPoint:
     asked: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     start: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     kept: IntArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    marched: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def unknowns(self) -> int:

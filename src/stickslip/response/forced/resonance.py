@@ -9,7 +9,8 @@ import numpy as np
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, Stage, forced_point
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to

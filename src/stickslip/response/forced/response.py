@@ -11,6 +11,7 @@ from stickslip.response.equilibrium import preload
 from stickslip.response.forced.accepted import accepted_pairs, accepted_points
 from stickslip.response.forced.along import along_the_branch
 from stickslip.response.forced.double_passage import double_passage
+from stickslip.response.forced.from_time import found_in_time
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.resonance import resolve_peak
 from stickslip.response.forced.single_passage import single_passage
@@ -58,7 +59,7 @@ def forced_response(
         If the static load finds no equilibrium.
     """
     problem = forced_problem(system, load, sweep)
-    solved = [p for p in done if p.stage not in OF_PEAK]
+    solved = [p for p in done if p.stage not in (*OF_PEAK, "in_time")]
     before = tuple(solved)
     if sweep.auto:
         passage = along_the_branch(problem, before)
@@ -69,6 +70,11 @@ def forced_response(
         static = cache(lambda: preload(system.at(first), problem.low.linear.load_at(first).static))
         passage = double_passage(problem, before, static)
     for point in passage:
+        solved.append(point)
+        yield point
+    marched = [p for p in done if p.stage == "in_time"]
+    solved += marched
+    for point in found_in_time(problem, accepted_points(solved), marched):
         solved.append(point)
         yield point
     peak = [p for p in done if p.stage in OF_PEAK]

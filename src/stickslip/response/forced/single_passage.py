@@ -10,11 +10,11 @@ from stickslip.arrays import ComplexArray
 from stickslip.harmonic.local import AnyBalance
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
     ForcedPoint,
     ForcedProblem,
-    Stage,
     forced_point,
 )
 from stickslip.response.ladder import without_branch

@@ -63,9 +63,10 @@ class Sweep:
     peak_points
         Most points added to resolve the peak.
     rescue
-        ``all``: a frequency that is not found is looked for by other globalisations and homotopies, up to some thousand Newton steps;
-        ``off``: by the corrector alone, from its neighbours, the bonded vibration and few harmonics; listed frequencies by no branch in
-        between either. Where many contacts lift off and no motion repeats, the first takes hours to say no.
+        ``off``: a frequency is looked for by the corrector alone, from its neighbours, the bonded vibration and few harmonics; listed
+        frequencies by no branch in between either. ``in_time``: then from the motion in time, if that repeats itself; if it does not, the
+        point says so. ``all``: by other globalisations and homotopies, up to some thousand Newton steps, before that. Where many contacts
+        lift off and no motion repeats, these take hours to say no.
     newton
         Corrector options.
     """
@@ -202,7 +203,7 @@ class Sweep:
         """Step control of the branch: a step is at most a `points`-th of the range."""
         first, last = self.omega_range
         control = steps_through(last - first, self.points)
-        listed = self.rescue == "off" and self.grid.size > 0
+        listed = self.rescue != "all" and self.grid.size > 0
         return replace(control, max_points=0) if listed else control
 
     @property

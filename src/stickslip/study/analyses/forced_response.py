@@ -12,6 +12,7 @@ from stickslip.errors import SingularError
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced.bifurcating import (
@@ -317,6 +318,8 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     shares["check"] = shares["peak"]
     begin, width = shares.get(point.stage, (0.0, 0.95))
     state = "" if point.converged else f", {point.status.advice}"
+    marched = marched_of(point)
+    state += "" if marched is None else f", {marched}"
     return (
         begin + width * along,
         f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",

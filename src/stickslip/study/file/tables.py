@@ -49,8 +49,8 @@ class Solver(Section):
     rescue: Rescue = Field(
         "all",
         description="of [forced_response]. all: a frequency that does not converge is looked for by other globalisations and homotopies, up to some "
-        "thousand Newton steps; off: by the corrector alone, from several starts, listed frequencies by no branch in between either: for strong "
-        "lift-off of many contacts, beside not_periodic_points",
+        "thousand Newton steps, then from the motion in time, if that repeats itself; in_time: by the corrector, from several starts, and from the "
+        "motion in time, listed frequencies by no branch in between: for strong lift-off of many contacts; off: by the corrector alone",
     )
 
 

@@ -97,6 +97,12 @@ class Curve:
         """Return the text of a variable along ``case``; empty where there is none."""
         return str(self.data[name].values[self.case]) if self.has(name) else ""
 
+    def texts(self, name: str) -> list[str]:
+        """Return the texts of a variable along ``point``; empty ones where there is none."""
+        if not self.has(name):
+            return [""] * self.at.size
+        return [str(text) for text in self.data[name].values[self.at]]
+
     @cached_property
     def hz(self) -> FloatArray:
         """(n,) frequencies."""

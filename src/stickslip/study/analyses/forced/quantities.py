@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.response.forced.problem import Stage
+from stickslip.response.forced.choices import Stage
 from stickslip.solve.status import Status
 from stickslip.study.analyses.verdict import LEVELS
 
@@ -78,6 +78,7 @@ _OF = {
         "seconds": ("s", "time of the point"),
         "refinement": ("1", "1 if the point was added to resolve the peak"),
         "motion_stability": ("1", "whether disturbances of the point's motion die, by its multipliers, where bifurcations were located"),
+        "marched_sentence": ("1", "what the motion in time from rest did where the point was not found otherwise, empty elsewhere"),
         "verdict": ("1", "whether the point is to be trusted"),
         "verdict_reason": ("1", "why not, empty where it is"),
         "reference_error_percent": ("percent", "change of the complex amplitude that twice as many harmonics would make, NaN where unsolved"),

@@ -67,9 +67,13 @@ def unsolved(case: Curve) -> Iterator[Finding]:
         remedy = "See run.log for what stopped them, and the size of the loads."
         yield Finding("wrong", "no point converged: there is no peak", remedy)
         return
+    marched = case.texts("marched_sentence")
     for i in lost:
-        why = f"did not converge ({Status(int(case.status[i])).advice})"
+        advice = [Status(int(case.status[i])).advice, *filter(None, [marched[i]])]
+        why = f"did not converge ({'; '.join(advice)})"
         remedy = "A smaller step (more forced_response.points) finds most such points."
+        if int(case.status[i]) == Status.NOT_PERIODIC:
+            remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points says at how many such points."
         yield Finding("wrong", why, remedy, (int(i),))
     if lost.size:
         why = f"{lost.size} points did not converge; the peak is the largest of the others, and a larger one may stand among them"

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import equivalent_damping, signals
 from stickslip.study.analyses.forced.comparison import Check
@@ -171,6 +172,7 @@ def _of_points(question: Question, response: Response) -> Values:
         "newton_iterations": _whole(p.iterations for p in points),
         "seconds": np.array([p.seconds_total for p in points]),
         "refinement": _whole(int(p.stage == "peak") for p in points),
+        "marched_sentence": texts(str(marched_of(p) or "") for p in points),
     }
 
 

@@ -1,0 +1,179 @@
+"""Frequencies that the corrector did not find: from the motion in time, if that repeats itself; if it does not, with what shows so."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass, replace
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import StickslipError
+from stickslip.harmonic.support import is_full
+from stickslip.response.branch import Judged
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.time.repeating import Repetition, repetition
+from stickslip.solve.branch import ParameterEvaluation
+from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.status import Rung, Status
+
+MOST_COORDINATES = 600  # half a second a period, or more
+PATIENCE = 40  # Newton steps, at least: the start is near
+MORE = (2, 4, 6, 10)  # harmonics more than asked for
+
+
+@dataclass(frozen=True)
+class Marched:
+    """What the motion in time from rest did; see `stickslip.response.time.repeating.Repetition`.
+
+    What is called finer is with half the step, from where the motion had come to; NaN where that was not needed.
+
+    Attributes
+    ----------
+    periods, steps, angle
+        Marched, steps in a period, and by which the fastest contact that opens or closes turns in one of them, rad.
+    every, finer_every
+        Periods after which it repeats itself; 0: it does not.
+    change
+        Of the harmonics of all gaps over the last period, of their size.
+    wander, finer_wander
+        Largest change of the first harmonic of the outputs from one of the last periods to the next, of its size.
+    growth, finer_growth
+        Factor by which a small difference grows in a period; NaN where that was not looked at.
+    opened
+        Share of the time in which contacts are open.
+    """
+
+    periods: float
+    steps: float
+    angle: float
+    every: float
+    change: float
+    wander: float
+    growth: float
+    finer_every: float
+    finer_wander: float
+    finer_growth: float
+    opened: float
+
+    def __str__(self) -> str:
+        counted = f"{self.periods:.0f} periods of {self.steps:.0f} steps"
+        if self.every == 1.0:
+            return f"periodic in time after {counted}"
+        if not np.isfinite(self.change):
+            return f"in time it grows beyond all numbers within {counted}"
+        told = _does(self.every, self.wander, self.growth)
+        finer = _does(self.finer_every, self.finer_wander, self.finer_growth)
+        return f"in time, {counted}, {told}; with half the step {finer}"
+
+
+def _does(every: float, wander: float, growth: float) -> str:
+    if every:
+        return f"it repeats itself every {every:.0f} periods"
+    return (
+        f"its first harmonic changes by up to {wander:.2g} of its size from period to period, and a small difference grows {growth:.3g}-fold "
+        "in each"
+    )
+
+
+def marched_of(point: ForcedPoint) -> Marched | None:
+    """Return what the motion in time did at a point; None where nothing was marched."""
+    return Marched(*point.marched) if point.marched.size else None
+
+
+def found_in_time(
+    problem: ForcedProblem, accepted: Sequence[ForcedPoint], done: Sequence[ForcedPoint] = ()
+) -> Iterator[ForcedPoint]:
+    """Yield what the motion in time leads to at the frequencies that were not found, but for those `done`.
+
+    A motion that repeats itself starts Newton's method. Structures of `MOST_COORDINATES` and more, rigid contacts, and structures that have no
+    form in time (tuned wheels, structural damping, coordinates without mass) are left as they are.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    accepted
+        Its points so far.
+    """
+    first, last = problem.sweep.omega_range
+    system = problem.system
+    if problem.sweep.rescue == "off" or system.interface.rigid or system.structure.n > MOST_COORDINATES:  # fmt: skip
+        return
+    known = {p.omega for p in done}
+    for lost in accepted:
+        if lost.converged or lost.omega in known or not first <= lost.omega <= last:
+            continue
+        known.add(lost.omega)
+        try:
+            found = _from_time(problem, lost)
+        except (StickslipError, np.linalg.LinAlgError):
+            continue
+        yield found
+
+
+def _from_time(problem: ForcedProblem, lost: ForcedPoint) -> ForcedPoint:
+    began, omega = perf_counter(), lost.omega
+    system, load = problem.system.at(omega), problem.low.linear.load_at(omega)
+    order = _orders(problem, lost)[-1]
+    seen = repetition(system.structure, system.interface, load, omega, system.outputs, order)
+    told = np.array(astuple(_told(seen)))
+    if seen.verdict == "periodic":
+        found = _solved(problem, lost, seen)
+        solution = charged(found[-1][1], [s for _, s in found])
+        seconds = perf_counter() - began
+        point = forced_point(found[-1][0], solution, "in_time", lost.index, omega, seconds, judged=Judged(np.nan))  # fmt: skip
+        return replace(point, rescue=Rung.IN_TIME, marched=told)
+    status = Status.NOT_PERIODIC if seen.verdict == "not periodic" else lost.status
+    return replace(
+        lost, stage="in_time", status=status, iterations=0, rescue=Rung.IN_TIME, marched=told, seconds_contact=0.0, seconds_linear=0.0,
+        seconds_total=perf_counter() - began,
+    )  # fmt: skip
+
+
+def _told(seen: Repetition) -> Marched:
+    none, finer = np.nan, seen.finer
+    return Marched(
+        periods=seen.periods,
+        steps=seen.steps,
+        angle=seen.angle,
+        every=seen.every,
+        change=float(seen.change[-1]),
+        wander=seen.wander,
+        growth=seen.growth,
+        finer_every=none if finer is None else finer.every,
+        finer_wander=none if finer is None else finer.wander,
+        finer_growth=none if finer is None else finer.growth,
+        opened=seen.opened,
+    )
+
+
+def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
+    """Return the highest harmonics that are tried: those asked for, then more, as the balance may have lost at a fold what a few more give back."""
+    most = problem.sweep.cap if problem.sweep.auto else lost.order + MORE[-1]
+    more = [lost.order + m for m in MORE if lost.order + m <= most]
+    return [lost.order, *more] if is_full(lost.support) else [lost.order]
+
+
+def _solved(
+    problem: ForcedProblem, lost: ForcedPoint, seen: Repetition
+) -> list[tuple[Balance, Solution]]:
+    """Return attempts from the motion in time, the last of which counts: as near as it begins, the natural level goes on where the residual stalls."""
+    spent: list[tuple[Balance, Solution]] = []
+    patient = problem.sweep.newton
+    patient = replace(patient, max_iterations=max(PATIENCE, patient.max_iterations))
+    for order in _orders(problem, lost):
+        support = lost.support if order == lost.order else tuple(range(order + 1))
+        balance = problem.balance(support)
+        start = balance.unknowns(seen.motion[: order + 1, balance.linear.retained])
+        evaluate = partial(_at, balance, lost.omega)
+        for level in (NaturalLevel(), None):
+            spent.append((balance, newton(evaluate, start, patient, level)))
+            if spent[-1][1].status.converged:
+                return spent
+    return spent
+
+
+def _at(balance: Balance, omega: float, x: FloatArray) -> ParameterEvaluation:
+    return balance.linearise(x, omega)

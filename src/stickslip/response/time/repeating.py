@@ -1,0 +1,243 @@
+"""Whether a motion in time repeats itself, with what shows that it does not: how far it wanders, and that small differences grow.
+
+It is marched from rest until the harmonics of all gaps repeat or the periods are spent. Of a motion that does not repeat, a copy that is kicked
+by a millionth is marched beside it: if the two part, it is no slow decay. All is done once more with half the step before it is told.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.harmonic.linear import LinearSide
+from stickslip.response.time.contact_step import StepState
+from stickslip.response.time.marcher import Marcher, prepared
+from stickslip.response.time.propagator import PeriodicLoad
+from stickslip.response.time.settling import overflowed, period_harmonics
+from stickslip.response.time.start import rest
+from stickslip.response.time.step_choice import ROUGH, with_enough_steps
+
+Told = Literal["periodic", "not periodic", "not known"]
+STEPS = 512  # in a period, at least
+PERIODS, LATER = 48, 12  # marched, twice as many if differences die; the last ones are judged
+SOON, CLEARLY = 2 * LATER + 1, 1.2  # periods that do where a small difference grows by so much
+MOST_TURNS = 6  # periods after which a motion may repeat itself
+REPEATS = 1e-4  # largest change of a gap's harmonics, of their size, that counts as none
+LASTS = 1e-2  # that counts as one, if it has not become less over the last quarters
+KICK, KICKED = 1e-6, 8  # of the speeds; periods
+PARTED = 0.05  # distance, of the size of the motion, that is no longer small
+
+
+@dataclass(frozen=True, eq=False)
+class Repetition:
+    """What a march tells of whether a motion repeats itself.
+
+    Attributes
+    ----------
+    motion
+        (order + 1, n) harmonics of all coordinates in the last period, m.
+    change
+        (periods - 1,) of the harmonics of all gaps from period to period, of their size.
+    every
+        Periods after which it repeats itself; 0: it does not.
+    wander
+        Largest change of the first harmonic of the outputs from one period to the next over the last ones, of its size.
+    growth
+        Factor by which a small difference grows in a period; NaN where that was not looked at.
+    opened
+        Share of the time in which contacts are open, in the last period.
+    steps, angle
+        In a period; by which the fastest contact that opens or closes turns in one of them, rad.
+    finer
+        The same with half the step; None where every period is like the one before.
+    """
+
+    motion: ComplexArray
+    change: FloatArray
+    every: int
+    wander: float
+    growth: float
+    opened: float
+    steps: int
+    angle: float
+    finer: "Repetition | None" = None
+
+    @property
+    def periods(self) -> int:
+        """Marched."""
+        return len(self.change) + 1
+
+    @property
+    def finite(self) -> bool:
+        """Whether it did not grow beyond all numbers."""
+        return bool(np.all(np.isfinite(self.change)))
+
+    @property
+    def alone(self) -> Told:
+        """What it tells without the finer march."""
+        if self.every == 1:
+            return "periodic"
+        if self.every:
+            return "not periodic"
+        lasts = _lasts(self.change) and (self.growth > 1.0 or self.periods >= 2 * PERIODS)
+        return "not periodic" if lasts else "not known"
+
+    @property
+    def verdict(self) -> Told:
+        """What both tell, if they agree and the finer step follows the contacts."""
+        if self.finer is None:
+            return self.alone
+        agrees = self.finer.alone == self.alone and self.finer.angle <= ROUGH
+        return self.alone if agrees else "not known"
+
+
+def repetition(
+    structure: LinearSide,
+    contacts: Interface,
+    load: PeriodicLoad,
+    omega: float,
+    outputs: IntArray,
+    order: int,
+    steps: int = STEPS,
+) -> Repetition:
+    """Return whether the motion from rest becomes periodic; one that does not at first is marched with half the step, too.
+
+    Parameters
+    ----------
+    structure, contacts, load
+        Any real structure, contacts with a stiffness, and periodic loads.
+    omega
+        rad/s.
+    outputs
+        Dofs whose first harmonic is watched.
+    order
+        Highest harmonic.
+    steps
+        In a period, at least; doubled until the finer march follows the impacts, see `stickslip.response.time.step_choice`.
+    """
+
+    def made(steps: int) -> Marcher:
+        return prepared(
+            structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
+        )
+
+    # the march with half the step is the one that has to follow the impacts
+    marcher = with_enough_steps(made, rest(structure.n, contacts.laws), steps, 2.0 * ROUGH)
+    state = marcher.begun(rest(structure.n, contacts.laws))
+    found = _marched(marcher, state, outputs, order)
+    if found.every == 1 or not found.finite:
+        return found
+    fine = made(2 * marcher.steps)
+    finer = _marched(fine, fine.begun(marcher.end(state)), outputs, order)
+    # a motion that settles slowly may come to repeat itself only in the second march
+    return (
+        finer if finer.every == 1 else replace(found, every=found.every or finer.every, finer=finer)
+    )
+
+
+def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) -> Repetition:
+    """March until the motion repeats itself, or the periods are spent: the fewer of them, the faster small differences grow."""
+    record, basis, seen = marcher.record(), marcher.modes.basis, _Seen([], [], [])
+    every, growth = 0, np.nan
+    for until, enough in ((SOON, CLEARLY), (PERIODS, 1.0), (2 * PERIODS, np.inf)):
+        every = _period_by_period(marcher, state, seen, basis[outputs], order, until)
+        if every or not seen.finite or until > PERIODS:
+            break
+        growth = _growth(marcher, state)
+        if growth > enough and _lasts(_changes(seen.gaps, 1)):
+            break
+    if seen.finite:
+        marcher.march(state, record)
+    change = _changes(seen.gaps, 1) if seen.finite else np.full(len(seen.gaps), np.inf)
+    motion = _harmonics(record.motion @ basis.T, order)
+    opened = float(np.mean(record.force[:, :, 2] == 0.0))
+    return Repetition(
+        motion, change, every, _wander(seen.first), growth, opened, marcher.steps, max(seen.angles)
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """Harmonics of the gaps, first harmonic of the outputs, and angle of the fastest contact that opens, of each period."""
+
+    gaps: list[ComplexArray]
+    first: list[ComplexArray]
+    angles: list[float]
+
+    @property
+    def finite(self) -> bool:
+        return bool(self.gaps) and bool(np.all(np.isfinite(self.gaps[-1])))
+
+
+def _period_by_period(
+    marcher: Marcher, state: StepState, seen: _Seen, rows: FloatArray, order: int, most: int
+) -> int:
+    """March until there are so many periods or it repeats itself; return after how many periods it does, 0: it does not."""
+    record = marcher.record()
+    while len(seen.gaps) < most:
+        lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
+        gaps = _harmonics(record.gap.reshape(marcher.steps, -1), order)
+        seen.gaps.append(np.full_like(gaps, np.nan) if lost else gaps)
+        seen.angles.append(marcher.turn(record))
+        seen.first.append(_harmonics(record.motion @ rows.T, 1)[1])
+        if lost:
+            return 0
+        if len(seen.gaps) > LATER and (every := _repeats(seen.gaps)):
+            return every
+    return 0
+
+
+def _repeats(gaps: Sequence[ComplexArray]) -> int:
+    """Return after how many periods a motion repeats itself, 0: after none; after several only what does not settle to one."""
+    single = float(_changes(gaps[-5:], 1).max())
+    if single < REPEATS:
+        return 1
+    several = range(2, MOST_TURNS + 1) if single > LASTS else ()
+    return next((m for m in several if _changes(gaps[-4 - m :], m).max() < REPEATS), 0)
+
+
+def _growth(marcher: Marcher, state: StepState) -> float:
+    """Return the factor by which the distance of a kicked copy grows in a period while it is small.
+
+    Of each half of the periods the largest distance counts: one that merely swings between displacement and speed does not grow.
+    """
+    n, record = marcher.n, marcher.record()
+    own, other = (StepState(state.x.copy(), state.seen.copy(), state.law.copy(), state.status.copy()) for _ in range(2))  # fmt: skip
+    other.x[n : 2 * n] += KICK * np.abs(state.x[n : 2 * n]).max() * np.cos(2.4 * np.arange(n))
+    size = float(np.linalg.norm(state.x[: 2 * n]))
+    apart: list[float] = []
+    while len(apart) < KICKED and not (apart and apart[-1] > PARTED):
+        for one in (own, other):
+            if marcher.march(one, record) < 0:
+                return np.inf
+        apart.append(float(np.linalg.norm(other.x[: 2 * n] - own.x[: 2 * n])) / size)
+    half = len(apart) // 2
+    if half == 0 or max(apart[:-half]) == 0.0:
+        return np.inf if apart[-1] > PARTED else 0.0
+    return float((max(apart[-half:]) / max(apart[:-half])) ** (1.0 / half))
+
+
+def _harmonics(samples: FloatArray, order: int) -> ComplexArray:
+    return period_harmonics(samples[-1], samples, order)
+
+
+def _changes(gaps: Sequence[ComplexArray], turns: int) -> FloatArray:
+    """Return the changes over so many periods, of the size of the vibration."""
+    size = max(*(float(np.linalg.norm(g[1:])) for g in gaps), np.finfo(float).tiny)
+    return np.array([float(np.linalg.norm(b - a)) / size for a, b in zip(gaps, gaps[turns:], strict=False)])  # fmt: skip
+
+
+def _lasts(change: FloatArray) -> bool:
+    last = float(np.max(change[-LATER:], initial=0.0))
+    before = float(np.max(change[-2 * LATER : -LATER], initial=0.0))
+    return np.isfinite(last) and last > LASTS and last > 0.5 * before
+
+
+def _wander(first: Sequence[ComplexArray]) -> float:
+    last = np.array(first[-LATER:])
+    size = float(np.linalg.norm(last, axis=1).max())
+    moved = np.linalg.norm(np.diff(last, axis=0), axis=1)
+    return float(np.max(moved, initial=0.0)) / size if size > 0.0 else 0.0
