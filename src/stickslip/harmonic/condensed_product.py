@@ -15,7 +15,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import SparseRows
 from stickslip.harmonic.factors import with_contacts
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.spectral import Interior
+from stickslip.harmonic.spectral import Blocks, Interior
 from stickslip.harmonic.state_space import StateSpace
 from stickslip.harmonic.support import Harmonics, real_rows
 
@@ -250,25 +250,32 @@ def _near(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products of the retained coordinates' own matrices."""
     k, c, m = linear.nn
     loss = None if linear.loss is None else rows @ linear.loss[0]
-    stiff, inert = rows @ k, rows @ m
-    if linear.rayleigh is not None:
-        a, b = linear.rayleigh
-        return stiff, a * stiff + b * inert, inert, loss
-    return stiff, rows @ (c if linear.ln is None else c.T), inert, loss
+    return _products(rows, (k, c if linear.ln is None else c.T, m), linear.rayleigh, loss)
 
 
 def onto_interior(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products from retained coordinates to the interior."""
-    k, c, m = linear.far
     loss = None if linear.loss is None else rows @ linear.loss[1]
-    return rows @ k, rows @ c, rows @ m, loss
+    return _products(rows, linear.far, linear.rayleigh_across, loss)
 
 
 def _back(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products from the interior to retained coordinates."""
     k, c, m = linear.nl
     loss = None if linear.loss is None else rows @ linear.loss[1].T
-    return rows @ k.T, rows @ c.T, rows @ m.T, loss
+    return _products(rows, (k.T, c.T, m.T), linear.rayleigh_across, loss)
+
+
+def _products(
+    rows: FloatArray, blocks: Blocks, shares: tuple[float, float] | None, loss: FloatArray | None
+) -> Lossy:
+    """Return the products with stiffness, damping and mass; that with the damping out of the others where it is made of them."""
+    k, c, m = blocks
+    stiff, inert = rows @ k, rows @ m
+    if shares is None:
+        return stiff, rows @ c, inert, loss
+    a, b = shares
+    return stiff, a * stiff + b * inert, inert, loss
 
 
 def _inner_parts(linear: Interior, rows: FloatArray) -> Lossy:

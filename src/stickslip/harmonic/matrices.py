@@ -70,9 +70,20 @@ def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, f
     if not np.all(size > 0.0):
         return None
     a, b = np.linalg.lstsq(own / size, np.diagonal(c), rcond=None)[0] / size
+    return (float(a), float(b)) if are_shares(float(a), float(b), (k, c, m)) else None
+
+
+def are_shares(
+    a: float,
+    b: float,
+    blocks: tuple[FloatArray, FloatArray, FloatArray],
+    rounding: float = PROPORTIONAL,
+) -> bool:
+    """Whether the damping is ``a`` times the stiffness and ``b`` times the mass, to `rounding` of the largest entry of each row."""
+    k, c, m = blocks
     for first in range(0, len(c), ROWS):
         stiff, damped, inert = (matrix[first : first + ROWS] for matrix in (k, c, m))
-        off = np.max(np.abs(a * stiff + b * inert - damped), axis=1)
-        if np.any(off > PROPORTIONAL * np.max(np.abs(damped), axis=1)):
-            return None
-    return float(a), float(b)
+        off = np.max(np.abs(a * stiff + b * inert - damped), axis=1, initial=0.0)
+        if np.any(off > rounding * np.max(np.abs(damped), axis=1, initial=0.0)):
+            return False
+    return True

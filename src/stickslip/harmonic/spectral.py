@@ -16,13 +16,14 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from stickslip.harmonic.matrices import shares_of_two
+from stickslip.harmonic.matrices import are_shares, shares_of_two
 from stickslip.harmonic.state_space import StateSpace, state_space
 
 Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
 PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
 LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
+IN_MODES = 1e-11  # share of the largest damping in a row by which a sum of products with the modes of the interior may round
 FAST = (
     10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 )
@@ -193,6 +194,12 @@ class Interior:
     def rayleigh(self) -> tuple[float, float] | None:
         """The shares of stiffness and mass that make up the damping of the retained coordinates; None where it is made of more."""
         return None if self.ln is not None else shares_of_two(*self.nn)
+
+    @cached_property
+    def rayleigh_across(self) -> tuple[float, float] | None:
+        """The same shares, if they make up the damping between the retained coordinates and the interior, too."""
+        own = self.rayleigh
+        return own if own is not None and are_shares(*own, self.nl, IN_MODES) else None
 
     @cached_property
     def transposed(self) -> "Interior":
