@@ -24,13 +24,12 @@ from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps
 from stickslip.assembly.waves import reduced_sector
+from stickslip.assembly.whole import as_it_is, refuse_rigid
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
 from stickslip.errors import input_error
-from stickslip.harmonic.dynamic_stiffness import LARGEST_INTERIOR
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
@@ -131,6 +130,7 @@ def assemble(
 def system_of(model: Model, linear: Linear, what: Asked) -> tuple[System, System, HarmonicLoad]:
     """Return the system without and with the retention, and the loads on it."""
     refuse_mixed_gaps(model, linear.gaps)
+    refuse_rigid(model, linear.side)
     system = System(
         linear.side,
         Interface(model.pairs.names, model.pairs.laws, linear.gaps),
@@ -256,15 +256,7 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
         return np.concatenate([part.structure.expand(piece) for part, piece in each])
 
     steady = found.load(few.load(steady))
-    return Linear(_side(structure, gaps), gaps, steady, of_dofs, load, of_wave, expand=expand)
-
-
-def _side(structure: Structure, gaps: Matrix) -> LinearSide:
-    """Return a structure whose parts are kept whole as it is where it has too many dofs to be condensed."""
-    if structure.is_complex or not scipy.sparse.issparse(structure.stiffness):
-        return structure
-    interior = structure.n - np.unique(gaps.nonzero()[1]).size
-    return Unreduced(structure) if interior > LARGEST_INTERIOR else structure
+    return Linear(as_it_is(structure, gaps), gaps, steady, of_dofs, load, of_wave, expand=expand)
 
 
 def free_coordinates(model: Model, linear: Linear) -> IntArray | None:

@@ -11,6 +11,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store, in_memory
+from stickslip.assembly.whole import refuse_whole
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 from stickslip.reduction.common_modes import ModesExchangedError
@@ -138,6 +139,7 @@ def _assembled(
         if speed not in known:
             turning = replace(model, speed=speed)
             known[speed] = assemble(turning, harmonics, store, checked=speed == speeds[1])
+            refuse_whole("run_up", known[speed])
         return known[speed]
 
     for intervals in INTERVALS:

@@ -6,6 +6,8 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.harmonic.linear import one_structure
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
@@ -61,6 +63,11 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     holds
         (n_contacts,) contact points that stick under the static loads; None: all.
 
+    Raises
+    ------
+    InputError
+        If the structure is not reduced.
+
     Notes
     -----
     Eigenvalues of ``λ²M + λC + K`` with all that C and K hold, Coriolis terms and unsymmetric ones of a flow included: undamped modes are
@@ -68,6 +75,8 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     each mode's own frequency. Of more than 400 coordinates the motions are spanned by undamped modes and the static answers to the forces
     that couple these.
     """
+    if isinstance(system.structure, Unreduced):
+        one_structure(system.structure, "stuck_modes")
     own = system.structure.of_harmonic(1)
     springs = system.springs.stuck_stiffness()
     if holds is not None:

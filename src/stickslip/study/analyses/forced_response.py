@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import unreduced_line
 from stickslip.errors import SingularError
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
@@ -151,6 +152,7 @@ class ForcedResponseAnalysis:
         return (
             *_of_pressures(case, model),
             str(estimate(model, question.sweep)),
+            *unreduced_line(question.model),
             *question.orders_lines,
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
             cost_line(question),
@@ -187,7 +189,8 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
         return
     _compile(question)
     model = question.model
-    for line in model.frequencies.lines() if question.first else ():
+    lines = (*unreduced_line(model), *model.frequencies.lines()) if question.first else ()
+    for line in lines:
         LOG.info(line)
     for point in forced_response(model.system, model.load, question.sweep, done=done):
         yield point

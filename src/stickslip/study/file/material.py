@@ -56,8 +56,8 @@ class ReductionTable(Section):
     method: Literal["craig_bampton", "rubin", "none"] = Field(
         "craig_bampton",
         description="craig_bampton (modes with the physical dofs fixed), rubin (with them free; exact free modes), or none: the part "
-        "is kept whole; where more than 5000 dofs touch no contact nothing is condensed either, and the forced response alone takes "
-        "such a model",
+        "is kept whole; where more than 5000 dofs touch no contact nothing is condensed either; [forced_response], [modes] and "
+        "[campbell] take such a model, without stability and time integration",
     )
     fixed_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
         None,

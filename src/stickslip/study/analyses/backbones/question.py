@@ -6,6 +6,7 @@ from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
@@ -104,6 +105,7 @@ def question_of(case: Case, model: Model) -> Question:
     refuse_waves(NAME, asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
     assembled = free_to_vibrate(model, most, case.store)
+    refuse_whole(NAME, assembled)
     refuse_rigid(NAME, assembled)
     question = Question(
         case.label,

@@ -6,6 +6,7 @@ from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
 from stickslip.reduction.tuned import TunedWheel
@@ -96,6 +97,7 @@ def question_of(case: Case, model: Model) -> Question:
     refuse_waves("limit_cycle", asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
     assembled = free_to_vibrate(model, most, case.store)
+    refuse_whole("limit_cycle", assembled)
     refuse_rigid("limit_cycle", assembled)
     question = Question(
         case.label,

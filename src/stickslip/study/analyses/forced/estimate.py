@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import kept_whole
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
 from stickslip.model.part import Part
@@ -22,6 +23,11 @@ FEWEST_A_POINT = 2  # where hardly a contact slips: two wheels took 1.6 to 3
 SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
 # of a step where hardly a contact slips: 10 ms with 190 to 300 unknowns, 12 to 30 ms with 440 to 570, 20 ms with 1900
 SECONDS_AN_UNKNOWN = 3e-5
+# where nothing is condensed, of a step with a new factor: 32 µs with 2000 contacts and 27 with 5000; 13 with a kept one in gross slip
+SECONDS_A_WHOLE_UNKNOWN = 4e-5
+BYTES_A_WHOLE_UNKNOWN = (
+    2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
+)
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 
 
@@ -82,7 +88,8 @@ class Estimate:
 def estimate(model: Model, sweep: Sweep) -> Estimate:
     """Estimate memory and work of the response of a model that is not assembled yet: how many points slip nobody knows before."""
     sectors = 1 if model.mistuning is None else model.sectors
-    nodes, coordinates = nodes_of(model), sectors * retained_of(model)
+    whole = kept_whole(model)
+    nodes, coordinates = nodes_of(model), whole or sectors * retained_of(model)
     low, high = (
         (2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics)
     )
@@ -95,7 +102,10 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     judged = 0 if kept else points * some if sweep.auto else points
     steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
-    of_low, of_high = (_flops(n) / FLOPS + SECONDS_A_STEP for n in (low, high))
+    of_low, of_high = (
+        (SECONDS_A_WHOLE_UNKNOWN * n if whole else _flops(n) / FLOPS) + SECONDS_A_STEP
+        for n in (low, high)
+    )
     most_seconds = steps_low * of_low + (steps_high + judged) * of_high
     # without a budget strategies look at the larger space wherever they stand
     easy_low, easy_high = (SECONDS_AN_UNKNOWN * n + SECONDS_A_STEP for n in (low, high))
@@ -104,10 +114,12 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     harmonics = (
         f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
     )
-    stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
+    each = 1 if whole else 10  # numbers a harmonic and coordinate: contacts are few among all dofs
+    stored = points * (sweep.high_harmonics[-1] + 1) * each * coordinates * 16 / 1e9
     # all sectors: a factor of each harmonic and the wheel's matrices; else one of all harmonics together
     largest = 6 * high**2 if sectors == 1 else 12 * (high + 4 * coordinates) * coordinates
-    memory = memory_gb(nodes) + stored + largest * 8 / 1e9
+    solving = BYTES_A_WHOLE_UNKNOWN * high if whole else largest * 8
+    memory = memory_gb(nodes) + stored + solving / 1e9
     return Estimate(
         nodes=nodes,
         unknowns=high,

@@ -1,5 +1,7 @@
 """What an examination of the stability costs, and whether it is begun: all sectors of a wheel count, each of which may do something else."""
 
+from stickslip.assembly.whole import KEPT
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.contact_states import is_located
 from stickslip.response.stability.hill import MOST, ROWS
@@ -44,6 +46,8 @@ def too_long(system: System, *, forced: bool) -> str:
     forced
         Whether a load drives it.
     """
+    if isinstance(system.structure, Unreduced):
+        return f"a reduced model is needed, and {KEPT}"
     side, work = system.structure, examination_work(system)
     wheel = isinstance(side, TunedWheel)
     most = MOST_WHEEL if forced and wheel else MOST_WORK
@@ -75,7 +79,8 @@ def by_hill(system: System) -> bool:
     interface, side = system.interface, system.structure
     large = isinstance(side, TunedWheel) and bool(too_long(system, forced=True))
     return (
-        (large or side.of_harmonic(1).loss is not None)
+        not isinstance(side, Unreduced)
+        and (large or side.of_harmonic(1).loss is not None)
         and not interface.rigid
         and all(is_located(law) for law in interface.laws)
         and hill_work(system) <= MOST_HILL

@@ -10,9 +10,11 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import static_state
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.support import is_full, named
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import frozen_sliders
@@ -138,6 +140,8 @@ class Question:
 def too_large(question: Question) -> str:
     """Return how many coordinates are too many to be integrated in time; empty where they are not."""
     system = question.model.system
+    if isinstance(system.structure, Unreduced):
+        return f"a reduced model is needed, and {KEPT}"
     sectors = sectors_in_time(system)
     size, kept = sectors * system.structure.n, sectors * len(system.retained_labels)
     if size <= MOST_IN_TIME:
@@ -186,6 +190,7 @@ def question_of(case: Case, model: Model) -> Question:
     if examined and examines_every_wave(assembled.system):
         assembled = model.assembled(harmonics, case.store, every_wave=True)
     if IN_TIME in case.checks:
+        refuse_whole("--verify", assembled, "run without --verify")
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:
         assembled = _with_frozen_sliders(assembled, share)

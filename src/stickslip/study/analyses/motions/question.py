@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.all_motions.basins import not_marched
@@ -57,6 +58,7 @@ def question_of(case: Case, model: Model) -> Question:
     """
     asked: AllMotionsTable = case.settings.all_motions
     assembled = peak_first(model.assembled(2 * asked.harmonics, case.store))
+    refuse_whole("all_motions", assembled)
     if not any(np.any(f) for f in assembled.load.harmonics.values()):
         raise input_error(
             "all_motions",

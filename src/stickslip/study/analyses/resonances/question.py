@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
+from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -105,6 +106,7 @@ def question_of(case: Case, model: Model) -> Question:
     parameter = _parameter(case, asked)
     _accepted(case, asked, parameter)
     assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
+    refuse_whole("resonance", assembled)
     refuse_rigid("resonance", assembled)
     evaluator: Evaluator = case.settings.solver.evaluator
     how = represented(asked.harmonics, evaluator)

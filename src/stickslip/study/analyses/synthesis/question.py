@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -107,6 +108,7 @@ def question_of(case: Case, model: Model) -> Question:
             )
     most = FACTOR * max(asked.harmonics, asked.most_harmonics)
     assembled = peak_first(model.assembled(most, case.store))
+    refuse_whole(NAME, assembled)
     refuse_rigid(NAME, assembled)
     facts = facts_of(model, model.speed / RPM)
     _bounded(asked.levels, assembled.load)

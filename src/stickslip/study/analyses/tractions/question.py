@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.starts import starts_of
 from stickslip.errors import InputError, input_error
@@ -117,6 +118,7 @@ def question_of(case: Case, model: Model) -> Question:
     if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
         raise refusal
     assembled = peak_first(model.assembled(asked.harmonics, case.store))
+    refuse_whole("residual_tractions", assembled)
     if not any(np.any(force) for force in assembled.load.harmonics.values()):
         name = next(iter(model.driven))
         raise input_error(

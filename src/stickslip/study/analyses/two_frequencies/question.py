@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
+from stickslip.assembly.whole import refuse_whole
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.reduction.tuned import TunedWheel
@@ -135,6 +136,7 @@ def question_of(case: Case, model: Model) -> Question:
         )
     most = max(asked.most_harmonics, *(h for own in keys for h in own.values()))
     assembled = peak_first(together.assembled(most, case.store, every_wave=wheel))
+    refuse_whole(NAME, assembled)
     static = assembled.load.static
     loads = [
         HarmonicLoad(static if i == 0 else np.zeros_like(static), _of(assembled, own, keys[i]))
