@@ -5,7 +5,8 @@ is a point of the Poincaré section: the nearest that these come to each other a
 of the first harmonic have to be the same for every step. A motion that a balance stands for is marched from this balance: it stays there.
 
 ``python -m evidence.benchmarks.returns 24 0.3 all 600 800`` does so at these frequencies with 512, 1024 and 2048 steps, or with those that
-stand in the place of ``all``; with ``stay`` there it begins on the balances. What is printed is JSON.
+stand in the place of ``all``; with ``stay`` there it begins on the balances. ``1024 verdict`` in the place of ``all`` repeats the verdict from so many steps on. What is printed
+is JSON.
 """
 
 import json
@@ -17,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from evidence.benchmarks.bench_lift_off import sweep_over
+from evidence.benchmarks.bench_lift_off import ORDER, sweep_over
 from evidence.models.many_contacts import Plates, two_plates
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.time.marcher import Marcher, prepared
+from stickslip.response.time.repeating import repetition
 from stickslip.response.time.settling import period_harmonics
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 
@@ -95,6 +97,19 @@ def returning(
     }  # fmt: skip
 
 
+def verdict(contacts: int, share: float, hertz: float, steps: int) -> dict[str, Any]:
+    """Return what is told of a frequency if the march begins with so many steps, and looks again with twice as many."""
+    plates, began, omega = two_plates(contacts), process_time(), 2.0 * np.pi * hertz
+    system = plates.system
+    seen = repetition(system.structure, system.interface, plates.load(share), omega, system.outputs, ORDER, steps)  # fmt: skip
+    both = [seen, *([] if seen.finer is None else [seen.finer])]
+    return {
+        "contacts": contacts, "share": share, "hertz": hertz, "verdict": seen.verdict, "every": seen.every,
+        "marches": [(s.steps, s.periods, round(s.angle, 3), round(s.wander, 4), round(s.growth, 3)) for s in both],
+        "cpu_s": round(process_time() - began, 1),
+    }  # fmt: skip
+
+
 def staying(
     contacts: int, share: float, hertz: tuple[float, ...], periods: int = 48
 ) -> Iterator[dict[str, Any]]:
@@ -123,12 +138,14 @@ def staying(
 
 
 if __name__ == "__main__":
-    size, part = int(sys.argv[1]), float(sys.argv[2])
-    asked = tuple(float(hz) for hz in sys.argv[4:])
-    if sys.argv[3] == "stay":
-        for told in staying(size, part, asked):
+    size, part, how = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
+    if how == "stay":
+        for told in staying(size, part, tuple(float(hz) for hz in sys.argv[4:])):
             print(json.dumps(told), flush=True)
+    elif sys.argv[4] == "verdict":
+        for hz in sys.argv[5:]:
+            print(json.dumps(verdict(size, part, float(hz), int(how))), flush=True)
     else:
-        for hz in asked:
-            for n in STEPS if sys.argv[3] == "all" else (int(sys.argv[3]),):
-                print(json.dumps(returning(size, part, hz, n)), flush=True)
+        for hz in sys.argv[4:]:
+            for n in STEPS if how == "all" else (int(how),):
+                print(json.dumps(returning(size, part, float(hz), n)), flush=True)
