@@ -51,7 +51,7 @@ class _Sums:
     terms: Terms
     load: ComplexArray  # statically condensed
     source: ComplexArray
-    direct: ComplexArray
+    direct: ComplexArray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +235,8 @@ class CondensedStiffness:
         if terms is None:
             return None
         f_n, f_l = self._modal_load
-        return _Sums(terms, f_n - f_l @ self.nl[0].T, terms.source(f_l), f_l @ terms.direct.T)
+        direct = None if terms.direct is None else f_l @ terms.direct.T
+        return _Sums(terms, f_n - f_l @ self.nl[0].T, terms.source(f_l), direct)
 
     def _interior_dynamic(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""

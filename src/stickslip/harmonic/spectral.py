@@ -40,24 +40,19 @@ class ModeTerms:
     left: FloatArray  # (n, J)
     right: FloatArray  # (J, n)
     polynomial: FloatArray  # (4, n, n) P
-    direct: FloatArray  # (n, l); the load takes ``left diag(v / d) source + p direct f_L``
     ratio: FloatArray  # (l,) κ
     damping: FloatArray  # (l,) c
     mass: FloatArray  # (l,) m
     symmetric: bool = True
+    direct: None = None  # the load takes ``left diag(v / d) source`` alone
 
-    def weights(self, powers: ComplexArray) -> ComplexArray:
-        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p."""
-        d, v, q, _ = powers @ self._coefficients
+    def weights(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and v / d and its derivative at the first `loaded` of them."""
+        d, v, q, r = powers @ self._coefficients
         inverse = 1.0 / d
         over = v * inverse
-        return np.array([v * over, q * inverse * over])
-
-    def load_weights(self, powers: ComplexArray) -> ComplexArray:
-        """Return v / d and its derivative by p, (2, H, J), at the `powers` (H, 4) of p."""
-        d, v, _, r = powers @ self._coefficients
-        inverse = 1.0 / d
-        return np.array([v * inverse, r * inverse * inverse])
+        own, first = inverse[:loaded], over[:loaded]
+        return np.array([v * over, q * inverse * over]), np.array([first, r[:loaded] * own * own])
 
     @cached_property
     def _coefficients(self) -> ComplexArray:
@@ -83,9 +78,9 @@ class ModeTerms:
         residues = (self.left[rows] * self.left[columns]).T
         return np.concatenate([self.polynomial[:, rows, columns], -residues])
 
-    def on_table(self, powers: ComplexArray) -> ComplexArray:
-        """Return the `weights` of the rows of `table` beyond the polynomial."""
-        return self.weights(powers)
+    def on_table(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return the `weights` of the rows of `table` beyond the polynomial, and those of the load."""
+        return self.weights(powers, loaded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +95,15 @@ class Poles:
     states: StateSpace
     symmetric: bool
 
-    def weights(self, powers: ComplexArray) -> ComplexArray:
-        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p."""
+    def weights(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and those of the load at the first `loaded` of them."""
         p = powers[:, 1:2]
         e = 1.0 / (1.0 - p * self.states.nu)
         w = np.where(self.power == 2, p**4, p * p) * e
-        return np.array([w, w * (2.0 * self.power / p + self.states.nu * e)])
+        slope = w * (2.0 * self.power / p + self.states.nu * e)
+        return np.array([w, slope]), self._load_weights(powers[:loaded])
 
-    def load_weights(self, powers: ComplexArray) -> ComplexArray:
+    def _load_weights(self, powers: ComplexArray) -> ComplexArray:
         """Return ``v = p^a / (1 - p ν)`` and dv/dp, (2, H, J), at the `powers` (H, 4) of p."""
         p = powers[:, 1:2]
         e = 1.0 / (1.0 - p * self.states.nu)
@@ -132,8 +128,8 @@ class Poles:
         polynomial = self.polynomial[:, rows, columns]
         return np.concatenate([polynomial, -own, -2.0 * paired.real, 2.0 * turned.real])
 
-    def on_table(self, powers: ComplexArray) -> ComplexArray:
-        """Return what the `weights` are for the rows of `table` beyond the polynomial.
+    def on_table(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return what the `weights` are for the rows of `table` beyond the polynomial, and those of the load.
 
         A pair of poles adds up to ``g (2 Re R - 2 p Re(ν* R))`` with ``g = p^2a / (1 - 2 p Re ν + p² |ν|²)``.
         """
@@ -152,7 +148,7 @@ class Poles:
         np.multiply(p, value[:, pairs], out=turned)
         np.multiply(p, slope[:, pairs], out=turned_slope)
         turned_slope += value[:, pairs]
-        return out
+        return out, self._load_weights(powers[:loaded])
 
     @cached_property
     def _denominators(self) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:
@@ -251,9 +247,8 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
         return None
     polynomial = np.concatenate([whole, np.zeros((1, *whole.shape[1:]))])
     return ModeTerms(
-        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio,
-        np.diagonal(ll[1]), np.diagonal(ll[2]),
-    )  # fmt: skip
+        m, np.ascontiguousarray(m.T), polynomial, ratio, np.diagonal(ll[1]), np.diagonal(ll[2])
+    )
 
 
 def _poles(interior: Interior, states: StateSpace) -> Poles:
@@ -290,7 +285,7 @@ def _poles(interior: Interior, states: StateSpace) -> Poles:
 
 
 def summed(
-    terms: Terms, omega: float, order: int, source: ComplexArray, direct: ComplexArray
+    terms: Terms, omega: float, order: int, source: ComplexArray, direct: ComplexArray | None
 ) -> tuple[ComplexArray, ComplexArray]:
     """Evaluate the sums of harmonics 0..`order` at `omega` (rad/s), which is not zero.
 
@@ -314,50 +309,57 @@ def summed(
         (2, order + 1, n) what the load of the interior adds, and its derivative.
     """
     n = terms.left.shape[0]
-    rate = 1j * np.arange(1, order + 1)[:, None]
-    p = omega * rate
     matrices = np.empty((2, order + 1, n, n), dtype=complex)
     matrices[0, 0], matrices[1, 0] = terms.polynomial[0], 0.0
-    powers = _powers(p)
-    _fill(terms, powers, rate, matrices[:, 1:])
-    loads = np.zeros((2, order + 1, n), dtype=complex)
+    powers, rate = _powers(omega, order)
     loaded = min(order + 1, len(source))
+    by_table = terms.symmetric and terms.left.size * (n + 1) / 2 <= LARGEST_TABLE
+    weigh = terms.on_table if by_table else terms.weights
+    weights, of_load = weigh(powers[0], loaded - 1)
+    weights[1] *= rate
+    (_tabled if by_table else _multiplied)(terms, powers, weights, matrices[:, 1:])
+    loads = np.zeros((2, order + 1, n), dtype=complex)
     if loaded > 1:
-        own, p = loads[:, 1:loaded], p[: loaded - 1]
-        weights = terms.load_weights(powers[0, : loaded - 1])
-        np.matmul(weights * -source[1:loaded], terms.left.T, out=own)
-        own[0] -= p * direct[1:loaded]
-        own[1] -= direct[1:loaded]
-        own[1] *= rate[: loaded - 1]
+        own, rate = loads[:, 1:loaded], rate[: loaded - 1]
+        of_load[1] *= rate
+        np.matmul(of_load * -source[1:loaded], terms.left.T, out=own)
+        if direct is not None:
+            own[0] -= omega * rate * direct[1:loaded]
+            own[1] -= rate * direct[1:loaded]
     return matrices, loads
 
 
-def _fill(terms: Terms, powers: ComplexArray, rate: ComplexArray, out: ComplexArray) -> None:
-    """Write ``Σ_k P_k p^k - Σ w R`` and `rate` (H, 1) times its derivative by p to `out` (2, H, n, n), from the `_powers` of p."""
-    n, size = terms.left.shape
-    if not terms.symmetric or size * n * (n + 1) / 2 > LARGEST_TABLE:
-        weights = terms.weights(powers[0])
-        scaled = (terms.left * weights[:, :, None]).reshape(2 * rate.size * n, size)
-        products = (scaled @ terms.right).reshape(out.shape)
-        polynomial = powers @ terms.polynomial.reshape(4, -1)
-        np.subtract(polynomial.reshape(out.shape), products, out)
-        out[1] *= rate[:, :, None]
-        return
-    weights = np.concatenate([powers, terms.on_table(powers[0])], axis=2)
-    weights[1] *= rate
-    rows = np.array([weights.real, weights.imag]).reshape(-1, 4 + size)
-    full = (rows @ terms.table).take(_places(n), axis=1).reshape(2, *out.shape)
+def _multiplied(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: ComplexArray) -> None:  # fmt: skip
+    """Write ``Σ_k P_k p^k - Σ w R`` and its derivative to `out` (2, H, n, n)."""
+    size = terms.left.shape[1]
+    scaled = (terms.left * weights[:, :, None]).reshape(-1, size)
+    products = (scaled @ terms.right).reshape(out.shape)
+    polynomial = powers @ terms.polynomial.reshape(4, -1)
+    np.subtract(polynomial.reshape(out.shape), products, out)
+
+
+def _tabled(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: ComplexArray) -> None:
+    """Do the same by one real product with the table of residues."""
+    n, table = terms.left.shape[0], terms.table
+    whole = np.concatenate([powers, weights], axis=2)
+    rows = np.array([whole.real, whole.imag]).reshape(-1, len(table))
+    full = (rows @ table).take(_places(n), axis=1).reshape(2, *out.shape)
     out.real, out.imag = full
 
 
-def _powers(p: ComplexArray) -> ComplexArray:
-    """Return the powers 0 to 3 of `p` (H, 1) and their derivatives, (2, H, 4)."""
-    out = np.zeros((2, p.shape[0], 4), dtype=complex)
-    square = p * p
-    out[0, :, 0] = out[1, :, 1] = 1.0
-    out[0, :, 1:2], out[0, :, 2:3], out[0, :, 3:] = p, square, p * square
-    out[1, :, 2:3], out[1, :, 3:] = 2.0 * p, 3.0 * square
-    return out
+def _powers(omega: float, order: int) -> tuple[ComplexArray, ComplexArray]:
+    """Return the powers 0 to 3 of ``p = i h ω`` and their derivatives by ω, (2, H, 4), and the rates ``i h`` (H, 1)."""
+    rate, powers = _rates(order)
+    square = omega * omega
+    of_omega = (1.0, omega, square, omega * square), (0.0, 1.0, 2.0 * omega, 3.0 * square)
+    return powers * np.array(of_omega)[:, None], rate
+
+
+@lru_cache(maxsize=32)
+def _rates(order: int) -> tuple[ComplexArray, ComplexArray]:
+    """Return ``i h`` (H, 1) and its powers 0 to 3 (H, 4)."""
+    rate = 1j * np.arange(1, order + 1)[:, None]
+    return rate, np.concatenate([np.ones_like(rate), rate, rate * rate, rate * rate * rate], axis=1)
 
 
 @lru_cache(maxsize=8)
