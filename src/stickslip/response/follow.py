@@ -318,7 +318,8 @@ class _Walk:
         return self.route.farthest([stop.point.p for stop in self.branch])
 
     def _idle(self) -> bool:
-        return self.route.idle([stop.point.p for stop in self.branch])
+        listed = self.route.listed
+        return not listed and self.route.idle([stop.point.p for stop in self.branch])
 
     def _further(self) -> float:
         """Return the value at which a lost branch is taken up."""

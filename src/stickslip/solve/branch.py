@@ -178,10 +178,12 @@ class Measure:
 
 def measure_at(x: FloatArray, following: Following) -> Measure:
     """Return how lengths are measured near `x`: changes of x by its own size, changes of p by the scale of the step control."""
-    weights = np.append(following.weights, 1.0 / following.control.scale)
-    size = float(np.linalg.norm(following.weights * x))
-    if size > 0.0:
-        weights[:-1] /= size
+    own = following.weights
+    weights = np.empty(own.size + 1)
+    weights[-1] = 1.0 / following.control.scale
+    sized = own * x
+    size = math.sqrt(sized.dot(sized))
+    np.divide(own, size if size > 0.0 else 1.0, out=weights[:-1])
     return Measure(weights)
 
 
@@ -246,8 +248,9 @@ class Latest:
 
     def known(self, x: FloatArray, p: float) -> ParameterEvaluation | None:
         """Return the latest evaluation if it was made at (x, p)."""
-        same = self.x is not None and self.p == p and np.array_equal(self.x, x)
-        return self.at if same else None
+        if self.x is None or self.p != p:
+            return None
+        return self.at if self.x is x or np.array_equal(self.x, x) else None
 
 
 def reversed_point(point: Point) -> Point:

@@ -60,7 +60,8 @@ def start_point(problem: Problem, x: FloatArray, p: float, following: Following)
         y = np.append(solution.x, p)
         tangent, sign = tangent_at(problem, y, growing, following, at)
     else:
-        along = np.append(inverse(-at.jac_p), 1.0)
+        along = upward(x.size + 1)
+        along[:-1] = inverse(-at.jac_p)
         tangent, sign = along / measure_at(solution.x, following).of(along), inverse.sign
     return Point(solution.x, p, tangent, first, solution, sign)
 

@@ -21,7 +21,7 @@ class Factored:
     def sign(self) -> float:
         """Sign of its determinant."""
         swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
-        flips = swaps + np.count_nonzero(np.diagonal(self.lu) < 0.0)
+        flips = swaps + np.count_nonzero(self.lu.diagonal() < 0.0)
         return 1.0 if flips % 2 == 0 else -1.0
 
     def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
@@ -34,6 +34,7 @@ def lu_factors(matrix: FloatArray) -> Factored | None:
     """Factorise an array, which is overwritten; None if it is singular to working precision."""
     lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
     size = np.abs(lu.diagonal())
-    # neither NaN nor infinity passes
-    usable = info == 0 and size.min() > SINGULAR * size.max()
+    size.sort()
+    # neither NaN, which is sorted to the end, nor infinity passes
+    usable = info == 0 and size[0] > SINGULAR * size[-1]
     return Factored(lu, pivots) if usable else None

@@ -1,5 +1,6 @@
 """What the correctors share: an iterate, the work they do, and how a step is taken from one iterate to the next."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
@@ -101,7 +102,9 @@ class Work:
         start = perf_counter()
         step = solve()
         self.seconds_linear += perf_counter() - start
-        return step if step is not None and np.isfinite(step).all() else None
+        # a square that is finite has finite entries alone; one that overflows may have, too
+        finite = step is not None and (math.isfinite(step.dot(step)) or np.isfinite(step).all())
+        return step if finite else None
 
 
 class Globalisation(Protocol):

@@ -276,6 +276,6 @@ def of_forced(curve: ForcedCurve, point: ForcedPoint) -> Followed:
     kind: Kind = point.stage if point.stage in KINDS else "point"
     level = curve.supports.index(point.support)
     start = point.start if point.start.size else None
-    judged = Judged(point.predicted_error, tuple(int(h) for h in point.asked), start)
+    judged = Judged(point.predicted_error, tuple(point.asked.tolist()), start)
     there = curve.forced.branch_point(point, curve.problem(level))
     return Followed(kind, point.index, level, there, judged, point.seconds_total)

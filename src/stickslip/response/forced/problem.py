@@ -122,7 +122,7 @@ class ForcedPoint:
     @property
     def support(self) -> Harmonics:
         """Harmonics kept, as a tuple."""
-        return tuple(int(h) for h in self.harmonics)
+        return tuple(self.harmonics.tolist())
 
     @property
     def converged(self) -> bool:
