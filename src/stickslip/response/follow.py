@@ -318,8 +318,7 @@ class _Walk:
         return self.route.farthest([stop.point.p for stop in self.branch])
 
     def _idle(self) -> bool:
-        listed = self.route.listed
-        return not listed and self.route.idle([stop.point.p for stop in self.branch])
+        return not self.route.listed and self.route.idle([s.point.p for s in self.branch])
 
     def _further(self) -> float:
         """Return the value at which a lost branch is taken up."""
