@@ -21,6 +21,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.part import Part
@@ -36,6 +37,7 @@ from stickslip.response.forced.response import (
 from stickslip.response.recovery import equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
+from stickslip.solve.status import Status
 from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced.curve import Curve
@@ -344,6 +346,23 @@ def test_peak_at_the_end_is_no_resonance() -> None:
         "Widen forced_response.frequency_hz."
     )
     assert told in said
+
+
+def test_what_no_balance_is_found_for_is_found_in_time_or_told_with_what_showed_it() -> None:
+    # a mass on a stop comes back in every period at 1.5, in every second one at 3.5
+    stop = Interface(("1",), (UnilateralSpring(k_n=20.0),), np.array([[0.0], [0.0], [1.0]]))
+    structure = Structure(np.eye(1), 0.1 * np.eye(1), np.eye(1), table(("a.x",)))
+    sweep = Sweep(
+        omega_range=(1.5, 3.5), at=(1.5, 3.5), low=9, high=9, selection="always_high", peak_points=0, rescue="in_time",
+        newton=Newton(max_iterations=1),
+    )  # fmt: skip
+    load = HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
+    data = dataset(solved(question(System(structure, stop, np.array([0])), load, sweep)))
+    periodic, other = data.marched_sentence.values.tolist()
+    assert data.status.values.tolist() == [0, Status.NOT_PERIODIC]
+    assert periodic.startswith("periodic in time after")
+    assert other.count("it repeats itself every 2 periods") == 2
+    assert data.verdict_reason.values.tolist()[1].endswith(f"{other})")
 
 
 def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
