@@ -7,6 +7,9 @@ from test_root_joint import COARSE, CONTACT, FINE, blocks
 from typer.testing import CliRunner
 
 from stickslip.cli import app
+from stickslip.response.forced.sweep import Sweep
+from stickslip.study.analyses.forced.estimate import estimate
+from stickslip.study.models.study import read_study
 
 MODEL = (
     CONTACT.format("node_to_segment").replace("interference_m = 1e-6\n", "")
@@ -111,3 +114,15 @@ def test_run_refuses_what_check_refuses(tmp_path):
 def test_natural_frequencies_need_no_reduction(tmp_path, more):
     code, told = said("run", study(tmp_path, more), "--no-report")
     assert code == 0, told
+
+
+def test_hundreds_of_contacts_are_not_refused_for_an_array_that_is_never_formed(tmp_path):
+    grid = (np.linspace(0.0, 1.0, 18).tolist(),) * 2
+    tmp_path.mkdir(exist_ok=True)
+    path = blocks(tmp_path, grid, grid, MODEL + FORCED, ())
+    sweep = Sweep(omega_range=(1.0, 2.0), high=5, selection="always_high", frequencies=30)
+    cost = estimate(read_study(path).model(), sweep)
+    array = 8 * cost.unknowns**2 / 1e9
+    matrices = 8 * (cost.unknowns / 11) ** 2 / 1e9
+    assert cost.unknowns == 11 * 3 * 18**2
+    assert 10 * matrices < cost.memory_gb < 2.0 * array

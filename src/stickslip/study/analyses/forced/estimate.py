@@ -11,6 +11,7 @@ from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
+from stickslip.solve.linear import MOST
 from stickslip.study.file.loads import Limits
 from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
@@ -116,9 +117,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     )
     each = 1 if whole else 10  # numbers a harmonic and coordinate: contacts are few among all dofs
     stored = points * (sweep.high_harmonics[-1] + 1) * each * coordinates * 16 / 1e9
-    # all sectors: a factor of each harmonic and the wheel's matrices; else one of all harmonics together
-    largest = 6 * high**2 if sectors == 1 else 12 * (high + 4 * coordinates) * coordinates
-    solving = BYTES_A_WHOLE_UNKNOWN * high if whole else largest * 8
+    solving = BYTES_A_WHOLE_UNKNOWN * high if whole else 8 * _numbers(sectors, coordinates, high)
     memory = memory_gb(nodes) + stored + solving / 1e9
     return Estimate(
         nodes=nodes,
@@ -130,6 +129,16 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
         most_seconds=most_seconds,
         most="" if kept else harmonics,
     )
+
+
+def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
+    """Return how many numbers a Newton step holds at once."""
+    if sectors > 1:  # a factor of each harmonic and the wheel's matrices
+        return 12 * (unknowns + 4 * coordinates) * coordinates
+    if unknowns <= MOST:  # an array of all harmonics together, and its factors
+        return 6 * unknowns**2
+    # the structure's matrices and a factor of each harmonic at most; 2.1 GB with 1000 contacts and H = 5, reduction included
+    return 8 * coordinates**2 + unknowns * coordinates
 
 
 def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
