@@ -745,7 +745,7 @@ def test_products_pay_from_some_three_hundred_unknowns():
 def priced(monkeypatch, product: float, array: float) -> None:
     """Let systems cost what a test wants."""
     costs = Costs(product, 0.0, array)
-    monkeypatch.setattr(structured_module, "linear_costs", lambda *_: costs)
+    monkeypatch.setattr(structured_module, "linear_costs", lambda *_, **__: costs)
     monkeypatch.setattr(structured_module, "reduced_cost", lambda *_, **__: np.inf)
 
 

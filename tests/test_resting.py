@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_krylov import OMEGA, STATES, assert_same, problem, state, system
+from test_krylov import OMEGA, STATES, assert_same, load, problem, state, system
 
 from stickslip.contact.interface import sparse_rows
 from stickslip.contact.law import PAIRS
@@ -14,7 +14,8 @@ from stickslip.contact.product import harmonic_means, less_means
 from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic import resting as resting_module
 from stickslip.harmonic import structured as structured_module
-from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.balance import harmonic_balance
+from stickslip.harmonic.dynamic_stiffness import Condensed, condense
 from stickslip.harmonic.matrix_products import MatrixProducts
 from stickslip.harmonic.resting import Resting, TransposedElimination, known
 from stickslip.harmonic.structured import StructuredJacobian
@@ -186,14 +187,13 @@ def counted(monkeypatch) -> list[int]:
         return array(self)
 
     monkeypatch.setattr(Resting, "array", told)
-    monkeypatch.setattr(structured_module, "linear_costs", lambda *_: Costs(1e9, 1e9, 1e9))
+    monkeypatch.setattr(structured_module, "linear_costs", lambda *_, **__: Costs(1e9, 1e9, 1e9))
     return left
 
 
-def test_contacts_that_slip_come_back_and_rest_again_along_a_branch(monkeypatch):
-    # from stick over the resonance, where contacts slip, to stick
-    left = counted(monkeypatch)
-    balance, branches = problem(0.3), []
+def follow_both(balance, span, made_of):
+    """Follow a branch by whole arrays and without what rests, and compare the points; return those of the second."""
+    branches = []
     for made, linear in (
         (replace(balance, jacobian="dense"), Dense()),
         (balance, Automatic()),
@@ -203,20 +203,42 @@ def test_contacts_that_slip_come_back_and_rest_again_along_a_branch(monkeypatch)
             control=StepControl(scale=0.2, largest=0.2, max_points=300),
             weights=np.ones(made.size),
         )
-        start = start_point(made, bonded_start(made, 0.4, system()), 0.4, following)
-        branches.append([start, *trace(made, start, 1.6, following)])
+        start = start_point(made, bonded_start(made, span[0], made_of), span[0], following)
+        branches.append([start, *trace(made, start, span[1], following)])
     assert [p.solution.status.converged for p in branches[1]].count(False) == 0
     assert len(branches[0]) == len(branches[1])
     for one, other in zip(*branches, strict=True):
         assert one.p == pytest.approx(other.p, rel=1e-10)
         assert np.max(np.abs(one.x - other.x)) <= 1e-10 * np.max(np.abs(one.x))
+        assert np.max(np.abs(one.tangent - other.tangent)) <= 1e-9 * np.max(np.abs(one.tangent))
         assert one.orientation == other.orientation
+    return branches[1]
+
+
+def test_contacts_that_slip_come_back_and_rest_again_along_a_branch(monkeypatch):
+    # from stick over the resonance, where contacts slip, to stick
+    left = counted(monkeypatch)
+    follow_both(problem(0.3), (0.4, 1.6), system())
     # few unknowns are left below the first resonance, many at it, few above it, and many at the second
     first = next(i for i, size in enumerate(left) if size > 60)
     least = first + int(np.argmin(left[first:]))
     assert max(left[:4]) <= 3
     assert left[least] < 20
     assert max(left[least:]) > 100
+
+
+def test_a_branch_turns_where_it_does_with_whole_arrays(monkeypatch):
+    # little damping: contacts that begin to slip soften the resonance, and the branch turns back and forth
+    left = counted(monkeypatch)
+    made = system()
+    light = replace(made.structure, damping=0.3 * made.structure.damping)
+    made = replace(made, structure=light)
+    linear = condense(light, made.retained, load(0.3))
+    balance = harmonic_balance(linear, made.interface, 2, 64, jacobian="structured")
+    points = follow_both(balance, (0.5, 1.1), made)
+    turns = np.count_nonzero(np.diff(np.sign([p.tangent[-1] for p in points])))
+    assert turns == 2
+    assert max(left) < balance.size
 
 
 def test_the_choice_of_solver_takes_what_is_left(monkeypatch):

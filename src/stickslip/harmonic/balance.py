@@ -37,7 +37,7 @@ from stickslip.harmonic.vector_forces import (
 )
 from stickslip.operators import Costs
 
-REDUCED = 250  # unknowns from which leaving out what rests can cost less than the whole array
+REDUCED = 300  # unknowns from which leaving out what rests can cost less than the whole array
 
 JacobianForm = Literal["auto", "dense", "structured"]
 

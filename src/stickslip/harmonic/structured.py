@@ -158,7 +158,8 @@ class StructuredJacobian:
         n, harmonics = self.linear.n, len(self.linear.harmonics)
         if isinstance(self.linear, SparseProduct):
             return linear_costs(n, harmonics, self.blocks.size, self.linear.entries)
-        own = linear_costs(n, harmonics, self.blocks.size)
+        shared = n >= SHARED and isinstance(self.linear, Shareable)
+        own = linear_costs(n, harmonics, self.blocks.size, shared=shared)
         return Costs(own.product, own.factors, min(own.array, self._reduced_cost))
 
     @cached_property
