@@ -35,7 +35,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "$(PYTHON) is Python $(VERSION), and 3.11 is the oldest that does. Name one: make PYTHON=/path/to/python3.12"; exit 1; }
 	$(PYTHON) -m venv $(if $(wildcard $@),,--clear) $(VENV)
-	$(PIP_INSTALL) --require-hashes -r requirements.lock
+	$(PIP_INSTALL) --no-deps --require-hashes -r requirements.lock
 	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@$(BIN)/python .ci/system_libraries.py
 	@$(BIN)/stickslip compile
@@ -54,7 +54,7 @@ coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter sl
 optional: $(OPTIONAL_INSTALLED)  ## install what nobody needs by default: readers, a faster factorisation, files of ANSYS to test with (1 GB)
 
 $(OPTIONAL_INSTALLED): $(INSTALLED) optional-requirements.lock
-	$(PIP_INSTALL) --require-hashes -r optional-requirements.lock
+	$(PIP_INSTALL) --no-deps --require-hashes -r optional-requirements.lock
 	@touch $@
 
 test-optional: $(OPTIONAL_INSTALLED)  ## run the tests of these, none skipped
@@ -71,7 +71,7 @@ lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/lint-imports
 
 $(DOCS_INSTALLED): $(INSTALLED) docs/requirements.lock
-	$(PIP_INSTALL) --require-hashes -r docs/requirements.lock
+	$(PIP_INSTALL) --no-deps --require-hashes -r docs/requirements.lock
 	@touch $@
 
 docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
@@ -88,7 +88,7 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 
 .venv-rival/.installed: evidence/benchmarks/requirements.lock $(INSTALLED)
 	$(PYTHON) -m venv .venv-rival
-	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r evidence/benchmarks/requirements.lock
+	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r evidence/benchmarks/requirements.lock
 	@touch $@
 
 strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)

@@ -561,5 +561,5 @@ def test_where_nothing_helps_the_nearest_attempt_is_returned():
 
 def test_rungs_are_counted_in_their_order():
     assert [rung.name for rung in sorted(Rung)] == [
-        "FULL_STEPS", "DAMPED_STEP", "SHORTER_STEP", "OTHER_GLOBALISATION", "HOMOTOPY"
+        "FULL_STEPS", "DAMPED_STEP", "SHORTER_STEP", "OTHER_GLOBALISATION", "HOMOTOPY", "IN_TIME"
     ]  # fmt: skip
