@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.solve import last_factors
 from stickslip.solve.branch import Latest, tangent_at, upward
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.krylov import Krylov
+from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.last_factors import LastFactors
 from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
@@ -96,3 +97,19 @@ def test_another_solver_stays_in_charge():
     with pytest.raises(InputError, match="Give Dense for an array"):
         factors.solve(MATRIX, np.ones(2))
     assert factors.inverse is None
+
+
+@pytest.mark.parametrize("bordered", [False, True])
+def test_factors_do_not_outlive_a_later_step_by_products(monkeypatch, bordered):
+    """What a system costs depends on its contacts: one step may be factorised, and the next one not."""
+    factors, right = LastFactors(Automatic()), np.ones(2)
+    factors.solve(MATRIX.copy(order="F"), right)
+    assert factors.inverse is not None
+    monkeypatch.setattr(last_factors, "is_factorised", lambda _: False)
+    if bordered:
+        factors.solve_bordered(2.0 * MATRIX, right, right, 1.0, np.ones(3))
+    else:
+        factors.solve(2.0 * MATRIX, right)
+    near = newton(lambda v: Springs().linearise(v, 2.0), np.zeros(2), Newton(tolerance=1e-12))
+    assert near.status.converged
+    assert factors.at(near) is None

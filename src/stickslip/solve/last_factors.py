@@ -41,6 +41,7 @@ class LastFactors:
         """Solve ``jac x = right``; see `LinearSolver`."""
         if self._factorises(jac):
             return self._solved(jac, right)
+        self.inverse = None  # those of an earlier step are not those of this one
         return self.linear.solve(jac, right)
 
     def solve_bordered(
@@ -48,6 +49,7 @@ class LastFactors:
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system; see `LinearSolver`."""
         if not self._factorises(jac):
+            self.inverse = None
             return self.linear.solve_bordered(jac, column, row, corner, right)
         found = self._solved(Bordered(jac, column, row, corner), right)
         return found, 0.0 if self.inverse is None else self.inverse.sign
