@@ -12,6 +12,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response import ladder
 from stickslip.response.branch import BACKWARD
+from stickslip.response.forced import from_time
 from stickslip.response.forced.response import (
     Sweep,
     accepted_pairs,
@@ -287,6 +288,7 @@ def no_rescue(monkeypatch):
         return solution
 
     monkeypatch.setattr(ladder, "solve_robustly", newton_only)
+    monkeypatch.setattr(from_time, "MOST_COORDINATES", 0)
 
 
 def test_resuming_after_points_that_failed(no_rescue):
@@ -320,6 +322,15 @@ def test_frequencies_stay_on_their_grid_after_one_that_failed(no_rescue):
     assert len(points) > 24
     assert any(p.stage == "found" for p in points)
     assert_resumes(system, load, sweep, points, range(1, len(points)))
+
+
+def test_resuming_points_from_the_motion_in_time():
+    system, load = lifting()
+    sweep = replace(HASTY, newton=Newton(max_iterations=1), frequencies=10, peak_points=0, rescue="in_time")  # fmt: skip
+    points = list(forced_response(system, load, sweep))
+    in_time = [k for k, p in enumerate(points) if p.stage == "in_time"]
+    assert len(in_time) > 1, "no point was found in time: nothing was shown"
+    assert_resumes(system, load, sweep, points, [in_time[0], in_time[1], len(points)])
 
 
 def test_points_come_one_by_one():
