@@ -26,7 +26,9 @@ from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.report.forced.not_periodic import statistics_in_time
 from stickslip.report.page import plots
+from stickslip.report.response import Response
 from stickslip.response.forced.response import (
     ForcedPoint,
     Sweep,
@@ -365,9 +367,27 @@ def test_what_no_balance_is_found_for_is_found_in_time_or_told_with_what_showed_
     assert data.verdict_reason.values.tolist()[1].endswith(f"{other})")
 
 
+def test_two_motions_of_one_case_that_are_not_periodic_stand_on_the_page() -> None:
+    stop = Interface(("1",), (UnilateralSpring(k_n=20.0),), np.array([[0.0], [0.0], [1.0]]))
+    structure = Structure(np.eye(1), 0.1 * np.eye(1), np.eye(1), table(("a.x",)))
+    sweep = Sweep(
+        omega_range=(3.5, 3.6), at=(3.5, 3.6), low=9, high=9, selection="always_high", peak_points=0, rescue="off", newton=Newton(max_iterations=1)
+    )  # fmt: skip
+    load = HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
+    asked = question(System(structure, stop, np.array([0])), load, sweep)
+    for seconds, words in ((5.0, "amplitude goes from"), (1e-9, "the time was too short: 0 of at least 128 periods")):  # fmt: skip
+        data = dataset(solved(replace(asked, not_periodic_s=seconds)))
+        shown = statistics_in_time(Response(data))
+        assert shown is not None
+        assert len(shown.items) == len(shown.rows) == 2
+        assert all(words in item and "nan" not in item for item in shown.items)
+
+
 def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     hopeless = Newton(max_iterations=1)
-    asked = lifted(newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0)
+    asked = lifted(
+        newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0, rescue="off"
+    )
     data = dataset(solved(replace(asked, not_periodic_s=2.0)))
     lost = data.status.values != 0
     assert 0 < lost.sum() == int(data.points_failed[0]) == data.attrs["failed"]

@@ -275,6 +275,17 @@ def test_what_is_eliminated_is_kept_at_a_frequency_while_the_same_contacts_rest(
     assert len(made) == 3 * (balance.order + 1)
 
 
+def test_rest_is_looked_at_contact_by_contact():
+    """A soft stop that closes for good is no rounding of a contact 1e14 times as stiff beside it."""
+    jac = random_jacobian(3, ["rest", "rest"], 2, 4)
+    same = replace(
+        jac.coupling, means=jac.coupling.means * np.array([1.0, 1e-14])[None, :, None, None]
+    )
+    other = replace(same, means=same.means * np.array([1.0, 2.0])[None, :, None, None])
+    assert same.same_rest(replace(same))
+    assert not same.same_rest(other)
+
+
 def test_middling_problems_are_given_by_their_parts(monkeypatch):
     monkeypatch.setattr(balance_module, "REDUCED", 100)
     balance = replace(problem(STATES["micro-slip"]), jacobian="auto")

@@ -59,8 +59,9 @@ class Coupling:
         """Whether the same forces rest, and are the same functions of their gaps."""
         if not np.array_equal(self.coupled, other.coupled):
             return False
-        size = ROUNDING * np.abs(self.means).max(initial=0.0)
-        return bool(np.abs(self.means - other.means).max(initial=0.0) <= size)
+        each = np.abs(self.means).max(axis=(0, 2, 3), initial=0.0)
+        moved = np.abs(self.means - other.means).max(axis=(0, 2, 3), initial=0.0)
+        return bool(np.all(moved <= ROUNDING * each))
 
 
 def coupling(blocks: FloatArray, rows: SparseRows, n: int) -> Coupling:

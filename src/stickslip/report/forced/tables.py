@@ -106,7 +106,7 @@ def sentences(response: Response, name: str) -> list[str]:
     if not response.has(name):
         return []
     each = [str(s) for s in response.data[name].values]
-    rows = f"{name.partition('_')[0]}_case"
+    rows = f"{name.removesuffix('_sentence')}_case"
     at = response.integers(rows) if response.has(rows) else np.arange(len(each))
     labels = [response.cases[int(k)].label for k in at]
     return [said(label, text) for label, text in zip(labels, each, strict=True)]

@@ -119,8 +119,8 @@ def _from_time(problem: ForcedProblem, lost: ForcedPoint) -> ForcedPoint:
     order = _orders(problem, lost)[-1]
     seen = repetition(system.structure, system.interface, load, omega, system.outputs, order)
     told = np.array(astuple(_told(seen)))
-    if seen.verdict == "periodic":
-        found = _solved(problem, lost, seen)
+    found = _solved(problem, lost, seen)
+    if seen.verdict == "periodic" or (found and found[-1][1].status.converged):
         solution = charged(found[-1][1], [s for _, s in found])
         seconds = perf_counter() - began
         point = forced_point(found[-1][0], solution, "in_time", lost.index, omega, seconds, judged=Judged(np.nan))  # fmt: skip
@@ -159,11 +159,17 @@ def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
 def _solved(
     problem: ForcedProblem, lost: ForcedPoint, seen: Repetition
 ) -> list[tuple[Balance, Solution]]:
-    """Return attempts from the motion in time, the last of which counts: as near as it begins, the natural level goes on where the residual stalls."""
+    """Return attempts from the motion in time, the last of which counts: as near as it begins, the natural level goes on where the residual stalls.
+
+    What settles too slowly to be told begins there, too, with the harmonics asked for.
+    """
+    if seen.verdict == "not periodic" or not seen.finite:
+        return []
     spent: list[tuple[Balance, Solution]] = []
     patient = problem.sweep.newton
     patient = replace(patient, max_iterations=max(PATIENCE, patient.max_iterations))
-    for order in _orders(problem, lost):
+    orders = _orders(problem, lost)
+    for order in orders if seen.verdict == "periodic" else orders[:1]:
         support = lost.support if order == lost.order else tuple(range(order + 1))
         balance = problem.balance(support)
         start = balance.unknowns(seen.motion[: order + 1, balance.linear.retained])

@@ -98,6 +98,12 @@ class Marcher:
         """Steps in a period."""
         return len(self.operators.drive)
 
+    @property
+    def slowest(self) -> float:
+        """Share that a period leaves of the slowest free motion, all contacts stuck."""
+        step = np.linalg.eigvals(self.operators.transfer[: 2 * self.n])
+        return float(np.abs(step).max(initial=0.0) ** self.steps)
+
     def turn(self, record: Record) -> float:
         """Return by how much the fastest contact that opens or closes in a record turns within a step, rad: pace times step.
 

@@ -1,7 +1,9 @@
 """Whether a motion in time repeats itself, with what shows that it does not: how far it wanders, and that small differences grow.
 
 It is marched from rest until the harmonics of all gaps repeat or the periods are spent. Of a motion that does not repeat, a copy that is kicked
-by a millionth is marched beside it: if the two part, it is no slow decay. All is done once more with half the step before it is told.
+by a millionth is marched beside it: if the two part, it is no slow decay. If they do not, the changes must stay as large as they were, where a
+motion of the structure alone would have died: a slow decay looks alike for long. All is done once more with half the step before it is told, and
+again while that makes the motion another one: what an impact is made of by a step that is too long does not repeat itself either.
 """
 
 from collections.abc import Sequence
@@ -18,14 +20,19 @@ from stickslip.response.time.marcher import Marcher, prepared
 from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import rest
-from stickslip.response.time.step_choice import ROUGH, with_enough_steps
+from stickslip.response.time.step_choice import MOST_STEPS, ROUGH, with_enough_steps
 
 Told = Literal["periodic", "not periodic", "not known"]
 STEPS = 512  # in a period, at least
-PERIODS, LATER = 48, 12  # marched, twice as many if differences die; the last ones are judged
+PERIODS, LATER = 48, 12  # marched, or twice as many; the last ones are judged
 SOON, CLEARLY = 2 * LATER + 1, 1.2  # periods that do where a small difference grows by so much
+WINDOW, APART = 24, 48  # periods that are compared, and from one to the other: ...
+STAYS, DIED = 0.9, 0.5  # ... least share left of the changes, most of the structure's own motion
+ALIKE = 0.5  # least share that half the step leaves of changes that it does not make
+MOST_WORK = 2e6  # coordinates and gaps, times steps in a period, that are not passed
 MOST_TURNS = 6  # periods after which a motion may repeat itself
-REPEATS = 1e-4  # largest change of a gap's harmonics, of their size, that counts as none
+REPEATS = 1e-4  # largest change of the gaps' harmonics, of their size, that counts as none ...
+NEARLY, NOTHING = 1e-3, 1e-9  # ... as none soon, and as rounding
 LASTS = 1e-2  # that counts as one, if it has not become less over the last quarters
 KICK, KICKED = 1e-6, 8  # of the speeds; periods
 PARTED = 0.05  # distance, of the size of the motion, that is no longer small
@@ -51,6 +58,8 @@ class Repetition:
         Share of the time in which contacts are open, in the last period.
     steps, angle
         In a period; by which the fastest contact that opens or closes turns in one of them, rad.
+    kept
+        Share that a period leaves of the slowest motion of the structure with all contacts stuck; NaN where that was not asked for.
     finer
         The same with half the step; None where every period is like the one before.
     """
@@ -63,6 +72,7 @@ class Repetition:
     opened: float
     steps: int
     angle: float
+    kept: float = np.nan
     finer: "Repetition | None" = None
 
     @property
@@ -82,16 +92,35 @@ class Repetition:
             return "periodic"
         if self.every:
             return "not periodic"
-        lasts = _lasts(self.change) and (self.growth > 1.0 or self.periods >= 2 * PERIODS)
-        return "not periodic" if lasts else "not known"
+        grows_or_stays = self.growth > CLEARLY or self._stays
+        return "not periodic" if _lasts(self.change) and grows_or_stays else "not known"
+
+    @property
+    def _stays(self) -> bool:
+        """Whether changes last where a motion of the structure would have died."""
+        if len(self.change) < 2 * WINDOW + APART - 1 or not self.kept**APART <= DIED:
+            return False
+        before = self.change[-WINDOW - APART : -APART]
+        return bool(self.change[-WINDOW:].max() >= STAYS * before.max())
 
     @property
     def verdict(self) -> Told:
-        """What both tell, if they agree and the finer step follows the contacts."""
-        if self.finer is None:
-            return self.alone
-        agrees = self.finer.alone == self.alone and self.finer.angle <= ROUGH
-        return self.alone if agrees else "not known"
+        """What both tell, if they agree."""
+        return self.alone if self.finer is None or self.agrees else "not known"
+
+    @property
+    def agrees(self) -> bool:
+        """Whether half the step follows the contacts and tells of the same motion."""
+        finer = self.finer
+        if finer is None or finer.alone != self.alone:
+            return False
+        if self.alone == "not known":
+            return True
+        if finer.angle > ROUGH or self.every:
+            return finer.angle <= ROUGH and finer.every > 0
+        wander, change = self.wander, self.change[-LATER:].max()
+        alike = finer.wander >= ALIKE * wander and finer.change[-LATER:].max() >= ALIKE * change
+        return bool(alike)
 
 
 def repetition(
@@ -103,7 +132,7 @@ def repetition(
     order: int,
     steps: int = STEPS,
 ) -> Repetition:
-    """Return whether the motion from rest becomes periodic; one that does not at first is marched with half the step, too.
+    """Return whether the motion from rest becomes periodic; one that does not at first is marched with half the step, too, until both agree.
 
     Parameters
     ----------
@@ -128,34 +157,44 @@ def repetition(
     marcher = with_enough_steps(made, rest(structure.n, contacts.laws), steps, 2.0 * ROUGH)
     state = marcher.begun(rest(structure.n, contacts.laws))
     found = _marched(marcher, state, outputs, order)
-    if found.every == 1 or not found.finite:
-        return found
-    fine = made(2 * marcher.steps)
-    finer = _marched(fine, fine.begun(marcher.end(state)), outputs, order)
-    # a motion that settles slowly may come to repeat itself only in the second march
-    return (
-        finer if finer.every == 1 else replace(found, every=found.every or finer.every, finer=finer)
-    )
+    while found.every != 1 and found.finite:
+        fine = made(2 * marcher.steps)
+        state = fine.begun(marcher.end(state))
+        finer = _marched(fine, state, outputs, order)
+        if finer.every == 1 or not finer.finite:
+            return finer
+        # a motion that settles slowly may come to repeat itself only in the second march
+        found = replace(found, every=found.every or finer.every, finer=finer)
+        if found.agrees or 2 * fine.steps > _most_steps(fine):
+            return found
+        marcher, found = fine, finer
+    return found
+
+
+def _most_steps(marcher: Marcher) -> float:
+    return min(MOST_STEPS, MOST_WORK / (marcher.n + marcher.k))
 
 
 def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) -> Repetition:
-    """March until the motion repeats itself, or the periods are spent: the fewer of them, the faster small differences grow."""
+    """March until the motion repeats itself, small differences are seen to grow, or the periods are spent."""
     record, basis, seen = marcher.record(), marcher.modes.basis, _Seen([], [], [])
-    every, growth = 0, np.nan
-    for until, enough in ((SOON, CLEARLY), (PERIODS, 1.0), (2 * PERIODS, np.inf)):
+    every, growth, kept = 0, np.nan, np.nan
+    for until in (SOON, PERIODS, 2 * PERIODS):
         every = _period_by_period(marcher, state, seen, basis[outputs], order, until)
-        if every or not seen.finite or until > PERIODS:
+        if every or not seen.finite:
             break
         growth = _growth(marcher, state)
-        if growth > enough and _lasts(_changes(seen.gaps, 1)):
+        if growth > CLEARLY and _lasts(_changes(seen.gaps, 1)):
             break
+        if until > PERIODS:
+            kept = marcher.slowest
     if seen.finite:
         marcher.march(state, record)
     change = _changes(seen.gaps, 1) if seen.finite else np.full(len(seen.gaps), np.inf)
     motion = _harmonics(record.motion @ basis.T, order)
     opened = float(np.mean(record.force[:, :, 2] == 0.0))
     return Repetition(
-        motion, change, every, _wander(seen.first), growth, opened, marcher.steps, max(seen.angles)
+        motion, change, every, _wander(seen.first), growth, opened, marcher.steps, max(seen.angles), kept
     )  # fmt: skip
 
 
@@ -191,12 +230,24 @@ def _period_by_period(
 
 
 def _repeats(gaps: Sequence[ComplexArray]) -> int:
-    """Return after how many periods a motion repeats itself, 0: after none; after several only what does not settle to one."""
+    """Return after how many periods a motion repeats itself, 0: after none; after several only what settles to that while it goes on to change in each.
+
+    A motion that dies at a half of the frequency changes less from two periods to the next two than from one to the next, too, but both alike.
+    """
     single = float(_changes(gaps[-5:], 1).max())
     if single < REPEATS:
         return 1
-    several = range(2, MOST_TURNS + 1) if single > LASTS else ()
-    return next((m for m in several if _changes(gaps[-4 - m :], m).max() < REPEATS), 0)
+    if len(gaps) < LATER + 4 + MOST_TURNS:
+        return 0
+    before = gaps[:-LATER]
+    if single <= max(LASTS, STAYS * _changes(before[-5:], 1).max()):
+        return 0
+    near = {m: _changes(gaps[-4 - m :], m).max() for m in range(2, MOST_TURNS + 1)}
+    found = next((m for m, change in near.items() if change < REPEATS), 0)
+    if not found or near[found] > max(DIED * _changes(before[-4 - found :], found).max(), NOTHING):
+        return 0
+    # before all has settled a multiple may be nearer
+    return next(m for m, change in near.items() if found % m == 0 and change < NEARLY)
 
 
 def _growth(marcher: Marcher, state: StepState) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from stickslip.response.time.marcher import Marcher
 from stickslip.response.time.start import TransientStart
 
-FINE, ROUGH = 0.2, 0.6  # rad
+FINE, ROUGH = 0.2, 0.3  # rad
 LOOK = 4  # periods after which contacts that open and close are known
 MOST_STEPS = 8192  # in a period
 

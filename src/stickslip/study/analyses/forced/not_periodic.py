@@ -205,11 +205,13 @@ def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
 def _told(question: Question, response: Response, omega: float, why: str, march: _March) -> Answer:
     """Return an answer in numbers and words."""
     found = march.course
-    if found.overflowed or found.periods < 2:
-        count = question.problem.system.outputs.size
-        said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else "the time was too short for two periods"  # fmt: skip
-        return _nothing(omega, why, count, said)
     of, own = statistics(found), response.output
+    if found.overflowed or not np.isfinite(of.spread):
+        count = question.problem.system.outputs.size
+        said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else (
+            f"the time was too short: {found.periods} of at least {LEAST} periods, more of it (forced_response.not_periodic_s) tells more"
+        )  # fmt: skip
+        return _nothing(omega, why, count, said)
     last = found.amplitude[-TURNS:, own]
     amplitudes = np.full(TURNS, np.nan)
     amplitudes[: last.size] = last
@@ -258,12 +260,16 @@ def _settledness(spread: float, settled: bool) -> str:
 
 def _of_the_step(march: _March, own: int) -> str:
     """Return why a march is not to be trusted for its step; empty where it is."""
-    if march.finer is None or not np.isfinite(rms := float(statistics(march.course).rms[own])):
+    if march.finer is None:
         return ""
     if march.finer.coarse:
         return f"; a contact that opens is too stiff for {march.finer.steps} steps a period"
-    fine = float(statistics(march.finer).rms[own])
-    if np.isfinite(fine) and abs(fine - rms) <= AGREE * max(fine, rms):
+    rms, fine = (float(statistics(c).rms[own]) for c in (march.course, march.finer))
+    if not np.isfinite(fine):
+        return (
+            "; there was no time to look at it with half the step (forced_response.not_periodic_s)"
+        )
+    if abs(fine - rms) <= AGREE * max(fine, rms):
         return ""
     return f"; with half the step the root mean square is {1e3 * fine:.4g} mm: too few steps, or too few periods"
 
