@@ -133,13 +133,13 @@ def _assembled(
     store: Store,
     tolerance: float,
 ) -> OverSpeed:
+    refuse_whole("run_up", model)
     known: dict[float, Assembled] = {}
 
     def at(speed: float) -> Assembled:
         if speed not in known:
             turning = replace(model, speed=speed)
             known[speed] = assemble(turning, harmonics, store, checked=speed == speeds[1])
-            refuse_whole("run_up", known[speed])
         return known[speed]
 
     for intervals in INTERVALS:

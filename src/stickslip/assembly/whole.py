@@ -29,8 +29,14 @@ def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
 
 def kept_whole(model: Model) -> int:
     """Return how many dofs a model not yet assembled keeps because nothing is condensed, about; 0 where something is."""
+    dofs, interior = _dofs(model)
+    return dofs if interior > LARGEST_INTERIOR else 0
+
+
+def _dofs(model: Model) -> tuple[int, int]:
+    """Return how many dofs the parts that are kept whole have, and how many of these touch no contact."""
     if model.neighbours is not None:
-        return 0
+        return 0, 0
     whole = [
         model.places.own(name)
         for name, part in model.parts.items()
@@ -38,7 +44,7 @@ def kept_whole(model: Model) -> int:
     ]
     dofs = stacked(whole)
     interior = np.setdiff1d(dofs, model.pairs.own.nonzero()[1])
-    return dofs.size if interior.size > LARGEST_INTERIOR else 0
+    return dofs.size, interior.size
 
 
 def refuse_rigid(model: Model, side: LinearSide) -> None:
@@ -58,21 +64,20 @@ def refuse_rigid(model: Model, side: LinearSide) -> None:
         )
 
 
-def refuse_whole(analysis: str, model: Assembled, instead: str = INSTEAD) -> None:
-    """Refuse a model of which nothing is condensed.
+def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
+    """Refuse a model of which nothing would be condensed, before it is assembled.
 
     Raises
     ------
     InputError
         That names `analysis`, and what to do `instead`.
     """
-    side = model.system.structure
-    if not isinstance(side, Unreduced):
+    dofs, interior = _dofs(model)
+    if interior <= LARGEST_INTERIOR:
         return
-    interior = side.n - model.system.interface.coordinates().size
     raise input_error(
         analysis,
-        f"needs a reduced model: {KEPT}, and {interior} of {side.n} dofs touch no contact, more than {LARGEST_INTERIOR}",
+        f"needs a reduced model: {KEPT}, and {interior} of {dofs} dofs touch no contact, more than {LARGEST_INTERIOR}",
         f'Reduce the parts (method = "craig_bampton"), or {instead}.',
     )
 

@@ -38,7 +38,7 @@ def amplitudes_in_time(response: Response) -> Plot | None:
     figure.update_yaxes(title_text=f"half of peak to peak ({scale.unit})", rangemode="tozero")
     caption = (
         "Where no periodic motion was found, or one that disturbances leave, this is the motion in time: the amplitude of each of its last "
-        "periods, half of peak to peak. It is time integration from near the balance, no balance itself; another start may end elsewhere."
+        "periods, half of peak to peak. It is time integration from the motion of the nearest point that was found, no balance itself; another start may end elsewhere."
     )
     return Plot("not_periodic", "What is not periodic, in time", caption, figure)
 

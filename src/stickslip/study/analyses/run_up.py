@@ -6,7 +6,7 @@ from dataclasses import replace
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.whole import kept_whole, refuse_whole
+from stickslip.assembly.whole import refuse_whole
 from stickslip.response.forced.response import forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced.estimate import estimate
@@ -105,8 +105,7 @@ class RunUp:
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Return the estimated cost."""
-        if kept_whole(model):
-            refuse_whole("run_up", model.assembled(1, case.store))
+        refuse_whole("run_up", model)
         table: RunUpTable = case.settings.run_up
         count = len(table.engine_orders or [0])
         return (

@@ -104,8 +104,8 @@ def question_of(case: Case, model: Model) -> Question:
     asked: NonlinearModeTable = case.settings.nonlinear_mode
     refuse_waves(NAME, asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
+    refuse_whole(NAME, model)
     assembled = free_to_vibrate(model, most, case.store)
-    refuse_whole(NAME, assembled)
     refuse_rigid(NAME, assembled)
     question = Question(
         case.label,

@@ -96,8 +96,8 @@ def question_of(case: Case, model: Model) -> Question:
     asked: LimitCycleTable = case.settings.limit_cycle
     refuse_waves("limit_cycle", asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
+    refuse_whole("limit_cycle", model)
     assembled = free_to_vibrate(model, most, case.store)
-    refuse_whole("limit_cycle", assembled)
     refuse_rigid("limit_cycle", assembled)
     question = Question(
         case.label,

@@ -270,7 +270,14 @@ class Curve:
     @property
     def range_key(self) -> str:
         """Key of the study that says where the response is."""
-        return "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
+        known = "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
+        return str(self.data.attrs.get("range_key", known))
+
+    @property
+    def nearer(self) -> str:
+        """What gives more points."""
+        listed = self.range_key == "frequencies_hz"
+        return "nearer forced_response.frequencies_hz" if listed else "more forced_response.points"
 
     def examined(self, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
         """Yield the points that a check looked at, with what its row says.

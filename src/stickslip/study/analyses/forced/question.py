@@ -177,6 +177,7 @@ def question_of(case: Case, model: Model) -> Question:
     )
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
+        refuse_whole("--verify", model, "run without --verify")
         _require_integrable(model)
     _refuse_for_rigid(model, sweep, case.checks)
     check_limits(settings.limits, estimate(model, sweep))
@@ -190,7 +191,6 @@ def question_of(case: Case, model: Model) -> Question:
     if examined and examines_every_wave(assembled.system):
         assembled = model.assembled(harmonics, case.store, every_wave=True)
     if IN_TIME in case.checks:
-        refuse_whole("--verify", assembled, "run without --verify")
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:
         assembled = _with_frozen_sliders(assembled, share)

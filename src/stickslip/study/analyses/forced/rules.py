@@ -71,13 +71,14 @@ def unsolved(case: Curve) -> Iterator[Finding]:
     for i in lost:
         advice = [Status(int(case.status[i])).advice, *filter(None, [marched[i]])]
         why = f"did not converge ({'; '.join(advice)})"
-        remedy = "A smaller step (more forced_response.points) finds most such points."
+        remedy = f"A smaller step ({case.nearer}) finds most such points."
         if int(case.status[i]) == Status.NOT_PERIODIC:
+            why = f"attains no periodic motion ({'; '.join(advice)})"
             remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points says at how many such points."
         yield Finding("wrong", why, remedy, (int(i),))
     if lost.size:
         why = f"{lost.size} points did not converge; the peak is the largest of the others, and a larger one may stand among them"
-        remedy = "Take more forced_response.points, or narrow the range to theirs."
+        remedy = f"Take {case.nearer}, or narrow the range to theirs."
         yield Finding("doubtful", why, remedy)
 
 
@@ -112,7 +113,7 @@ def _more(case: Curve, point: int) -> str:
     if case.supports[point][-1] < case.cap:
         return (
             f"Up to {case.cap} harmonics were allowed, and the work that a response may take, or the want of a solution nearby, ended "
-            "before: give more forced_response.points, which allow more work, or a narrower range"
+            f"before: give {case.nearer}, which allow more work, or a narrower range"
         )
     if case.cap < RUNGS[-1]:
         return f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
@@ -188,7 +189,7 @@ def on_other_motions(case: Curve) -> Iterator[Finding]:
             f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): more than one periodic motion "
             f"exists near there, and which one a machine takes depends on its history{unlike}"
         )
-        remedy = 'Take more forced_response.points there, and sweep both ways (direction = "down").'
+        remedy = f'Take {case.nearer} there, and sweep both ways (direction = "down").'
         yield Finding("doubtful", why, remedy, (i, j), jump.size)
 
 

@@ -61,6 +61,7 @@ def _attributes(question: Question, output: int) -> Values:
         "sectors": model.sectors,
         "driven_harmonics": list(question.driven),
         "direction": sweep.direction,
+        "range_key": question.key,
         "stepped": int(sweep.single or sweep.grid.size > 0),
         "error_limit_percent": 100 * question.limit,
     }

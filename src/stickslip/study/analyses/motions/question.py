@@ -57,8 +57,8 @@ def question_of(case: Case, model: Model) -> Question:
         If a contact is rigid, no load vibrates, or the loads drive a harmonic that is not kept.
     """
     asked: AllMotionsTable = case.settings.all_motions
+    refuse_whole("all_motions", model)
     assembled = peak_first(model.assembled(2 * asked.harmonics, case.store))
-    refuse_whole("all_motions", assembled)
     if not any(np.any(f) for f in assembled.load.harmonics.values()):
         raise input_error(
             "all_motions",

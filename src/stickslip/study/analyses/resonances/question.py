@@ -105,8 +105,8 @@ def question_of(case: Case, model: Model) -> Question:
         )
     parameter = _parameter(case, asked)
     _accepted(case, asked, parameter)
+    refuse_whole("resonance", model)
     assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
-    refuse_whole("resonance", assembled)
     refuse_rigid("resonance", assembled)
     evaluator: Evaluator = case.settings.solver.evaluator
     how = represented(asked.harmonics, evaluator)

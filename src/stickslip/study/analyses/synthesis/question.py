@@ -107,8 +107,8 @@ def question_of(case: Case, model: Model) -> Question:
                 "Leave the load out, or ask for the forced response.",
             )
     most = FACTOR * max(asked.harmonics, asked.most_harmonics)
+    refuse_whole(NAME, model)
     assembled = peak_first(model.assembled(most, case.store))
-    refuse_whole(NAME, assembled)
     refuse_rigid(NAME, assembled)
     facts = facts_of(model, model.speed / RPM)
     _bounded(asked.levels, assembled.load)

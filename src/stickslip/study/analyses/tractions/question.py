@@ -117,8 +117,8 @@ def question_of(case: Case, model: Model) -> Question:
     what = f"a case of residual_tractions ({asked.points} frequencies, {cost.unknowns} unknowns, up to {MOTIONS[1]} motions each) is estimated"
     if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
         raise refusal
+    refuse_whole("residual_tractions", model)
     assembled = peak_first(model.assembled(asked.harmonics, case.store))
-    refuse_whole("residual_tractions", assembled)
     if not any(np.any(force) for force in assembled.load.harmonics.values()):
         name = next(iter(model.driven))
         raise input_error(

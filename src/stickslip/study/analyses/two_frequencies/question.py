@@ -135,8 +135,8 @@ def question_of(case: Case, model: Model) -> Question:
             f"Add the number of sectors to it, {model.sectors}: that is the same wave.",
         )
     most = max(asked.most_harmonics, *(h for own in keys for h in own.values()))
+    refuse_whole(NAME, together)
     assembled = peak_first(together.assembled(most, case.store, every_wave=wheel))
-    refuse_whole(NAME, assembled)
     static = assembled.load.static
     loads = [
         HarmonicLoad(static if i == 0 else np.zeros_like(static), _of(assembled, own, keys[i]))
