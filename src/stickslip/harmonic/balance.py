@@ -252,8 +252,14 @@ class HarmonicBalance:
         """Return the (size, size) Jacobian as an array."""
         return self._parts(omega, blocks).dense()
 
+    def by_parts(self, omega: float, blocks: FloatArray) -> StructuredJacobian:
+        """Return the Jacobian with derivatives (n_contacts, P, m, m) of the contact forces, N/m, by its products."""
+        part = products(self.linear, self.harmonics, omega)
+        factor = self.displacement_scale / self.force_scale
+        return StructuredJacobian(part, blocks, self.rows, factor)
+
     def _parts(self, omega: float, blocks: FloatArray) -> StructuredJacobian:
-        """Return the Jacobian by its parts."""
+        """Return the Jacobian by its parts, whose matrices are formed."""
         part = matrices(self.linear, self.harmonics, omega)
         return StructuredJacobian(
             part, blocks, self.rows, self.displacement_scale / self.force_scale
@@ -273,8 +279,7 @@ class HarmonicBalance:
         part = products(self.linear, self.harmonics, omega)
         q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
-        factor = self.displacement_scale / self.force_scale
-        jac = StructuredJacobian(part, period.blocks, self.rows, factor)
+        jac = self.by_parts(omega, period.blocks)
         return linear - part.load, slope - part.load_slope, jac if self.structured else jac.dense()
 
     def linear_load(self, omega: float) -> FloatArray:

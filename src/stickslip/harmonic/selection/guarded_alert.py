@@ -20,14 +20,14 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.contact.product import contact_product, harmonic_means
+from stickslip.contact.product import contact_product, harmonic_means, less_means
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.selection.adjoint import Factored, factored
 from stickslip.harmonic.selection.alert import jacobian_alert
-from stickslip.harmonic.selection.strategy import Step, Verdict
+from stickslip.harmonic.selection.strategy import Solve, Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import harmonics_of, is_full, rows_of
 
@@ -102,7 +102,7 @@ class GuardedAlert:
         at = high.linearise(start, omega)
         wide = beyond.unknowns(high.coefficients(start))
         period = beyond.forces(wide, omega, at.events)
-        right = at.residual + truncated(high, beyond, period, omega)
+        right = at.residual + truncated(high, beyond, period, omega, step.solve)
         chord = factors.solve(-right)
         if chord is not None and float(np.linalg.norm(at.residual)) <= residual:
             bound = predicted + DOUBT * _error(step, high, chord)
@@ -182,7 +182,11 @@ def doubled(reference: HarmonicBalance) -> HarmonicBalance:
 
 
 def truncated(
-    high: HarmonicBalance, beyond: HarmonicBalance, period: ContactPeriod, omega: float
+    high: HarmonicBalance,
+    beyond: HarmonicBalance,
+    period: ContactPeriod,
+    omega: float,
+    solve: Solve | None = None,
 ) -> FloatArray:
     """Return what the harmonics that a reference leaves out would add to its scaled residual, each solved alone.
 
@@ -194,22 +198,43 @@ def truncated(
         Contacts with the harmonics of `beyond` at a motion that has those of `high` alone.
     omega
         Frequency, rad/s.
+    solve
+        Solves systems that are known by their products; None: harmonic by harmonic.
     """
     rows, n = beyond.rows, beyond.linear.n
     force = np.zeros((beyond.n_rows, n))
     rows.add_forces(period.coefficients, force)
+    moved = _moved(high, beyond, period, omega, force, solve)
+    gap, own = np.empty((3, beyond.n_rows)), np.empty((3, beyond.n_rows))
+    out = np.zeros_like(force)
+    contact_product(period.blocks, rows.columns, rows.values, moved, False, gap, own, out)
+    return np.asarray(out[rows_of(high.harmonics)].reshape(-1) / high.force_scale)
+
+
+def _moved(
+    high: HarmonicBalance,
+    beyond: HarmonicBalance,
+    period: ContactPeriod,
+    omega: float,
+    force: FloatArray,
+    solve: Solve | None,
+) -> FloatArray:
+    """Return the rows (m, n) of the motion in the harmonics that the reference leaves out, m, under the contact forces (m, n)."""
     means = harmonic_means(period.blocks)
     moved = np.zeros_like(force)
+    if beyond.structured and solve is not None:
+        own = period.blocks - less_means(period.blocks, means)
+        moved -= force
+        moved[rows_of(high.harmonics)] = 0.0
+        found = solve(beyond.by_parts(omega, own), moved.reshape(-1) / beyond.force_scale)
+        return np.zeros_like(force) if found is None else beyond.displacement_scale * found.reshape(force.shape)  # fmt: skip
     for h in beyond.harmonics:
         if h in high.harmonics:
             continue
-        matrix = with_contacts(beyond.linear_block(omega, h), means[h], rows)
+        matrix = with_contacts(beyond.linear_block(omega, h), means[h], beyond.rows)
         try:
             q = -solved(matrix, force[2 * h - 1] - 1j * force[2 * h])
         except np.linalg.LinAlgError:
             continue  # a resonance without damping: the Newton steps that follow see it
         moved[2 * h - 1], moved[2 * h] = q.real, -q.imag
-    gap, own = np.empty((3, beyond.n_rows)), np.empty((3, beyond.n_rows))
-    out = np.zeros_like(force)
-    contact_product(period.blocks, rows.columns, rows.values, moved, False, gap, own, out)
-    return np.asarray(out[rows_of(high.harmonics)].reshape(-1) / high.force_scale)
+    return moved
