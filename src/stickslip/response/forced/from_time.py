@@ -127,7 +127,7 @@ def _from_time(problem: ForcedProblem, lost: ForcedPoint) -> ForcedPoint:
         return replace(point, rescue=Rung.IN_TIME, marched=told)
     status = Status.NOT_PERIODIC if seen.verdict == "not periodic" else lost.status
     return replace(
-        lost, stage="in_time", status=status, iterations=0, rescue=Rung.IN_TIME, marched=told, seconds_contact=0.0, seconds_linear=0.0,
+        lost, stage="in_time", status=status, iterations=sum(s.iterations for _, s in found), rescue=Rung.IN_TIME, marched=told, seconds_contact=0.0, seconds_linear=0.0,
         seconds_total=perf_counter() - began,
     )  # fmt: skip
 
