@@ -2,7 +2,7 @@
 
 A contact of stiffness k on the mass m that moves with it alone vibrates with √(k/m). An impact lasts half such a vibration. What the step makes
 of it depends on the angle ``√(k/m) h``. Masses on stops, held against an integrator with exact events (`tests/test_step_choice.py`), are off by
-less than 1 % below `FINE` and by 5 % below `ROUGH`. A contact that stays closed needs no fine steps, nor does one that slips.
+less than 1 % below `FINE` and by 2 % below `ROUGH`. A contact that stays closed needs no fine steps, nor does one that slips.
 """
 
 from collections.abc import Callable
