@@ -22,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
+.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections trust lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -105,6 +105,9 @@ alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that ve
 
 sections: $(DOCS_INSTALLED)  ## two blades with 1 to 15 sections of contact points; writes docs/contact_points_numbers.md and its picture (some ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.sections
+
+trust: $(INSTALLED)  ## hold what a response trusts on random machines against a judge of its own (SEED=1 SYSTEMS=60, ten minutes)
+	$(ONE_THREAD) $(BIN)/python -m evidence.trust --seed $(or $(SEED),1) --systems $(or $(SYSTEMS),60) --workers $(WORKERS)
 
 calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)
 	apt-get update -qq

@@ -1,0 +1,216 @@
+"""The judge: periodic motions by shooting and their multipliers, with a march of its own. Nothing of stickslip is imported here.
+
+The march is the classical Runge-Kutta method with steps of the same length. A slider's place is part of the state and moves at the end of each step as
+far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
+"""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from evidence.trust.draw import Machine
+
+Array = npt.NDArray[np.float64]
+KINDS = ("slider", "pad", "stop", "cubic")
+SLIDER, PAD, STOP, CUBIC = range(4)
+ANGLE = 0.04  # of the fastest vibration with all contacts closed, rad a step
+LEAST_STEPS = 1500  # a period
+MOST_STEPS = 60000
+SETTLING = 3  # periods of prescribed motion after which sliders repeat
+NEWTON = 25  # iterations
+CLOSED = 1e-8  # residual of a period over the size of the motion
+NUDGE = 1e-6  # difference step over the size of the motion
+HARMONICS = 6  # that are compared
+
+
+@numba.njit(cache=True)
+def _forces(kind, tangent, normal, number, q, place, out, moved, move):  # type: ignore[no-untyped-def]
+    """Fill the contact forces on the dofs, and with `move` the places of the sliders; mark those that moved."""
+    out[:] = 0.0
+    n = q.size
+    for c in range(kind.size):
+        t, z = 0.0, 0.0
+        for i in range(n):
+            t += tangent[c, i] * q[i]
+            z += normal[c, i] * q[i]
+        along, across = 0.0, 0.0
+        if kind[c] == CUBIC:
+            along = -number[c, 0] * t * t * t
+        elif kind[c] == STOP:
+            across = -number[c, 0] * max(0.0, z - number[c, 5])
+        else:
+            limit = number[c, 1]
+            if kind[c] == PAD:
+                press = max(0.0, number[c, 4] + number[c, 2] * z)
+                across = -press
+                limit = number[c, 3] * press
+            spring = number[c, 0] * (t - place[c])
+            if abs(spring) > limit:
+                spring = limit if spring > 0.0 else -limit
+                if move:
+                    place[c] = t - spring / number[c, 0]
+                    moved[c] = True
+            along = -spring
+        for i in range(n):
+            out[i] += tangent[c, i] * along + normal[c, i] * across
+
+
+@numba.njit(cache=True)
+def _rate(inverse, damping, stiffness, load, q, v, contact, out):  # type: ignore[no-untyped-def]
+    n = q.size
+    total = load + contact
+    for i in range(n):
+        for j in range(n):
+            total[i] -= damping[i, j] * v[j] + stiffness[i, j] * q[j]
+    for i in range(n):
+        out[i] = 0.0
+        for j in range(n):
+            out[i] += inverse[i, j] * total[j]
+
+
+@numba.njit(cache=True)
+def period(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, steps, q, v, place, moved, sums):  # type: ignore[no-untyped-def]  # fmt: skip
+    """March one period; q, v, place are changed in place, `sums` (2, harmonics, n) gets the Fourier coefficients."""
+    n = q.size
+    h = 2 * np.pi / omega / steps
+    contact, load = np.zeros(n), np.zeros(n)
+    a, b, c, d = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    sums[:] = 0.0
+    for s in range(steps):
+        for m in range(sums.shape[1]):
+            cosine, sine = np.cos(2 * np.pi * m * s / steps), np.sin(2 * np.pi * m * s / steps)
+            weight = (1.0 if m == 0 else 2.0) / steps
+            for i in range(n):
+                sums[0, m, i] += weight * cosine * q[i]
+                sums[1, m, i] -= weight * sine * q[i]
+        angle = 2 * np.pi * order * s / steps
+        half, whole = angle + np.pi * order / steps, angle + 2 * np.pi * order / steps
+        load[:] = static + real * np.cos(angle) - imaginary * np.sin(angle)
+        _forces(kind, tangent, normal, number, q, place, contact, moved, False)
+        _rate(inverse, damping, stiffness, load, q, v, contact, a)
+        load[:] = static + real * np.cos(half) - imaginary * np.sin(half)
+        qb, vb = q + 0.5 * h * v, v + 0.5 * h * a
+        _forces(kind, tangent, normal, number, qb, place, contact, moved, False)
+        _rate(inverse, damping, stiffness, load, qb, vb, contact, b)
+        qc, vc = q + 0.5 * h * vb, v + 0.5 * h * b
+        _forces(kind, tangent, normal, number, qc, place, contact, moved, False)
+        _rate(inverse, damping, stiffness, load, qc, vc, contact, c)
+        load[:] = static + real * np.cos(whole) - imaginary * np.sin(whole)
+        qd, vd = q + h * vc, v + h * c
+        _forces(kind, tangent, normal, number, qd, place, contact, moved, False)
+        _rate(inverse, damping, stiffness, load, qd, vd, contact, d)
+        q += h / 6 * (v + 2 * vb + 2 * vc + vd)
+        v += h / 6 * (a + 2 * b + 2 * c + d)
+        _forces(kind, tangent, normal, number, q, place, contact, moved, True)
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic motion: Fourier coefficients (harmonics, n), largest modulus of its multipliers, and the judge's own errors of both."""
+
+    motion: npt.NDArray[np.complex128]
+    motion_error: float
+    multiplier: float
+    multiplier_error: float
+
+
+class Judge:
+    """A machine at one frequency."""
+
+    def __init__(self, machine: Machine, omega: float) -> None:
+        self.machine, self.omega = machine, omega
+        contacts = machine.contacts
+        self.kind = np.array([KINDS.index(c.kind) for c in contacts])
+        self.tangent = np.array([c.tangent for c in contacts])
+        self.normal = np.array([c.normal for c in contacts])
+        self.number = np.array(
+            [
+                [c.stiffness, c.limit, c.normal_stiffness, c.friction, c.preload, c.clearance]
+                for c in contacts
+            ]
+        )
+        self.inverse = np.linalg.inv(machine.mass)
+        # a pad at rest is held by what presses it: the preload of the contact, as a load
+        stuck = machine.stiffness + sum(
+            (
+                (c.stiffness if c.kind in ("slider", "pad") else 0.0) * np.outer(c.tangent, c.tangent)
+                + (c.normal_stiffness if c.kind == "pad" else c.stiffness) * np.outer(c.normal, c.normal)
+                for c in contacts
+            ),
+            np.zeros_like(machine.stiffness),
+        )  # fmt: skip
+        fastest = float(np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stuck)))))
+        self.steps = int(np.clip(2 * np.pi * fastest / omega / ANGLE, LEAST_STEPS, MOST_STEPS))
+
+    def flow(self, state: Array, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_]]:  # fmt: skip
+        """Return the state (2n + contacts,) after a period, the motion's Fourier coefficients, and which sliders moved."""
+        n = len(self.machine.mass)
+        q, v, place = state[:n].copy(), state[n : 2 * n].copy(), state[2 * n :].copy()
+        moved = np.zeros(self.kind.size, dtype=np.bool_)
+        sums = np.zeros((2, HARMONICS, n))
+        m = self.machine
+        period(
+            self.inverse, m.damping, m.stiffness, self.kind, self.tangent, self.normal, self.number,
+            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, self.omega, steps, q, v, place, moved, sums,
+        )  # fmt: skip
+        return np.concatenate([q, v, place]), sums[0] + 1j * sums[1], moved
+
+    def start(self, motion: npt.NDArray[np.complex128]) -> Array:
+        """Return the state at t = 0 of a motion (H+1, n): sliders have followed it for some periods from zero."""
+        h = np.arange(len(motion))[:, None]
+        place = np.zeros(self.kind.size)
+        moved = np.zeros(self.kind.size, dtype=np.bool_)
+        out = np.zeros(motion.shape[1])
+        for angle in np.arange(512 * SETTLING + 1) * 2 * np.pi / 512:
+            q = (motion * np.exp(1j * h * angle)).real.sum(axis=0)
+            _forces(self.kind, self.tangent, self.normal, self.number, q, place, out, moved, True)
+        q = motion.real.sum(axis=0)
+        v = (1j * h * self.omega * motion).real.sum(axis=0)
+        return np.concatenate([q, v, place])
+
+    def orbit(self, motion: npt.NDArray[np.complex128]) -> Orbit | None:
+        """Return the periodic motion that Newton's method finds from a motion (H+1, n); None where it finds none."""
+        begin = self.start(motion)
+        one = self._shoot(begin, self.steps)
+        two = None if one is None else self._shoot(one[0], 2 * self.steps)
+        if one is None or two is None:
+            return None
+        size = float(np.max(np.abs(two[1][1:])))
+        off = float(np.max(np.abs(two[1] - one[1]))) / size
+        return Orbit(two[1], off, two[2], abs(two[2] - one[2]))
+
+    def _shoot(self, state: Array, steps: int) -> tuple[Array, npt.NDArray[np.complex128], float] | None:  # fmt: skip
+        scale = self._scale(state, steps)
+        for _ in range(NEWTON):
+            end, found, moved = self.flow(state, steps)
+            off = (end - state) / scale
+            jac = self._jacobian(state, steps, scale)
+            if np.max(np.abs(off)) < CLOSED:
+                return state, found, self._largest(jac, moved)
+            step = np.linalg.lstsq(np.eye(len(off)) - jac, off, rcond=1e-7)[0]
+            size = np.max(np.abs(step))
+            state = state + scale * step * min(1.0, 0.5 / size if size > 0.5 else 1.0)
+        return None
+
+    def _scale(self, state: Array, steps: int) -> Array:
+        n = len(self.machine.mass)
+        amplitude = float(np.max(np.abs(self.flow(state, steps)[1][1:]))) or 1.0
+        speed = amplitude * self.omega * self.machine.harmonic
+        return np.concatenate([np.full(n, amplitude), np.full(n, speed), np.full(self.kind.size, amplitude)])  # fmt: skip
+
+    def _jacobian(self, state: Array, steps: int, scale: Array) -> Array:
+        columns = []
+        for i in range(len(state)):
+            nudge = np.zeros_like(state)
+            nudge[i] = NUDGE * scale[i]
+            ahead, behind = self.flow(state + nudge, steps)[0], self.flow(state - nudge, steps)[0]
+            columns.append((ahead - behind) / scale / (2 * NUDGE))
+        return np.array(columns).T
+
+    def _largest(self, jac: Array, moved: npt.NDArray[np.bool_]) -> float:
+        """Return the largest modulus of the multipliers; sliders that stick all the time have none."""
+        n = len(self.machine.mass)
+        keep = np.concatenate([np.arange(2 * n), 2 * n + np.flatnonzero(moved)]).astype(int)
+        return float(np.max(np.abs(np.linalg.eigvals(jac[np.ix_(keep, keep)]))))

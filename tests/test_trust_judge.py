@@ -1,0 +1,71 @@
+"""The judge of trusted points against closed forms."""
+
+import numpy as np
+import pytest
+
+from evidence.trust.draw import Contact, Machine, draw
+from evidence.trust.march import Judge
+
+ONE = np.ones(1)
+
+
+def one_mass(contact: Contact, force: float, damping: float = 0.2) -> Machine:
+    """Return a mass of 1 kg on a spring of 1 N/m with one contact to the ground."""
+    return Machine(0, "line", np.eye(1), damping * np.eye(1), np.eye(1), (1,), ("x",), (contact,), np.array([force + 0j]), np.zeros(1), 1, (0.1, 0.2))  # fmt: skip
+
+
+def test_a_slider_that_sticks_is_a_spring() -> None:
+    """Motion and multiplier are those of the mass on both springs."""
+    machine = one_mass(Contact("slider", ONE, 0 * ONE, stiffness=3.0, limit=1e6), 1.0)
+    omega = 1.7
+    found = Judge(machine, omega).orbit(np.array([[0j], [0.3 + 0j]]))
+    assert found is not None
+    assert found.motion[1, 0] == pytest.approx(1 / (4.0 - omega**2 + 0.2j * omega), rel=1e-9)
+    assert found.multiplier == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
+
+
+def test_friction_takes_the_area_of_its_loop() -> None:
+    """The load's work in a cycle is that of the dashpot and of 4 x limit x slip."""
+    machine = one_mass(Contact("slider", ONE, 0 * ONE, stiffness=5.0, limit=0.3), 1.0)
+    omega = 1.1
+    found = Judge(machine, omega).orbit(np.array([[0j], [1.0 - 1.0j]]))
+    assert found is not None
+    h = np.arange(len(found.motion))
+    tau = np.linspace(0.0, 2 * np.pi, 4096, endpoint=False)
+    x = (found.motion[:, 0] * np.exp(1j * h * tau[:, None])).real.sum(axis=1)
+    work = -np.pi * found.motion[1, 0].imag
+    dashpot = np.pi * omega * 0.2 * float(np.sum(h**2 * np.abs(found.motion[:, 0]) ** 2))
+    slip = np.ptp(x) - 2 * 0.3 / 5.0
+    assert work == pytest.approx(dashpot + 2 * 0.3 * slip, rel=2e-3)  # harmonics up to 5 alone
+
+
+def test_the_middle_branch_of_a_hardening_oscillator_is_unstable() -> None:
+    """Three motions at one frequency: the middle one has a real multiplier above 1, the others do not."""
+    machine = one_mass(Contact("cubic", ONE, 0 * ONE, stiffness=1.0), 0.3, damping=0.05)
+    omega = 1.6
+    judge = Judge(machine, omega)
+    roots = np.roots(
+        [(3 / 4) ** 2, 2 * (3 / 4) * (1 - omega**2), (1 - omega**2) ** 2 + (0.05 * omega) ** 2, -(0.3**2)]
+    )  # fmt: skip
+    sizes = np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9].real))
+    assert sizes.size == 3
+    largest = []
+    for a in sizes:
+        phase = np.angle(1 / (1 - omega**2 + 0.75 * a**2 + 0.05j * omega))
+        found = judge.orbit(np.array([[0j], [a * np.exp(1j * phase)]]))
+        assert found is not None
+        largest.append(found.multiplier)
+    assert largest[1] > 1.01
+    assert max(largest[0], largest[2]) < 0.99
+
+
+def test_machines_are_the_same_whenever_they_are_drawn() -> None:
+    """A seed and a number are enough; all families are drawn, and all structures are held."""
+    families = set()
+    for number in range(30):
+        one, other = draw(3, number), draw(3, number)
+        assert np.array_equal(one.stiffness, other.stiffness)
+        assert one.hz == other.hz
+        assert np.linalg.eigvalsh(one.stiffness)[0] > 0
+        families.add(one.family)
+    assert families == {"chain", "stop", "pad", "cubic"}
