@@ -132,7 +132,7 @@ release: $(DOCS_INSTALLED)  ## build the wheel, the source archive and the notes
 
 lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, and write the lock files
 	$(PIP_INSTALL) uv
-	$(LOCK) --extra fe --extra report --extra exchange --extra test --group editable -o requirements.lock
+	$(LOCK) --extra fe --extra exchange --extra test --group editable -o requirements.lock
 	$(LOCK) --extra docs --group release -c requirements.lock -o docs/requirements.lock
 	$(LOCK) --extra readers --extra readers-test --extra sparse --extra cluster -c requirements.lock -c docs/requirements.lock \
 		-o optional-requirements.lock

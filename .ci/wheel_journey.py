@@ -1,4 +1,6 @@
-"""Install the built wheel alone in fresh environments and go the shortest journey with it: four masses from the study to the page.
+"""Install the built wheel without extras in fresh environments and go the shortest journey with it: four masses from the study to the page.
+
+Then ask it for what only an extra brings, a shape to be meshed and a deck: it must name the extra.
 
 ``wheel_journey.py DIST PYTHON ...``: the folder with the wheel, and interpreters or versions such as 3.12. Versions that are not on the
 machine are named and left out. Dependencies are those of requirements.lock. All Pythons must find the
@@ -18,6 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 STUDY = ROOT / "examples" / "four_masses" / "study.toml"
+LACKING = {"two_blades": "gmsh", "own_blades": "scikit-fem"}  # example -> the package that it lacks
 SAME = 1e-6  # of a peak: other versions of NumPy and SciPy round in another order
 PEAKS = """
 import json, sys
@@ -88,14 +91,31 @@ def journey(python: str, wheel: Path, folder: Path) -> dict[str, list[float]]:
     scripts = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
     own, command = str(scripts / "python"), str(scripts / "stickslip")
     pip = (own, "-m", "pip", "--quiet", "--disable-pip-version-check")
-    done(*pip, "install", "--constraint", "pins.txt", f"stickslip[report] @ {wheel.as_uri()}")
+    done(*pip, "install", "--constraint", "pins.txt", f"stickslip @ {wheel.as_uri()}")
     done(*pip, "check")
     done(command, "check", "study.toml")
     done(command, "run", "study.toml")
     if (folder / "results" / "report.html").stat().st_size == 0:
         sys.exit("The page is empty.")
     peaks: dict[str, list[float]] = json.loads(done(own, "-c", PEAKS))
+    for example, package in LACKING.items():
+        study = ROOT / "examples" / example / "study.toml"
+        ended = subprocess.run(
+            (command, "check", str(study)),
+            check=False, cwd=folder, env=environment, capture_output=True, text=True,
+        )  # fmt: skip
+        wrong = not_refused(ended.returncode, ended.stdout + ended.stderr, package)
+        if wrong:
+            sys.exit(f"{example} without {package}: {wrong}")
     return peaks
+
+
+def not_refused(code: int, said: str, package: str) -> str:
+    """Return what is wrong with the end of a command that lacks a package of the extra ``fe``; empty where it is a clear refusal."""
+    remedy = f"{package}: not installed. Use: pip install 'stickslip[fe]'"
+    if code and remedy in said and "fault" not in said and "Traceback" not in said:
+        return ""
+    return f"ended with {code} and did not only say {remedy!r}:\n{said}"
 
 
 def compare(peaks: dict[str, list[float]], reference: dict[str, list[float]]) -> str:

@@ -1,5 +1,6 @@
 """What is handed out: one version everywhere, notes of a release, and a conda recipe with the dependencies of pyproject.toml."""
 
+import ast
 import importlib.util
 import re
 import sys
@@ -46,7 +47,7 @@ def test_the_recipe_has_the_dependencies_of_the_package():
     recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
     run = re.findall(r"^    - (\S+) (>=\S+)$", recipe.partition("\n  run:")[2], re.MULTILINE)
     extras = PROJECT["optional-dependencies"]
-    stated = [*PROJECT["dependencies"], *extras["report"], *extras["fe"]]
+    stated = [*PROJECT["dependencies"], *extras["fe"]]
     wanted = {tuple(re.split("(?=>=)", one)) for one in stated}
     renamed = {("python-gmsh" if name == "gmsh" else name, least) for name, least in wanted}
     assert set(run) == renamed | {("python", PROJECT["requires-python"])}
@@ -65,6 +66,50 @@ def test_peaks_of_another_python_are_compared():
     assert compare(peaks, peaks) == ""
     other = peaks | {"peak_amplitude": [1e-3, 2.00001e-3]}
     assert compare(other, peaks) == "peak_amplitude: 0.00200001 instead of 0.002"
+
+
+def test_the_journey_takes_only_a_refusal_that_names_the_extra():
+    wrong = script("wheel_journey").not_refused
+    refusal = "gmsh: not installed. Use: pip install 'stickslip[fe]'"
+    assert wrong(1, refusal, "gmsh") == ""
+    assert "ended with 0" in wrong(0, refusal, "gmsh")
+    assert wrong(1, refusal, "scikit-fem")
+    assert wrong(1, f"{refusal}\nThis is a fault of stickslip.", "gmsh")
+
+
+def test_what_is_imported_is_of_the_core_or_named_with_its_extra():
+    """Packages that the wheel does not bring are imported inside functions, where a message names the extra."""
+    brought = {re.split("[<>=]", one)[0].lower() for one in PROJECT["dependencies"]}
+    brought |= {"pydantic_core", "stickslip"}  # the first comes with pydantic
+    lacking = set()
+    for path in (ROOT / "src").rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            lacking |= {(path.name, name) for name in imported(node) - brought}
+    assert not lacking
+    inside = {
+        name
+        for path in (ROOT / "src").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in imported(node) - brought
+    }
+    # IPython shows progress in its own notebooks, psutil serves where there is no /proc: both are asked for before
+    asked_for = {"gmsh", "skfem", "meshio", "feral", "pyuff", "executorlib", "IPython", "psutil"}
+    assert inside <= asked_for
+
+
+def imported(node: ast.AST) -> set[str]:
+    """Return the packages that a statement imports, without those of Python itself."""
+    if isinstance(node, ast.Import):
+        names = {alias.name for alias in node.names}
+    elif isinstance(node, ast.ImportFrom):
+        names = {str(node.module)}
+    else:
+        return set()
+    return {name.partition(".")[0] for name in names} - set(sys.stdlib_module_names)
+
+
+def test_the_extra_of_earlier_versions_is_still_there():
+    assert PROJECT["optional-dependencies"]["report"] == []
 
 
 def test_classifiers_name_the_pythons_that_are_tried():

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.errors import input_error, missing_package
+from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs, numbered_dofs
 from stickslip.model.modes import ABSURD
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
@@ -120,12 +120,12 @@ def _names_in_npz(path: Path) -> Collection[str]:
 
 
 def _names_in_hdf5(path: Path) -> Collection[str]:
-    try:
-        import h5py
+    import h5py
 
+    try:
         with h5py.File(path, "r") as file:
             return set(file)
-    except (ModuleNotFoundError, OSError, RuntimeError):  # told when its matrices are read
+    except (OSError, RuntimeError):  # told when its matrices are read
         return ("mass",)
 
 
@@ -210,10 +210,8 @@ def _check_size(shape: tuple[int, int], n: int | None, stored: int, place: str) 
 
 def _read_hdf5(path: Path, name: str) -> Arrays:
     """Return dataset `name`, or the datasets of group `name`, after their sizes were checked."""
-    try:
-        import h5py
-    except ModuleNotFoundError as error:
-        raise missing_package("h5py", error, "report") from error
+    import h5py
+
     if not path.is_file():
         raise input_error(str(path), "there is no such file", "Check the path.")
     try:
