@@ -614,3 +614,25 @@ def test_component_with_a_wild_range_is_refused(tmp_path):
     (tmp_path / "a.cdb").write_text(text)
     with pytest.raises(InputError, match="range that ends at -999999999"):
         read_ansys_archive(tmp_path / "a.cdb")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("KEYOP,       1, 2,       3", r"line \d+: KEYOPT\(2\) = 3 of SOLID185: another integration than full"),
+        ("KEYOPT,1,2,1", r"KEYOPT\(2\) = 1 of SOLID185"),
+        ("keyo,1,6,1", r"KEYOPT\(6\) = 1 of SOLID185: a pressure of its own"),
+        ("ET,1,185,,2", r"KEYOPT\(2\) = 2 of SOLID185"),
+        ("KEYOPT,1,15,1", r"KEYOPT\(15\) = 1 of SOLID185: what is not read"),
+    ],
+)  # fmt: skip
+def test_options_that_make_a_brick_another_are_refused(tmp_path, line, message):
+    (tmp_path / "cube.cdb").write_text(f"{cube()}\n{line}\n")
+    with pytest.raises(InputError, match=message):
+        read_ansys_archive(tmp_path / "cube.cdb")
+
+
+@pytest.mark.parametrize("line", ["KEYOP,1,2,0", "KEYOP,1,5,1", "KEYOPT,7,2,3", "KEYOPT,1,2"])
+def test_options_that_change_nothing_are_passed_over(tmp_path, line):
+    (tmp_path / "cube.cdb").write_text(f"{cube()}\n{line}\n")
+    assert len(read_ansys_archive(tmp_path / "cube.cdb").cells) == 1

@@ -12,6 +12,7 @@ from stickslip.model.readers.ansys_blocks import (
     CONSTRAINTS,
     CUT_SHORT,
     NUMBER,
+    OPTIONS,
     ROTATIONS,
     TYPE,
     WRITE,
@@ -26,6 +27,21 @@ NODES_OF_SOLID = {
     186: (20,),
     187: (10, 4),
 }  # element type -> its regular numbers of nodes
+# values of KEYOPT other than 0 that leave these solids as they are read: SOLID186 with full integration, and output
+HARMLESS_OPTIONS = {
+    (186, 2): ("1",),
+    (185, 5): ("1", "2"),
+    (186, 5): ("1", "2"),
+    (187, 5): ("1", "2"),
+}
+WHAT_OPTIONS = {
+    (185, 2): "another integration than full: reduced, or with enhanced strains",
+    (185, 3): "layers",
+    (186, 3): "layers",
+    (185, 6): "a pressure of its own",
+    (186, 6): "a pressure of its own",
+    (187, 6): "a pressure of its own",
+}
 WITHOUT_STIFFNESS = {
     154,
     200,
@@ -170,6 +186,26 @@ def _coupled(blocks: Blocks) -> IntArray:
     return np.array([*pairs], dtype=np.int64).reshape(-1, 2)
 
 
+def _check_options(blocks: Blocks) -> None:
+    """Refuse an option of a solid that elements have, by which its matrices are others."""
+    used = set(blocks.heads[:, TYPE].tolist())
+    for place, (command, *words) in blocks.commands:
+        if command.upper() not in OPTIONS:
+            continue
+        number, option, value = (word.rstrip(".") for word in [*words, "0", "0", "0"][:3])
+        kind = blocks.types.get(int(number), 0) if number.isdigit() else 0
+        if kind not in NODES_OF_SOLID or int(number) not in used or value in ("", "0"):
+            continue
+        key = (kind, int(option)) if option.isdigit() else (kind, 0)
+        if value not in HARMLESS_OPTIONS.get(key, ()):
+            what = WHAT_OPTIONS.get(key, "what is not read")
+            raise input_error(
+                place,
+                f"KEYOPT({option}) = {value} of SOLID{kind}: {what}",
+                "Use elements without it, such as SOLID186, or let ANSYS write its matrices (read_ansys_full).",
+            )
+
+
 def _solids(path: Path, blocks: Blocks) -> IntArray:
     """Return the rows of the solid elements; refuse others that have a stiffness."""
     kinds = np.array([blocks.types.get(int(t), 0) for t in blocks.heads[:, TYPE]], dtype=np.int64)
@@ -180,6 +216,7 @@ def _solids(path: Path, blocks: Blocks) -> IntArray:
             f"has elements of the types {others}; a mesh of solids holds SOLID185, 186 and 187",
             WRITE,
         )
+    _check_options(blocks)
     rows = np.flatnonzero(np.isin(kinds, list(NODES_OF_SOLID)))
     if not len(rows):
         raise input_error(str(path), "has no elements SOLID185, 186 or 187", WRITE)

@@ -25,6 +25,8 @@ WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDW
 
 ROTATIONS = ("OMEGA", "CMOMEGA", "CGOMGA", "DOMEGA", "CMDOMEGA", "DCGOMG")
 CONSTRAINTS = ("CE", "CP")
+OPTIONS = ("KEYO", "KEYOP", "KEYOPT")  # of an element type; ANSYS takes four letters
+KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,8 @@ class Blocks:
     properties
         Material number -> property -> value.
     commands
-        (place, words) of commands that change the model: rotation, coupled dofs, constraint equations.
+        (place, words) of commands that change the model: rotation, coupled dofs, constraint equations, options of element
+        types, those of ``ET`` as ``KEYOPT`` of their own.
     """
 
     numbers: IntArray
@@ -93,12 +96,15 @@ def read_blocks(path: Path) -> Blocks:
             at = _component(path, lines, at, sets)
         elif command == "ET" and len(words) > 2:
             types[_whole(path, at, words[1])] = _whole(path, at, words[2])
+            place = f"{path}: line {at + 1}"
+            options = enumerate(words[3:9], 1)
+            commands += [(place, ["KEYOPT", words[1], str(k), w]) for k, w in options if w]
             at += 1
         elif command in {"MPDATA", "MP"}:
             _property(path, at, words, properties)
             at += 1
         else:
-            if command in (*ROTATIONS, *CONSTRAINTS):
+            if command in KEPT:
                 commands.append(
                     (f"{path}: line {at + 1}", [w.split("!")[0].strip() for w in words])
                 )

@@ -7,7 +7,6 @@ over materials, supports, ties and steps without a word, and it is not there whe
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.solid import Material, integrate, node_dofs
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.deck_model import DeckModel, interpret
+from stickslip.model.readers.deck_tie import tie_faces
 from stickslip.model.readers.keywords import keyword_blocks
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
@@ -132,6 +132,7 @@ def read_deck(
     path = Path(path)
     blocks = keyword_blocks(path)
     model = interpret(blocks, block_nodes(blocks, path), ignore)
+    tie_faces(model, blocks, ignore)
     materials = _materials(model, units, plausible)
     mesh, keep = _mesh(model, units)
     held: BoolArray = _held(model)[keep]
@@ -215,7 +216,7 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
         for what, table in (("*ELASTIC", model.elastic), ("*DENSITY", model.density)):
             if name not in table:
                 raise input_error(
-                    place, f"material {name!r} has no {what}", _found_instead(model, name, what)
+                    place, f"material {name!r} has no {what}", _found_instead(model, name)
                 )
         modulus, ratio = model.elastic[name]
         modulus, density = units.stress * modulus, units.density * model.density[name]
@@ -228,17 +229,12 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
     return materials
 
 
-def _found_instead(model: DeckModel, name: str, keyword: str) -> str:
-    """Say what may have been meant where a material lacks a keyword: another material, or a keyword that was passed over."""
+def _found_instead(model: DeckModel, name: str) -> str:
+    """Say what may have been meant where a material lacks a keyword: another material, or the keyword below it."""
     known = sorted({*model.elastic, *model.density})
     if name not in known:
         return f"Add it. {did_you_mean(name, known)}" if known else "Add it."
-    alike = [
-        text for text in model.ignored if get_close_matches(keyword, [text.partition(" (")[0]])
-    ]
-    return f"Add it to *MATERIAL, NAME={name}. " + (
-        f"Not known is its {alike[0]}." if alike else "It is a line of its own there."
-    )
+    return f"Add it to *MATERIAL, NAME={name}. It is a line of its own there."
 
 
 def _cell_materials(model: DeckModel) -> tuple[str, ...]:

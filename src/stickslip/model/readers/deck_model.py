@@ -7,7 +7,15 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
-from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
+from stickslip.model.readers.deck_words import (
+    DAMPING,
+    OTHER_BRICKS,
+    PARAMETERS,
+    PASSING_CONDITIONS,
+    REFUSED,
+    SILENT,
+    TOLD,
+)
 from stickslip.model.readers.keywords import (
     Block,
     members,
@@ -19,31 +27,7 @@ from stickslip.model.readers.node_table import NodeTable
 
 NODES_OF = {
     "C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10,
-    "C3D8": 8, "C3D8I": 8, "C3D8R": 8, "C3D20": 20, "C3D20R": 20,
-}  # fmt: skip
-
-# corners of the faces S1, S2, …, counted from 0
-TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-
-# Keywords that say nothing about mass, stiffness or supports: steps, output, loads of single nodes
-SILENT = {
-    "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "MATERIAL", "END STEP", "STATIC", "FREQUENCY",
-    "COMPLEX FREQUENCY", "BUCKLE", "STEADY STATE DYNAMICS", "MODAL DYNAMIC", "DYNAMIC", "SELECT CYCLIC SYMMETRY MODES",
-    "NODE PRINT", "NODE FILE", "NODE OUTPUT", "EL PRINT", "EL FILE", "ELEMENT OUTPUT", "ENERGY OUTPUT", "CONTACT FILE",
-    "CONTACT PRINT", "OUTPUT", "PREPRINT", "RESTART", "SURFACE", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
-    "INSTANCE", "END INSTANCE", "MATRIX GENERATE", "MATRIX OUTPUT", "FILE FORMAT", "MONITOR", "AMPLITUDE", "TIME POINTS",
-    "MODAL DAMPING", "BASE MOTION", "PHYSICAL CONSTANTS", "USER OUTPUT", "PRINT", "FIELD", "SOLID SECTION", "ELASTIC",
-    "DENSITY", "BOUNDARY", "DLOAD", "TIE", "CYCLIC SYMMETRY MODEL",
-}  # fmt: skip
-# Keywords without which the matrices would be others, and which are not read
-REFUSED = {
-    "MPC", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING", "CONTACT PAIR",
-    "CONTACT", "SHELL SECTION", "BEAM SECTION", "BEAM GENERAL SECTION", "MEMBRANE SECTION", "SPRING", "DASHPOT", "MASS",
-    "ROTARY INERTIA", "GAP", "SUBMODEL", "MODEL CHANGE", "ORIENTATION", "PRE-TENSION SECTION", "USER ELEMENT",
-    "MATRIX INPUT", "MATRIX ASSEMBLE", "NCOPY", "NGEN", "NFILL", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "TRANSFORM",
-    "DISTRIBUTION", "FOUNDATION", "EMBEDDED ELEMENT", "CONNECTOR SECTION", "SUPER ELEMENT", "SUBSTRUCTURE",
-    "HYPERELASTIC", "HYPERFOAM", "USER MATERIAL", "SUBSTRUCTURE PROPERTY", "SHELL TO SOLID COUPLING", "PHYSICAL",
+    "C3D8": 8, "C3D20": 20, "C3D20R": 20,
 }  # fmt: skip
 
 
@@ -90,34 +74,63 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
         If something is missing, wrong, or changes the matrices in a way that is not read.
     """
     model = DeckModel(nodes)
-    passed = {" ".join(word.upper().strip("* ").split()) for word in ignore}
+    passed = passed_over(ignore)
     _cells(model, blocks, passed)
     _nodes_of_elements(model, blocks)
     material = ""
     for block in blocks:
         word = block.keyword
-        if word == "MATERIAL":
-            material = block.parameter("NAME").upper()
-        elif word in passed and word != "ELEMENT":
+        if word in passed and word not in ("ELEMENT", "MATERIAL"):
             model.ignored.append(f"*{word} ({block.path.name}: line {block.line}), as asked")
-        elif word in REFUSED:
-            raise _unread(block, f"*{word} changes the model and is not read")
-        elif word in ("ELASTIC", "DENSITY"):
-            _material(model, block, material)
-        elif word in _ACTIONS:
-            _ACTIONS[word](model, block)
-        elif word not in SILENT:
+        elif word in PARAMETERS:
+            block.check_parameters()
+            if word == "MATERIAL":
+                material = block.parameter("NAME").upper()
+            elif word in ("ELASTIC", "DENSITY"):
+                _material(model, block, material)
+            elif word in _ACTIONS:
+                _ACTIONS[word](model, block)
+        elif word in TOLD:
             model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
-    _cyclic(model, blocks, passed)
+        elif word not in SILENT:
+            raise _refused(block)
     return model
 
 
-def _unread(block: Block, problem: str) -> InputError:
+def passed_over(ignore: tuple[str, ...]) -> set[str]:
+    """Return keywords that a user asks to pass over, as blocks write them."""
+    return {" ".join(word.upper().strip("* ").split()) for word in ignore}
+
+
+def unread(block: Block, problem: str) -> InputError:
+    """Return the refusal of a keyword without which the model would be another one."""
     return input_error(
         block.place,
         problem,
         "Let the solver write its matrices and read those$ignore.",
         ignore=f", or pass ignore=({block.keyword!r},) to go on without",
+    )
+
+
+def _refused(block: Block) -> InputError:
+    """Say why a keyword is not passed over."""
+    word = block.keyword
+    if word in DAMPING:
+        return input_error(
+            block.place,
+            "damping is not read from decks",
+            "State it in the study, and leave it out here$ignore.",
+            ignore=f", or pass ignore=({word!r},) to go on without",
+        )
+    if word in REFUSED:
+        return unread(block, f"*{word} changes the model and is not read")
+    near = did_you_mean(word, sorted({*PARAMETERS, *SILENT, *TOLD}))
+    hint = f"{near} " if near.startswith("Did") else ""
+    return input_error(
+        block.place,
+        f"*{word} is not known, and may change the model",
+        f"{hint}Take it out where the model is the same without it, else let the solver write its matrices and read those$ignore.",
+        ignore=f", or pass ignore=({word!r},)",
     )
 
 
@@ -127,14 +140,22 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
     for block in blocks:
         if block.keyword != "ELEMENT":
             continue
+        block.check_parameters()
         kind = block.parameter("TYPE").upper()
         if kind not in NODES_OF and "ELEMENT" in passed:
             model.ignored.append(
                 f"elements {kind} ({block.path.name}: line {block.line}), as asked"
             )
             continue
+        if kind in OTHER_BRICKS:
+            what, remedy = OTHER_BRICKS[kind]
+            raise input_error(
+                block.place,
+                f"elements of type {kind} have {what}, which are not read; plain bricks in their place are too stiff in bending",
+                remedy,
+            )
         if kind not in NODES_OF:
-            raise _unread(block, f"elements of type {kind} are not read")
+            raise unread(block, f"elements of type {kind} are not read")
         count = NODES_OF[kind]
         model.element_type = model.element_type or kind
         if kind != model.element_type:
@@ -169,7 +190,7 @@ def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
         if block.keyword == "NSET" and "ELSET" in block.parameters:
             elements = block.parameter("ELSET").upper()
             if elements not in model.element_sets:
-                raise _unknown(block.place, "element set", elements, list(model.element_sets))
+                raise unknown(block.place, "element set", elements, list(model.element_sets))
             rows = model.cells[np.isin(model.cells[:, 0], model.element_sets[elements]), 1:]
             name = block.parameter("NSET").upper()
             known = sets.get(name, np.empty(0, dtype=np.int64))
@@ -201,11 +222,11 @@ def _material(model: DeckModel, block: Block, material: str) -> None:
         raise input_error(block.place, "belongs to no *MATERIAL", "Put it below its material.")
     kind = block.parameters.get("TYPE", "ISO").upper()
     if block.keyword == "ELASTIC" and not kind.startswith("ISO"):
-        raise _unread(block, f"TYPE={kind} is not read, only isotropic materials")
+        raise unread(block, f"TYPE={kind} is not read, only isotropic materials")
     rows = list(block.rows())
     wanted = 2 if block.keyword == "ELASTIC" else 1
     if len(rows) != 1:
-        raise _unread(block, f"has {len(rows)} lines of data: values by temperature are not read")
+        raise unread(block, f"has {len(rows)} lines of data: values by temperature are not read")
     place, fields = rows[0]
     if len(fields) < wanted:
         raise input_error(place, f"needs {wanted} numbers, got {len(fields)}", "Check the line.")
@@ -218,14 +239,15 @@ def _material(model: DeckModel, block: Block, material: str) -> None:
 
 def _section(model: DeckModel, block: Block) -> None:
     if "ORIENTATION" in block.parameters:
-        raise _unread(block, "an ORIENTATION is not read")
+        raise unread(block, "an ORIENTATION is not read")
     name, elements = block.parameter("MATERIAL").upper(), block.parameter("ELSET").upper()
     if elements not in model.element_sets:
-        raise _unknown(block.place, "element set", elements, list(model.element_sets))
+        raise unknown(block.place, "element set", elements, list(model.element_sets))
     model.sections.append((name, elements, block.place))
 
 
-def _unknown(place: str, what: str, name: str, known: list[str]) -> InputError:
+def unknown(place: str, what: str, name: str, known: list[str]) -> InputError:
+    """Return the refusal of a name that is not there."""
     return input_error(place, f"there is no {what} {name!r}", did_you_mean(name, known))
 
 
@@ -234,7 +256,7 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
     if text.upper() in model.nodes.node_sets:
         return model.nodes.node_sets[text.upper()]
     if not text.lstrip("+-").isdigit():
-        raise _unknown(place, "node set", text.upper(), list(model.nodes.node_sets))
+        raise unknown(place, "node set", text.upper(), list(model.nodes.node_sets))
     number = np.array([whole_number(text, place, "node")])
     model.nodes.index(number)
     return number
@@ -243,7 +265,9 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
 def _boundary(model: DeckModel, block: Block) -> None:
     """Take supports: ``node or set, first direction, last direction, value`` or ``ENCASTRE`` and the like."""
     words = {"ENCASTRE": (1, 6), "PINNED": (1, 3)}
-    if block.parameters.get("OP", "MOD").upper() == "NEW":
+    if block.parameters.get("TYPE", "DISPLACEMENT").upper() != "DISPLACEMENT":
+        raise unread(block, f"TYPE={block.parameters['TYPE']} is not read")
+    if _anew(block):
         model.fixed = {"x": [], "y": [], "z": []}
     for place, fields in block.rows():
         nodes = nodes_named(model, fields[0], place)
@@ -260,7 +284,7 @@ def _boundary(model: DeckModel, block: Block) -> None:
             )
         value = real_number(fields[3], place, "value") if len(fields) > 3 else 0.0
         if value:
-            raise _unread(block, f"a prescribed displacement of {value:g} is not read")
+            raise unread(block, f"a prescribed displacement of {value:g} is not read")
         if not 1 <= first <= last:
             raise input_error(place, f"directions {first} to {last}", "They count from 1 to 3.")
         for direction, component in enumerate("xyz", 1):
@@ -268,11 +292,21 @@ def _boundary(model: DeckModel, block: Block) -> None:
                 model.fixed[component].append(nodes)
 
 
+def _anew(block: Block) -> bool:
+    """Whether what earlier steps said is gone (``OP=NEW``)."""
+    operation = block.parameters.get("OP", "MOD").upper()
+    if operation not in ("NEW", "MOD"):
+        raise input_error(block.place, f"OP={operation} is not known", "Write OP=NEW or OP=MOD.")
+    return operation == "NEW"
+
+
 ROTATIONS = ("CENT", "CORIO", "ROTA", "ROTDYNF")  # of Abaqus
 
 
 def _distributed_load(model: DeckModel, block: Block) -> None:
     """Take rotation: ``elements, CENTRIF, speed², point of the axis, direction``; list other loads as ignored."""
+    if _anew(block):
+        model.speed_squares = []
     for place, fields in block.rows():
         kind = fields[1].upper() if len(fields) > 1 else ""
         if kind in ROTATIONS:
@@ -291,8 +325,30 @@ def _distributed_load(model: DeckModel, block: Block) -> None:
         numbers = [real_number(text, place, "CENTRIF value") for text in fields[2:9]]
         if numbers[0] < 0:
             raise input_error(place, f"speed² is {numbers[0]:g}", "It cannot be negative.")
+        if "AMPLITUDE" in block.parameters:
+            model.ignored.append(f"AMPLITUDE of *DLOAD ({place}): the speed is taken whole")
+        _whole_model(model, fields[0], place, "rotates")
         model.speed_squares.append(numbers[0])
         model.axes.append((place, numbers[1:4], numbers[4:7]))
+
+
+def _whole_model(model: DeckModel, name: str, place: str, what: str) -> None:
+    """Refuse a set that lacks some of the elements."""
+    inside = model.element_sets.get(name.upper(), np.empty(0, dtype=np.int64))
+    if not np.isin(model.cells[:, 0], inside).all():
+        raise input_error(
+            place,
+            f"{what} {name!r}, which is not the set of all elements",
+            "Name a set that holds all of them.",
+        )
+
+
+def _initial(model: DeckModel, block: Block) -> None:
+    """List initial conditions that leave the matrices as they are as ignored; refuse stresses and what else is given."""
+    kind = block.parameter("TYPE").upper()
+    if kind not in PASSING_CONDITIONS:
+        raise unread(block, f"initial conditions of TYPE={kind} change the stiffness")
+    model.ignored.append(f"*INITIAL CONDITIONS, TYPE={kind} ({block.path.name}: line {block.line})")
 
 
 def _step(model: DeckModel, block: Block) -> None:
@@ -304,7 +360,12 @@ def _step(model: DeckModel, block: Block) -> None:
 
 
 def _cyclic_model(model: DeckModel, block: Block) -> None:
+    before = model.sectors
     model.sectors = whole_number(block.parameter("N"), block.place, "number of sectors N")
+    if before not in (None, model.sectors):
+        raise input_error(block.place, f"N={model.sectors} after N={before}", "Give one.")
+    if "ELSET" in block.parameters:
+        _whole_model(model, block.parameters["ELSET"], block.place, "repeats")
     if model.sectors < 1:
         raise input_error(block.place, f"N={model.sectors}", "Give the number of sectors.")
     rows = list(block.rows())
@@ -321,72 +382,6 @@ _ACTIONS = {
     "BOUNDARY": _boundary,
     "DLOAD": _distributed_load,
     "STEP": _step,
+    "INITIAL CONDITIONS": _initial,
     "CYCLIC SYMMETRY MODEL": _cyclic_model,
 }
-
-
-def _cyclic(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
-    """Take the faces of the cyclic tie; refuse other ties."""
-    instances = [b for b in blocks if b.keyword == "INSTANCE"]
-    moved = len(instances) > 1 or any(list(b.rows()) for b in instances)
-    if moved and "INSTANCE" not in passed:
-        raise _unread(instances[-1], "several instances, or a moved one, are not read")
-    surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
-    for block in blocks:
-        if block.keyword != "TIE" or "TIE" in passed:
-            continue
-        if "CYCLIC SYMMETRY" not in block.parameters:
-            raise _unread(block, "a *TIE that is not cyclic changes the model and is not read")
-        rows = list(block.rows())
-        if len(rows) != 1 or len(rows[0][1]) < 2:
-            raise input_error(block.place, "needs one line with two surfaces", "Add it.")
-        place, fields = rows[0]
-        low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
-        model.tie = (low, high)
-        if model.sectors is None:
-            raise input_error(
-                block.place,
-                "is cyclic, but nothing says how many sectors there are",
-                "Add *CYCLIC SYMMETRY MODEL, N=….",
-            )
-
-
-def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
-    if name not in surfaces:
-        raise _unknown(place, "surface", name, list(surfaces))
-    block = surfaces[name]
-    kind = block.parameters.get("TYPE", "ELEMENT").upper()
-    if kind == "NODE":
-        parts = [nodes_named(model, fields[0], where) for where, fields in block.rows()]
-    elif kind == "ELEMENT":
-        parts = [_face_nodes(model, fields, where) for where, fields in block.rows()]
-    else:
-        raise input_error(
-            block.place, f"a surface of TYPE={kind} is not read", "Use TYPE=NODE or ELEMENT."
-        )
-    if not parts:
-        raise input_error(block.place, "holds no nodes", "List node sets or element faces.")
-    return unique_in_order(np.concatenate(parts))
-
-
-def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
-    """Return the nodes of ``element or set, face``, e.g. ``SIDE, S3``."""
-    count = model.cells.shape[1] - 1
-    faces = TET_FACES if count in (4, 10) else HEX_FACES
-    face = fields[1].upper() if len(fields) > 1 else ""
-    if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
-        raise input_error(
-            place, f"{face!r} is no face of {model.element_type}", f"Write S1 to S{len(faces)}."
-        )
-    corners = faces[int(face[1:]) - 1]
-    edges = TET_EDGES if count == 10 else HEX_EDGES if count == 20 else ()
-    first = 4 if count == 10 else 8
-    middles = [first + i for i, ends in enumerate(edges) if set(ends) <= set(corners)]
-    if fields[0].upper() in model.element_sets:
-        numbers = model.element_sets[fields[0].upper()]
-    else:
-        numbers = np.array([whole_number(fields[0], place, "element")])
-    rows = model.cells[np.isin(model.cells[:, 0], numbers)]
-    if not len(rows):
-        raise _unknown(place, "element or element set", fields[0], list(model.element_sets))
-    return np.asarray(rows[:, [1 + i for i in (*corners, *middles)]].ravel(), dtype=np.int64)

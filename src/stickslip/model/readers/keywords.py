@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.errors import InputError, input_error
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.readers.deck_words import PARAMETERS
 from stickslip.model.readers.text import SHOWN, number_table, read_text
 
 MOST_INCLUDES = 200
@@ -56,6 +57,17 @@ class Block:
             raise input_error(self.place, f"lacks the parameter {name}", f"Write {name}=….")
         return value
 
+    def check_parameters(self) -> None:
+        """Refuse a parameter that the keyword, one that is read, is not known to have."""
+        known = PARAMETERS[self.keyword]
+        for name in self.parameters:
+            if name not in known:
+                raise input_error(
+                    self.place,
+                    f"the parameter {name} is not read, and may change the model",
+                    f"{did_you_mean(name, sorted(known))} Take it out if the model is the same without.",
+                )
+
     def rows(self) -> Iterator[tuple[str, list[str]]]:
         """Yield place and fields of each data line; a comma at its end counts for nothing."""
         for segment in self.segments:
@@ -80,7 +92,7 @@ def keyword_blocks(path: Path) -> list[Block]:
     Parameters
     ----------
     path
-        The file; ``*INCLUDE`` may name files of its folder and of folders below it.
+        The file; ``*INCLUDE``, and ``INPUT=`` of a keyword that is read, may name files of its folder and of folders below it.
 
     Raises
     ------
@@ -151,7 +163,10 @@ def members(
     known = np.sort(numbers)
     parts = {name: [listed] for name, listed in named.items()}
     for block in blocks:
-        if block.keyword == kind and not (kind == "NSET" and "ELSET" in block.parameters):
+        if block.keyword != kind:
+            continue
+        block.check_parameters()
+        if not (kind == "NSET" and "ELSET" in block.parameters):
             name = block.parameter(kind).upper()
             parts.setdefault(name, []).extend(_listed(block, parts, known))
     return {
@@ -219,9 +234,19 @@ def _read_into(blocks: list[Block], path: Path, stack: list[Path], count: list[i
             number += 1
         block = _parse_keyword(line, path, first)
         if block.keyword == "INCLUDE":
+            block.check_parameters()
             _read_into(blocks, _included(block, path, stack, count), [*stack, path], count)
         else:
             blocks.append(block)
+            if "INPUT" in block.parameters and block.keyword in PARAMETERS:
+                known = len(blocks)
+                _read_into(blocks, _included(block, path, stack, count), [*stack, path], count)
+                if len(blocks) > known:
+                    raise input_error(
+                        blocks[known].place,
+                        f"is a keyword in a file of data, which INPUT of {block.place} names",
+                        "Take it out of that file, or name the file in *INCLUDE.",
+                    )
         start = number + 1
     flush()
 

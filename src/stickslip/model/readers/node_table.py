@@ -119,6 +119,7 @@ def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
     for block in blocks:
         if block.keyword != "NODE":
             continue
+        block.check_parameters()
         if block.parameters.get("SYSTEM", "R").upper() != "R":
             raise input_error(
                 block.place,
