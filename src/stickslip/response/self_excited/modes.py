@@ -75,20 +75,43 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     each mode's own frequency. Of more than 400 coordinates the motions are spanned by undamped modes and the static answers to the forces
     that couple these.
     """
-    if isinstance(system.structure, Unreduced):
-        one_structure(system.structure, "stuck_modes")
-    own = system.structure.of_harmonic(1)
     springs = system.springs.stuck_stiffness()
     if holds is not None:
         springs = np.where(np.repeat(holds, 3), springs, 0.0)
+    return sprung_modes(system, count, springs)
+
+
+def sprung_modes(
+    system: System,
+    count: int,
+    springs: FloatArray,
+    harmonic: int = 1,
+    whole: int = WHOLE,
+) -> list[StuckMode]:
+    """Return the lowest modes of the structure with linear springs in place of its contacts; see `stuck_modes`.
+
+    Parameters
+    ----------
+    system, count
+        As in `stuck_modes`.
+    springs
+        (3 n_contacts,) stiffnesses t, w, n of each contact, N/m.
+    harmonic
+        What vibrates in it: on a wheel the harmonics of a load travel as different waves.
+    whole
+        Coordinates up to which eigenvalues are those of all motions.
+    """
+    if isinstance(system.structure, Unreduced):
+        one_structure(system.structure, "stuck_modes")
+    own = system.structure.of_harmonic(harmonic)
     bound = with_springs(own, system.interface.gap_operator, springs)
     elastic = replace(bound, stiffness=_hermitian(bound.stiffness), mass=_hermitian(bound.mass))
     # copies that contacts know, and what holds them, have no mass and are no motions of their own
     way = own_motions(elastic, system.structure.multipliers)
     dofs = elastic.dofs.take(np.arange(way.shape[1]))
     still, free = (in_coordinates(one, way, dofs, {}) for one in (elastic, bound))
-    basis, rigid = _basis(still, free, count)
-    feedback = system.structure.feedback_of(1)
+    basis, rigid = _basis(still, free, count, whole)
+    feedback = system.structure.feedback_of(harmonic)
     if feedback is not None:
         feedback = replace(feedback, patterns=(way @ basis).conj().T @ feedback.patterns)
     stiffness, damping = (in_basis(m, basis) for m in (free.stiffness, free.damping))
@@ -103,10 +126,10 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     ]
 
 
-def _basis(still: Structure, free: Structure, count: int) -> tuple[Matrix, int]:
+def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[Matrix, int]:
     """Return motions of unit mass that span the lowest modes, and how many of those asked for do not vibrate without damping."""
     moving = int(np.count_nonzero(still.mass.diagonal()))
-    wanted = moving if moving <= WHOLE else min(moving, 2 * count + SPARE)
+    wanted = moving if moving <= whole else min(moving, 2 * count + SPARE)
     modes = normal_modes(still, wanted)
     rigid = int(np.count_nonzero(modes.squares[: min(count, moving)] <= 0.0))
     shapes = np.asarray(modes.shapes)
@@ -118,6 +141,7 @@ def _basis(still: Structure, free: Structure, count: int) -> tuple[Matrix, int]:
         float(np.max(modes.squares)) * 1e-3
     )  # a body that is free to move has a static answer, too
     answers = np.linalg.solve(still.stiffness + shift * still.mass, coupling)
+    answers = answers[:, np.any(answers != 0.0, axis=0)]
     both = np.hstack([shapes, answers / np.linalg.norm(answers, axis=0)])
     square, turn = np.linalg.eigh(both.conj().T @ (still.mass @ both))
     kept = square > 1e-10 * square[-1]

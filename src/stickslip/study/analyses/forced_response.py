@@ -42,6 +42,7 @@ from stickslip.study.analyses.forced.not_periodic import (
     of_answers,
     without_periodic,
 )
+from stickslip.study.analyses.forced.physics import PHYSICS, beforehand, of_physics, physics_of
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
 from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
@@ -90,6 +91,7 @@ NOTES = (
     IN_TIME,
     NOT_PERIODIC,
     HARMONICS,
+    PHYSICS,
 )  # what makes up the dataset
 
 
@@ -134,6 +136,8 @@ class ForcedResponseAnalysis:
             notes.put(BIFURCATIONS, _bifurcations(inputs, response, notes))
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
+        if notes.get(PHYSICS) is None:
+            notes.put(PHYSICS, of_physics(inputs, response))
         if failure is not None:
             raise failure
 
@@ -149,7 +153,15 @@ class ForcedResponseAnalysis:
         chooser, passages = question.chooser, case.settings.harmonics.passages
         labels = question.model.error_labels
         of_model = [text for text in question.model.warnings if text not in model.warnings]
-        doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
+        physics = physics_of(question)
+        known = [] if physics is None else list(beforehand(physics))
+        notes = [v for v in known if not v.rank]
+        doubts = [
+            *no_resonance(question),
+            *nothing_pressed(question),
+            *mixed_places(labels),
+            *(v for v in known if v.rank),
+        ]
         return (
             *_of_pressures(case, model),
             str(estimate(model, question.sweep)),
@@ -159,7 +171,7 @@ class ForcedResponseAnalysis:
             cost_line(question),
             *bifurcations_line(question),
             *inside(question),
-            *(f"note: {v.why}. {v.remedy}" for v in off_engine_order(question)),
+            *(f"note: {v.why}. {v.remedy}" for v in (*off_engine_order(question), *notes)),
             *(
                 f"WARNING: {text}"
                 for text in (*of_model, *(f"{v.why}. {v.remedy}" for v in doubts))

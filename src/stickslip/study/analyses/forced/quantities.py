@@ -54,6 +54,7 @@ _OF = {
         "reference_sentence": ("1", "what the check says, in words"),
         "bifurcations_limits": ("1", "where bifurcations are not seen, and what looking for them took, in words"),
         "known_verdicts": ("1", "what only the model knew, verdicts as JSON"),
+        "physics_verdicts": ("1", "what the modes say of the physics of the case, verdicts as JSON"),
         "case_verdict": ("1", "whether the peak is to be trusted"),
         "largest_blade": ("1", "sector of the blade with the largest amplitude"),
         "tuned_peak_amplitude": ("m", "largest amplitude of the wheel with all sectors alike"),
