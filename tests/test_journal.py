@@ -3,6 +3,7 @@
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.solve.status import Status
-from stickslip.study.keep.archive import decode, encode
+from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
 from stickslip.study.keep.journal import JobJournal, read_note, read_sealed
 
 
@@ -90,9 +91,7 @@ def test_file_of_another_job_is_refused(tmp_path: Path) -> None:
     with JobJournal(tmp_path / "a.part", Point) as journal:
         journal.put("model", {"n": 1})
     (tmp_path / "a.part").rename(tmp_path / "b.part")
-    with pytest.raises(
-        InputError, match=r"b\.part: is the file of another job or version\. .*--fresh"
-    ):
+    with pytest.raises(InputError, match=r"b\.part: is the file of another job\. .*--fresh"):
         JobJournal(tmp_path / "b.part", Point)
 
 
@@ -155,16 +154,74 @@ def test_kill_in_the_middle_of_an_insert_leaves_whole_records(tmp_path: Path) ->
     check.close()
 
 
-def test_any_wrong_byte_of_an_archive_is_a_value_error_or_harmless():
-    whole = encode({"a": np.arange(40.0), "name": "x"})
-    rng = np.random.default_rng(3)
-    for _ in range(400):
-        payload = bytearray(whole)
-        payload[int(rng.integers(len(payload)))] = int(rng.integers(256))
-        start = int(rng.integers(len(payload)))
-        if rng.random() < 0.3:
-            payload[start : start + 30] = bytes(30)
+def test_a_file_of_an_older_layout_is_refused_with_run_anew(tmp_path: Path) -> None:
+    with JobJournal(tmp_path / "a.part", Point) as journal:
+        journal.add(point(0))
+    with closing(sqlite3.connect(tmp_path / "a.part")) as db:
+        db.execute("update meta set value = '6:a' where key = 'file'")
+        db.commit()
+    with pytest.raises(InputError, match=r"a\.part: was written by another version .*Run anew"):
+        JobJournal(tmp_path / "a.part", Point)
+
+
+def test_every_flipped_bit_of_a_record_or_note_is_seen():
+    """All bits: of what zip passes over (dates, flags, the names in its directory), too."""
+    note = encode({"a": np.arange(5.0), "name": "x", "finished": True})
+    for whole, read in ((encode_record(point(3)), decode_record), (note, decode)):
+        kind = (Point,) if read is decode_record else ()
+        for bit in range(8 * len(whole)):
+            flipped = bytearray(whole)
+            flipped[bit // 8] ^= 1 << bit % 8
+            with pytest.raises(ValueError, match="checksum|other bytes"):
+                read(bytes(flipped), *kind)
+        for length in range(len(whole)):
+            with pytest.raises(ValueError, match="checksum"):
+                read(whole[:length], *kind)
+
+
+FLIPS = pytest.mark.parametrize("count", [300, pytest.param(5000, marks=pytest.mark.validation)])
+
+
+@FLIPS
+@pytest.mark.parametrize("end", [".part", ".job"])
+def test_a_flipped_bit_of_a_job_is_refused_or_changes_nothing(
+    tmp_path: Path, end: str, count: int
+) -> None:
+    """Anywhere in the file: names of notes, numbers of records, SQLite's own pages."""
+    path = tmp_path / "a.part"
+    with JobJournal(path, Point) as journal:
+        journal.add(point(0))
+        journal.add(point(3))
+        journal.put("finished", {"points": 2})
+        journal.put("model", {"a": np.eye(2), "names": np.array(["L1.1", "R.3"])})
+        if end == ".job":
+            journal.seal()
+    whole, path = path.with_suffix(end).read_bytes(), path.with_suffix(end)
+    rng = np.random.default_rng(11)
+    refused = 0
+    for bit in rng.integers(8 * len(whole), size=count):
+        flipped = bytearray(whole)
+        flipped[bit // 8] ^= 1 << int(bit % 8)
+        path.write_bytes(flipped)
         try:
-            decode(bytes(payload))
-        except ValueError:
-            continue
+            records, notes = _read(path)
+        except InputError as error:
+            assert error.place == str(path)
+            assert "--fresh" in error.remedy
+            refused += 1
+        else:
+            assert [p.index for p in records] == [0, 3]
+            assert all(same(p, point(p.index)) for p in records)
+            assert notes["finished"] == {"points": 2}
+            np.testing.assert_array_equal(notes["model"]["a"], np.eye(2))
+            assert list(notes["model"]["names"]) == ["L1.1", "R.3"]
+    assert refused > count // 20
+
+
+def _read(path: Path) -> tuple[list[Point], dict[str, dict[str, object]]]:
+    """Read a file as a run does that goes on with it."""
+    if path.suffix == ".job":
+        return read_sealed(path, Point)
+    with JobJournal(path, Point) as journal:
+        journal.check()
+        return journal.records(), journal.notes()

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip.errors import InputError, input_error
+from stickslip.model.checksum import add_checksum, check_file
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -51,6 +52,7 @@ def read_npz(path: Path) -> Arrays:
         more than its size can hold.
     """
     try:
+        check_file(path)
         with zipfile.ZipFile(path) as archive:
             return {
                 _array_name(entry, path): _read_array(archive, entry, path)
@@ -72,7 +74,7 @@ def read_npz(path: Path) -> Arrays:
 
 
 def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write arrays under a temporary name and put the file in place, so that `path` is always whole.
+    """Write arrays and their checksum under a temporary name and put the file in place, so that `path` is always whole.
 
     Raises
     ------
@@ -87,6 +89,7 @@ def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
             for name, array in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
                     np.lib.format.write_array(stream, np.asarray(array), allow_pickle=False)
+        add_checksum(temporary)
         temporary.replace(path)
     except OSError as error:
         raise input_error(

@@ -1,27 +1,28 @@
 """The file of a job: everything it has finished, record by record.
 
 One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
-leaves whole records only. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of
+leaves whole records only. Every record and note ends with its checksum, and a sealed file holds one of all of them. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of
 several machines share the folder; sealed, it is ``<key>.job``.
 """
 
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
+from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from stickslip.errors import InputError, input_error
-from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
+from stickslip.study.keep.archive import FORMAT, decode, decode_record, encode, encode_record
 from stickslip.study.keep.whole import unwritable
 
-FORMAT = 6  # raised whenever the tables or the archives change
 AT_WORK, SEALED = ".part", ".job"
 BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
-WHOLE = "whole"  # what a file says of itself that has been sealed
+WHOLE = "whole"  # of a file that has been sealed: the checksum of all its records and notes
 DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
 PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
+ANEW = "Run anew with --fresh, which removes what runs wrote into the folder and no other file."
 FRESH = (
     "If its disk is full, make room. Otherwise delete it, or start over with --fresh, which removes what runs wrote into the "
     "folder and no other file."
@@ -116,7 +117,7 @@ class JobJournal:
     def check(self) -> None:
         """Read everything, and refuse the file if any of it is damaged."""
         with _named(self._path):
-            (said,) = self._db.execute("pragma quick_check").fetchone()
+            (said,) = self._db.execute("pragma integrity_check").fetchone()
             if said != "ok":
                 raise ValueError(said)
             _records(self._db, self._type)
@@ -136,7 +137,7 @@ class JobJournal:
         """Close the file and give it the name of a finished job."""
         with _named(self._path):
             self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
-            self._db.execute("insert into meta values (?, 'yes')", (WHOLE,))
+            self._db.execute("insert into meta values (?, ?)", (WHOLE, _checksum(self._db)))
             self._db.close()
             self._path.replace(self._path.with_name(f"{_key(self._path)}{SEALED}"))
 
@@ -150,6 +151,9 @@ def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str
         If the file cannot be read.
     """
     with _named(path), _reading(path) as db:
+        (whole,) = db.execute("select value from meta where key = ?", (WHOLE,)).fetchone()
+        if whole != _checksum(db):
+            raise ValueError("holds other records or notes than were sealed")
         return _records(db, record_type), _notes(db)
 
 
@@ -204,8 +208,26 @@ def _mark(path: Path) -> str:
 def _check_mark(db: sqlite3.Connection, path: Path) -> None:
     """Refuse the file of another job, or of another layout."""
     row = db.execute("select value from meta where key = 'file'").fetchone()
+    layout, _, key = str(row[0] if row else "").partition(":")
+    if layout.isdecimal() and int(layout) != FORMAT and key == _key(path):
+        problem = (
+            f"was written by another version of stickslip (layout {layout}, this one has {FORMAT})"
+        )
+        raise input_error(str(path), problem, ANEW)
     if row is None or row[0] != _mark(path):
-        raise input_error(str(path), "is the file of another job or version", FRESH)
+        raise input_error(str(path), "is the file of another job", FRESH)
+
+
+def _checksum(db: sqlite3.Connection) -> str:
+    """Return the checksum of all records and notes, each under its number or name."""
+    found = sha256()
+    for rows in (
+        "select id, payload from record order by id",
+        "select name, payload from note order by name",
+    ):
+        for place, payload in db.execute(rows):
+            found.update(f"{place} {len(payload)} ".encode() + payload)
+    return found.hexdigest()
 
 
 def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:

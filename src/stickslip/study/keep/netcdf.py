@@ -1,7 +1,6 @@
 """Labelled variables, and files of them that are always whole."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,9 @@ import xarray as xr
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
+from stickslip.model.checksum import Cut, check_file, with_checksum
 from stickslip.study.keep.whole import interrupted_later, write_whole
 
-MARK = b"\nstickslip: sha256 of all before: "
 _AGAIN = (
     "Give the result.nc that 'stickslip run' wrote, or its folder. Of a damaged one, run the study again: no finished point is "
     "computed anew. With --fresh everything is, after what runs wrote into the folder is removed, and no other file."
@@ -34,7 +33,7 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
     # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
     with interrupted_later():
         content = bytes(tree.to_netcdf(format="NETCDF4", engine="h5netcdf"))
-        write_whole(path, content + _sum(content))
+        write_whole(path, with_checksum(content))
 
 
 def read_tree(path: Path) -> xr.DataTree:
@@ -45,12 +44,10 @@ def read_tree(path: Path) -> xr.DataTree:
     InputError
         If it cannot be read, or is not what was written.
     """
-    # HDF5 may read damaged files for ever, or end the process
-    content = path.read_bytes()
-    length = content.rfind(MARK)
-    if length >= 0 and content[length:] != _sum(content[:length]):
-        problem = "holds other bytes than were written: it is damaged, or was changed"
-        raise input_error(str(path), problem, _AGAIN)
+    try:
+        check_file(path)  # HDF5 may read damaged files for ever, or end the process
+    except ValueError as error:
+        raise input_error(str(path), str(error), _AGAIN) from None
     try:
         with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
             return tree.load()
@@ -64,20 +61,18 @@ def read_tree(path: Path) -> xr.DataTree:
 
 
 def attributes_there(path: Path) -> dict[str, Any]:
-    """Return the attributes of the root of a file that `write_tree` wrote; none where there is no such file, or a damaged one."""
+    """Return the attributes of the root of a file that `write_tree` wrote, whatever became of its checksum; none where there is no such file, or a damaged one."""
     try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+        check_file(path)
+    except Cut:
+        pass  # what stands before is whole, or HDF5 sees its end missing
+    except (FileNotFoundError, ValueError):
         return {}
-    length = content.rfind(MARK)
-    if length < 0 or content[length:] != _sum(content[:length]):
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as root:
+            return dict(root.attrs)
+    except Exception:  # noqa: BLE001  as in `read_tree`
         return {}
-    with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as root:
-        return dict(root.attrs)
-
-
-def _sum(content: bytes) -> bytes:
-    return MARK + sha256(content).hexdigest().encode()
 
 
 def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:

@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from stickslip.study.keep.archive import decode, encode
+from stickslip.study.keep.archive import FORMAT, decode, encode
 from stickslip.study.keep.progress import LOG
 from stickslip.study.keep.whole import write_whole
 
@@ -33,7 +33,8 @@ class PartStore:
         """Return what `make` makes, or what it made in an earlier run; `content` is all that this depends on."""
         if self.folder is None:
             return make()
-        path = self.folder / f"{sha256(content.encode()).hexdigest()}.npz"
+        named = sha256(f"{FORMAT} {content}".encode()).hexdigest()
+        path = self.folder / f"{named}.npz"
         if path.is_file() and (path in self.written or not self.fresh):
             try:
                 return decode(path.read_bytes())

@@ -1,0 +1,81 @@
+"""A checksum behind the content of a file or a record: one flipped bit is seen before anything of it is used."""
+
+from hashlib import file_digest, sha256
+from io import BytesIO
+from pathlib import Path
+from typing import IO
+
+MARK = b"\nstickslip: sha256 of all before: "
+LENGTH = len(MARK) + 2 * sha256().digest_size  # bytes of mark and sum
+LEFT = 8  # bytes of a mark that was cut off by which it is known; shorter ends may be the content's own
+
+
+class Cut(ValueError):  # noqa: N818  it tells what has happened
+    """The end of the content is missing, within its checksum."""
+
+
+def with_checksum(content: bytes) -> bytes:
+    """Return content with its SHA-256 behind it; readers of zip and HDF5 pass over what stands there."""
+    return content + MARK + sha256(content).hexdigest().encode()
+
+
+def add_checksum(path: Path) -> None:
+    """Write its checksum behind a file that is whole; as `with_checksum`."""
+    with path.open("rb+") as stream:
+        stream.write(MARK + file_digest(stream, "sha256").hexdigest().encode())
+
+
+def checked(content: bytes, *, required: bool = True) -> bytes:
+    """Return what `with_checksum` was given.
+
+    Parameters
+    ----------
+    content
+        With its checksum.
+    required
+        Whether content without any checksum is refused; else it is returned as it is.
+
+    Raises
+    ------
+    ValueError
+        If it differs from what was written, or the checksum is not whole.
+    """
+    length = _checked(BytesIO(content), len(content), required=required)
+    return content[:length]
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that differs from what was written; one without any checksum is another program's.
+
+    Raises
+    ------
+    ValueError
+        If it differs, or its checksum is not whole.
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as stream:
+        _checked(stream, path.stat().st_size, required=False)
+
+
+def _checked(stream: IO[bytes], size: int, *, required: bool) -> int:
+    """Return how many bytes stand before the checksum, once they have been compared with it."""
+    stream.seek(max(size - LENGTH, 0))
+    end = stream.read(LENGTH)
+    at = end.rfind(MARK)
+    if at > 0 or any(end.endswith(MARK[:n]) for n in range(LEFT, len(MARK) + 1)):
+        raise Cut("was cut off within the checksum at its end")
+    if at == 0:
+        stream.seek(0)
+        content = size - LENGTH
+        found = sha256()
+        while content:
+            block = stream.read(min(content, 2**20))
+            found.update(block)
+            content -= len(block)
+        if end != MARK + found.hexdigest().encode():
+            raise ValueError("holds other bytes than were written: it is damaged, or was changed")
+        return size - LENGTH
+    if required:
+        raise ValueError("has no checksum: it was cut off, or another program wrote it")
+    return size
