@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from cyclic_models import unlike_wedge
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
@@ -14,6 +16,7 @@ from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.model.fe.prestress import strain_and_rotation
 from stickslip.model.fe.solid import Material
+from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.part import solid_part
@@ -506,3 +509,60 @@ def test_shapes_of_both_directions_are_conjugates() -> None:
             mine = shape[own].ravel()
             near = mine[np.abs(mine) > (1 - 1e-4) * np.abs(mine).max()]
             assert near[0] == pytest.approx(abs(near[0]), abs=1e-12)
+
+
+def growth_by_assembling(asked: Question, number: int) -> np.ndarray:
+    """Return the derivatives of the squares by matrices that are assembled at three speeds, as a central difference."""
+    x = asked.speeds[0] ** 2
+    here, low, high = (asked.at(np.sqrt(f * x), number) for f in (1.0, 0.5, 1.5))
+    solve = gyroscopic_modes if asked.turning else normal_modes
+    found = solve(here, asked.n_modes)
+    phi, omega = found.shapes, 2 * np.pi * found.frequencies_hz
+
+    def form(matrix: Any) -> np.ndarray:
+        return np.sum(np.conj(phi) * (matrix @ phi), axis=0)
+
+    # the stiffness has degree two in Ω²: exact but for rounding
+    by_x = form((high.stiffness - low.stiffness) / x)
+    if not asked.turning:
+        return (by_x / form(here.mass)).real
+    turning = 1j * (form(here.damping) - form(here.damping.conj().T)) / 2
+    by_omega = 2 * omega * form(here.mass) - turning
+    return (2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real
+
+
+@pytest.mark.parametrize("coriolis", [False, True])
+@pytest.mark.parametrize("of", ["unlike faces", "joined shrouds", "damper between two blades"])
+def test_growth_is_that_of_matrices_assembled_at_other_speeds(
+    tmp_path: Path, of: str, coriolis: bool
+) -> None:
+    sectors, number = 6, 2
+    if of == "unlike faces":
+        mesh = unlike_wedge(sectors, (3, 2), (2, 3), clamp=True)
+        ring = solid_part(mesh, Material(), clamped=("root",), sectors=sectors, cyclic="segment_to_segment")  # fmt: skip
+        model = Model(parts={"ring": ring}, coriolis=coriolis)
+    elif of == "joined shrouds":
+        model, sectors = study(tmp_path, {"rotation.coriolis": str(coriolis).lower()}).model(), 8
+    else:
+        model, sectors, number = read_study(write_two_blades(tmp_path)).model(), 1, 0
+        model = replace(model, coriolis=coriolis)
+    asked = Question(model, "stuck", Wheel(sectors, parted=coriolis), (number,), 4, (900.0,))
+    found = solve_wave(asked, number).growth
+    np.testing.assert_allclose(found, growth_by_assembling(asked, number), rtol=1e-9, atol=1e-9)
+
+
+def test_a_wave_is_assembled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = unlike_wedge(6, (3, 2), (2, 3), clamp=True)
+    ring = solid_part(mesh, Material(), clamped=("root",), sectors=6, cyclic="segment_to_segment")
+    asked = Question(Model(parts={"ring": ring}), "open", Wheel(6, parted=False), (0, 1, 2), 3, (900.0,))  # fmt: skip
+    assembled = []
+    at = Model.at
+
+    def counted(self: Model, *words: Any, **named: Any) -> Any:
+        assembled.append(words)
+        return at(self, *words, **named)
+
+    monkeypatch.setattr(Model, "at", counted)
+    for number in asked.numbers:
+        solve_wave(asked, number)
+    assert [words[:2] for words in assembled] == [(900.0, 0), (900.0, 1), (900.0, 2)]

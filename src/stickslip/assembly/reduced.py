@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.places import node_rows
@@ -130,6 +131,16 @@ def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structu
         )
     except SingularError as error:
         raise SingularError(f"part.{name}: {error}") from None
+
+
+def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
+    """Return the (n, n) derivative by Ω² of the stiffness of `at_speed`, N s²/m."""
+    if part.body is not None:
+        return scipy.sparse.csr_array(part.body.at_speed(1.0, spin.axis).stiffness)
+    if part.solid is None:
+        return scipy.sparse.csr_array((part.structure.n, part.structure.n))
+    found = part.solid.polynomial(rest.tie, tangent=spin.tangent, unit=rest.unit)
+    return found.by_square(spin.speed)
 
 
 def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:

@@ -50,6 +50,10 @@ class SpeedPolynomial:
             stiffness = stiffness + speed**4 * self.fourth
         return scipy.sparse.csr_array(stiffness)
 
+    def by_square(self, speed: float) -> Matrix:
+        """Return the derivative of the stiffness by Ω² in N s²/m at `speed` in rad/s."""
+        return self.square if self.fourth is None else self.square + 2.0 * speed**2 * self.fourth
+
 
 @dataclass(frozen=True, eq=False)
 class RotatingSolid:

@@ -8,10 +8,12 @@ from time import perf_counter
 from typing import TypeVar
 
 import numpy as np
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
+from stickslip.assembly.reduced import stiffening
 from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
@@ -110,6 +112,13 @@ class Question:
         return self.model.at(speed, wave_number, self.contacts)
 
     @cached_property
+    def stiffening(self) -> Matrix:
+        """The derivative by Ω² of the stiffness at the first speed, on the dofs of all parts, the same for all waves."""
+        model, spin = self.model, self.model.spin(self.speeds[0])
+        own = [stiffening(part, spin, model.steady[name]) for name, part in model.parts.items()]
+        return scipy.sparse.block_diag(own, format="csr")
+
+    @cached_property
     def family(self) -> WaveFamily:
         """The waves at the first speed, which share what is alike in them."""
         return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
@@ -160,31 +169,33 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     if asked.shapes:
         moved = asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex))
         moved = unit_shapes(moved, _own_points(asked.model))
-    growth = _growth(asked, wave_number, hertz, vectors)
+    growth = _growth(asked, structure, hertz, vectors)
     flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
     found = WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
     return found if flow is None else replace(found, in_flow=flow.damped)
 
 
-def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matrix) -> FloatArray:
+def _growth(
+    asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix
+) -> FloatArray:
     """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
     x = asked.speeds[0] ** 2
     if x == 0 or not asked.model.rotates:
         return np.zeros(len(hertz))
-    here, low, high = (asked.at(np.sqrt(f * x), wave_number) for f in (1.0, 0.5, 1.5))
-
-    def form(matrix: Matrix) -> ComplexArray:
-        return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
-
-    # the stiffness has degree two in Ω², so that the central difference is exact
-    by_x = form((high.stiffness - low.stiffness) / x)
-    mass, omega = form(here.mass), 2 * np.pi * hertz
+    # cyclic faces, joins and springs do not change with the speed: a mode feels what the parts do
+    by_x = _form(asked.stiffening, structure.expand(vectors))
+    mass, omega = _form(structure.mass, vectors), 2 * np.pi * hertz
     if not asked.turning:
         return np.asarray((by_x / mass).real)
     # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
-    turning = 1j * (form(here.damping) - form(here.damping.conj().T)) / 2
+    turning = -_form(structure.damping, vectors).imag
     by_omega = 2 * omega * mass - turning
     return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
+
+
+def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
+    """Return ``φᴴ A φ`` of each column."""
+    return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
 
 
 def _own_points(model: Model) -> IntArray:
