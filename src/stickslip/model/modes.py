@@ -9,6 +9,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
+from stickslip.model.dense_modes import dense_modes
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.factorisation import (
     DENSE,
@@ -114,12 +115,13 @@ def normal_modes(
         if not count:
             continue
         start, solve = -SHIFT * mean if shift is None else shift, None
-        factorised = partial(_factorised, dofs=structure.dofs.take(part), say=say)
+        own = structure.dofs.take(part)
+        factorised = partial(_factorised, dofs=own, say=say, below=start < 0)
         if not _small(K, count):
             known = factors if len(part) == structure.n else None
             solve = factorised(K - start * M) if known is None else known(K - start * M)
         say(f"{count} modes of {len(part)} dofs")
-        values, vectors = lowest_modes(K, M, count, solve, start)
+        values, vectors = lowest_modes(K, M, count, solve, start, own)
         if solve is not None:
             found = values, vectors
             values, vectors = _with_missed(K, M, found, (start, solve), mean, factorised)
@@ -163,13 +165,20 @@ def _with_missed(
     return both[0][: values.size], both[1][:, : values.size]
 
 
-def _factorised(matrix: Matrix, dofs: Dofs, say: Say) -> Factorisation:
-    """Factorise the matrix of a body; where it is singular, say how the body can move."""
+def _factorised(matrix: Matrix, dofs: Dofs, say: Say, *, below: bool = True) -> Factorisation:
+    """Factorise ``K − shift M`` of a body; where it is singular, say how the body can move, or, with a shift below zero, what it lacks."""
     try:
         return factorise(matrix, say=say)
-    except SingularError:
+    except SingularError as error:
         refuse_unheld(matrix, dofs, "normal_modes")
-        raise
+        if not below:
+            raise
+        text = (
+            "normal_modes: mass and stiffness are singular together: a motion has neither, and nothing says how it moves. So have "
+            "single rows or layers of bricks with reduced integration (C3D20R): take C3D20, exact integration, or more bricks "
+            f"across; of other matrices leave out what nothing moves ({error})"
+        )
+        raise SingularError(text) from error
 
 
 def natural_frequencies(structure: Structure, n: int) -> FloatArray:
@@ -221,7 +230,12 @@ def submatrix(matrix: Matrix, rows: IntArray, columns: IntArray) -> Matrix:
 
 
 def lowest_modes(
-    stiffness: Matrix, mass: Matrix, n: int, solve: Solve | None, shift: float = 0.0
+    stiffness: Matrix,
+    mass: Matrix,
+    n: int,
+    solve: Solve | None,
+    shift: float = 0.0,
+    dofs: Dofs | None = None,
 ) -> tuple[FloatArray, Matrix]:
     """Return the `n` lowest squares of circular frequencies and mass-normalised modes.
 
@@ -236,10 +250,17 @@ def lowest_modes(
         faster.
     shift
         In rad²/s², at most the lowest square.
+    dofs
+        Of the coordinates, for messages.
+
+    Raises
+    ------
+    InputError
+        If fewer than `n` motions have mass, where dense algebra sees it.
     """
     if solve is None or _small(stiffness, n):
         K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))
-        return _dense_modes(K, M, n, shift)
+        return dense_modes(K, M, n, shift, dofs)
     kind = complex if np.iscomplexobj(stiffness) or np.iscomplexobj(mass) else float
     values, vectors = lanczos(mass, n, solve, shift, kind)
     order = np.argsort(values)
@@ -314,31 +335,6 @@ def _mean_square(structure: Structure) -> float:
 def _small(stiffness: Matrix, n: int) -> bool:
     size = stiffness.shape[0]
     return bool(size <= DENSE or n > size // 3)
-
-
-def _dense_modes(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
-    """Solve the reciprocal problem for few modes: of a fine mesh the direct one has the lowest to six digits only."""
-    size = len(K)
-    few = 2 * n <= size
-    try:
-        return (_reciprocal if few else _direct)(K, M, n, shift)
-    except np.linalg.LinAlgError:  # a mode diverges, or dofs have no mass
-        return (_direct if few else _reciprocal)(K, M, n, shift)
-
-
-def _direct(K: Matrix, M: Matrix, n: int, _: float) -> tuple[FloatArray, Matrix]:
-    values, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
-    return np.asarray(values), np.asarray(vectors)
-
-
-def _reciprocal(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
-    size = len(K)
-    largest = (size - n, size - 1)
-    inverse, vectors = scipy.linalg.eigh(M, K - shift * M, subset_by_index=largest)
-    if inverse[0] <= 0:
-        raise np.linalg.LinAlgError("dofs have no mass, or a negative one")
-    values = shift + 1.0 / inverse[::-1]
-    return np.asarray(values), np.asarray((vectors / np.sqrt(inverse))[:, ::-1])
 
 
 def _strain_share(stiffness: Matrix, shapes: Matrix) -> FloatArray:

@@ -14,6 +14,7 @@ import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
+from stickslip.model.dense_modes import dense_modes
 from stickslip.model.fe.factorisation import DENSE, Say, Solve, factorise, silent
 from stickslip.model.fe.lanczos import lanczos
 from stickslip.model.modes import usual_shift
@@ -353,7 +354,7 @@ class _Problem:
     def _dense(self, rows: ComplexArray, n: int) -> tuple[FloatArray, ComplexArray]:
         basis = scipy.linalg.null_space(rows) if len(rows) else np.eye(self.mass.shape[0])
         K, M = (basis.conj().T @ (a @ basis) for a in (self.stiffness, self.mass))
-        squares, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
+        squares, vectors = dense_modes(K, M, n, self.shift)
         return squares, basis @ vectors
 
 

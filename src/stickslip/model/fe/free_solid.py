@@ -7,7 +7,11 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.rotation import RotatingSolid
 
-RIGID = 1e-9  # of what a motion of the same size would cost: strains below are rounding
+RIGID = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it is rounding
+# Displacement by which two faces that are tied differ, over the largest of a rigid motion: below, they differ because the file
+# writes few digits of the coordinates (5 or more), above, because the tie hinders the motion (a sector's translation across
+# the axis by 2 sin(pi/n) for n sectors, 3e-3 for 2000)
+MISMATCH = 2e-4
 
 
 def inertia_relief(
@@ -53,7 +57,11 @@ def inertia_relief(
 
 
 def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray:
-    """Return the (n, k) rigid motions that neither supports nor the tie hinder; k from 0 to 6."""
+    """Return the (n, k) rigid motions that neither supports nor the tie hinder; k from 0 to 6.
+
+    Elements resist no rigid motion of their own nodes, however these were rounded. A tie between faces whose nodes were rounded
+    does, in proportion to their mismatch: each has its own threshold.
+    """
     places = solid.mesh.points[solid.free]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
     unit = np.eye(3)
@@ -64,12 +72,14 @@ def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray
         every[:, 3 + k] = np.cross(unit[k], whole).ravel()
     motions = every[solid.moving]
     stiffness = scipy.sparse.csr_array(solid.structure.stiffness)
-    cost = abs(stiffness) @ np.abs(motions)
-    hindered = [(stiffness @ motions) / cost.max()]
+    cost = (abs(stiffness) @ np.abs(motions)).max(axis=1, keepdims=True)
+    hindered = [(stiffness @ motions) / (RIGID * cost)]
     if tie is not None:
-        hindered.append(motions - tie @ _on(tie, motions))
-    _, values, rows = np.linalg.svd(np.vstack(hindered), full_matrices=False)
-    return np.asarray(motions @ rows[values < RIGID].T)
+        hindered.append((motions - tie @ _on(tie, motions)) / MISMATCH)
+    allowed = np.vstack(hindered)
+    _, _, rows = np.linalg.svd(allowed, full_matrices=False)
+    whole = np.abs(motions @ rows.T).max(axis=0)
+    return np.asarray((motions @ rows.T)[:, np.abs(allowed @ rows.T).max(axis=0) < whole])
 
 
 def _on(tie: Matrix, motions: FloatArray) -> FloatArray:

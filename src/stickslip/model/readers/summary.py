@@ -8,7 +8,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import StickslipError
-from stickslip.model.fe.factorisation import Say, silent
+from stickslip.model.dense_modes import mass_rank
+from stickslip.model.fe.factorisation import DENSE, Say, silent
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes
 from stickslip.model.readers.entries import SYMMETRY, asymmetry
@@ -120,9 +121,8 @@ def structure_summary(
     doubt = doubt_about_positions(structure)
     if doubt:
         remarks.append(f"Positions: {doubt}: they are probably those of another mesh.")
-    massless = int(np.count_nonzero(structure.mass.diagonal() == 0))
-    if massless:
-        remarks.append(f"{massless} dofs have no mass.")
+    rank, said = _rank_of_mass(structure)
+    remarks += said
     finite = dofs.position[np.isfinite(dofs.position).all(axis=1)]
     symmetric = max(asymmetry(structure.mass), asymmetry(structure.stiffness)) <= SYMMETRY
     travelling = np.iscomplexobj(structure.stiffness)
@@ -144,7 +144,21 @@ def structure_summary(
     if not symmetric:
         more = "Not symmetric: no frequencies computed."
         return replace(summary, remarks=(*summary.remarks, more))
-    return _with_modes(summary, structure, min(n_modes, structure.n - massless), say)
+    return _with_modes(summary, structure, min(n_modes, rank), say)
+
+
+def _rank_of_mass(structure: Structure) -> tuple[int, list[str]]:
+    """Return how many modes there are, of a large model at most, and a remark where motions have no mass."""
+    heavy = int(np.count_nonzero(structure.mass.diagonal()))
+    said = [f"{structure.n - heavy} dofs have no mass."] if heavy < structure.n else []
+    if not 0 < structure.n <= DENSE:
+        return heavy, said
+    rank = mass_rank(structure.mass)
+    if rank < heavy:
+        said.append(
+            f"The mass has rank {rank} of {structure.n}: the other motions have none, as of few bricks with reduced integration."
+        )
+    return rank, said
 
 
 def mesh_summary(mesh: SolidMesh, kind: str = "mesh") -> ModelSummary:
