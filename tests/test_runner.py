@@ -5,6 +5,7 @@ import logging
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from toy_analysis import Toy, ToyStudy
 
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.verdict import Verdict, conclusion, of_tree
 from stickslip.study.keep.cell import Limits
 from stickslip.study.keep.folder import locked_folder
@@ -132,8 +134,10 @@ def test_interrupted_run_goes_on_to_the_same_numbers(tmp_path: Path, whole: ToyS
 KILLED = """
 import sys
 sys.path.insert(0, {here!r})
+from collections.abc import Sequence
 from pathlib import Path
 from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.analysis import Solved
 from stickslip.study.run import run_study
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
@@ -256,6 +260,46 @@ def test_job_without_a_solution_does_not_take_the_others_with_it(
     assert np.isfinite(value[1]).all()
     assert np.isfinite(value[0, :2]).all()
     assert np.isnan(value[0, 2:]).all()
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_the_work_of_judging_grows_with_the_number_of_cases(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, resumed: bool
+) -> None:
+    """A case is judged when its job ends, all are put together at the end: three times as many cases are three times the work."""
+    entered: list[int] = []
+    dataset, verdicts = Toy.dataset, Toy.verdicts
+
+    def counted(self: Toy, solved: Sequence[Solved]) -> xr.Dataset:
+        entered.append(len(solved))
+        return dataset(self, solved)
+
+    def counted_again(self: Toy, data: xr.Dataset) -> tuple[Verdict, ...]:
+        entered.append(data.sizes["case"])
+        return verdicts(self, data)
+
+    monkeypatch.setattr(Toy, "dataset", counted)
+    monkeypatch.setattr(Toy, "verdicts", counted_again)
+    # what is not complete is written by the clock: here never
+    monkeypatch.setattr("stickslip.study.run._now_and_then", lambda _: lambda _: None)
+    work = {}
+    for n in (10, 30):
+        made = study(tmp_path / str(n), factors=tuple(np.linspace(1.0, 3.0, n)), terms=1)
+        run_study(made)
+        if resumed:
+            entered.clear()
+            run_study(made)
+        work[n] = sum(entered)
+        entered.clear()
+    assert work == {10: 40, 30: 120}  # dataset and verdicts, each alone and with all others
+
+
+def test_a_verdict_of_many_cases_is_told_when_it_is_found_and_where_it_holds_at_the_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    run_study(study(tmp_path, factors=(1.5, 2.5, 3.5)))
+    told = [r.getMessage() for r in caplog.records if getattr(r, "verdict", "") == "DOUBTFUL"]
+    assert told == ["factor = 2.5: large.", "factor = 3.5: large."]
 
 
 def test_second_run_in_the_folder_is_refused_before_it_deletes_anything(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """What a run has found, put together: the only place that makes a result of what jobs have left."""
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import xarray as xr
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
 from stickslip.study.analyses.forced.working_range import with_regimes
-from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, to_json
+from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
 from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
 from stickslip.study.keep.progress import tell
@@ -86,40 +86,58 @@ def checked(note: Mapping[str, Any] | None) -> frozenset[str]:
 
 @dataclass(frozen=True, eq=False)
 class Book:
-    """What is finished so far, put together."""
+    """What is finished so far: each case is judged when its job ends, what speaks of all of them when they are put together."""
 
     origin: Provenance
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
     nodes: dict[str, xr.Dataset] = field(default_factory=dict)
     aside: dict[str, list[Verdict]] = field(default_factory=dict)
+    apart: dict[str, tuple[Analysis, list[Task]]] = field(default_factory=dict)
     told: set[str] = field(default_factory=set)
+    of_a_kind: set[str] = field(default_factory=set)
     measured: MeasuredPeaks | None = None
 
     def read(self, tasks: Sequence[Task], unfinished: Container[Path]) -> None:
-        """Put together the nodes of the analyses of which jobs have been sealed since."""
+        """Take up the jobs that have been sealed since, and tell what is to be thought of their cases."""
         for asked in {t.analysis.name: t.analysis for t in tasks}.values():
             own = [t for t in tasks if t.analysis is asked and t.sealed not in unfinished]
             new = {t.sealed for t in own} - self.solved.keys()
             self.solved.update({path: read_sealed(path, asked.record) for path in new})
             if new:
-                self.enter(asked, [Solved(t.case, *self.solved[t.sealed]) for t in own])
+                self.apart[asked.name] = asked, own
+            for task in own:
+                if task.sealed in new:
+                    self._judge(asked, Solved(task.case, *self.solved[task.sealed]))
+
+    def _judge(self, asked: Analysis, solved: Solved) -> None:
+        """Tell what is to be thought of a case; where that holds for another one, too, it is told of all together."""
+        if ASIDE in solved.notes:
+            self._tell([_unsolved(solved, ASIDE)])
+            return
+        _, found = _judged(asked, [solved])
+        new = [v for v in found if replace(v, case="").sentence not in self.of_a_kind]
+        self.of_a_kind.update(replace(v, case="").sentence for v in new)
+        self._tell(new)
 
     def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
-        """Make the node of an analysis from what its cases have found; those set aside are told of alone."""
+        """Make the node of an analysis from what its cases have found; those set aside have none."""
         self.aside[asked.name] = [_unsolved(s, ASIDE) for s in solved if ASIDE in s.notes]
-        self._tell(self.aside[asked.name])
         solved = [s for s in solved if ASIDE not in s.notes]
         if not solved:
             return
-        node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
+        node, found = _judged(asked, solved)
         if asked.name == "forced_response":
             node = with_regimes(with_measured(node, self.measured))
-        unsolved = [_unsolved(s, UNSOLVED) for s in solved if UNSOLVED in s.notes]
-        found = (*unsolved, *asked.verdicts(node))
-        self._tell(found)
-        failed = int(node.attrs.get("failed", 0)) + len(unsolved)
+        unsolved = sum(UNSOLVED in s.notes for s in solved)
+        failed = int(node.attrs.get("failed", 0)) + unsolved
         own = {ATTRIBUTE: to_json(found), "failed": failed}
         self.nodes[asked.name] = node.assign_attrs(own)
+
+    def _put_together(self) -> None:
+        """Make the nodes of the analyses of which jobs have been sealed since."""
+        for asked, own in self.apart.values():
+            self.enter(asked, [Solved(t.case, *self.solved[t.sealed]) for t in own])
+        self.apart.clear()
 
     def _tell(self, found: Iterable[Verdict]) -> None:
         """Tell verdicts that have not been told."""
@@ -135,6 +153,7 @@ class Book:
 
     def tree(self, *, complete: bool) -> xr.DataTree:
         """Return the tree of all nodes, with what it comes from."""
+        self._put_together()
         attributes = self.origin.attributes(complete=complete)
         aside = [verdict for found in self.aside.values() for verdict in found]
         if aside:
@@ -143,9 +162,13 @@ class Book:
         return xr.DataTree.from_dict({"/": root, **{n: self.nodes[n] for n in self._names}})
 
     def outcome(self, asked: Sequence[Analysis]) -> Outcome:
-        """Return what a run has found that has answered everything it was asked."""
+        """Return what a run has found that has answered everything it was asked; tell what has not been told."""
+        tree = self.tree(complete=True)
+        self._tell(verdict for found in self.aside.values() for verdict in found)
+        for name in self._names:
+            self._tell(stored(self.nodes[name].attrs))
         return Outcome(
-            tree=self.tree(complete=True),
+            tree=tree,
             summaries={
                 a.name: a.summary(self.nodes[a.name]) for a in asked if a.name in self.nodes
             },
@@ -155,6 +178,13 @@ class Book:
             + sum(map(len, self.aside.values())),
             files=(),
         )
+
+
+def _judged(asked: Analysis, solved: Sequence[Solved]) -> tuple[xr.Dataset, tuple[Verdict, ...]]:
+    """Return the dataset of cases, and what is to be thought of them."""
+    node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
+    unsolved = [_unsolved(s, UNSOLVED) for s in solved if UNSOLVED in s.notes]
+    return node, (*unsolved, *asked.verdicts(node))
 
 
 def _unsolved(solved: Solved, note: str) -> Verdict:
