@@ -27,6 +27,7 @@ from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.front import result as front
 from stickslip.front.study import Study
+from stickslip.model import blas_threads
 from stickslip.study.file.example import example_text
 from stickslip.study.keep import threads
 from stickslip.study.keep.folder import locked_folder
@@ -49,11 +50,11 @@ def test_loaded_blas_has_one_thread_for_a_while_unless_told_otherwise(monkeypatc
     """The order of sums, and so the bits, are then those of the command; NumPy's wheel keeps an OpenBLAS."""
     counts = [5, 7]
     own = [(partial(counts.__getitem__, i), partial(counts.__setitem__, i)) for i in range(2)]
-    assert len(threads._loaded()) == 2
-    assert all(get() >= 1 for get, _ in threads._loaded())
-    monkeypatch.setattr(threads, "_loaded", lambda: own)
-    monkeypatch.setattr(threads, "SAID", said)
-    with threads.one_loaded_blas_thread():
+    assert len(blas_threads.loaded()) == 2
+    assert all(get() >= 1 for get, _ in blas_threads.loaded())
+    monkeypatch.setattr(blas_threads, "loaded", lambda: own)
+    monkeypatch.setattr(blas_threads, "SAID", said)
+    with blas_threads.one_loaded_blas_thread():
         assert counts == ([5, 7] if said else [1, 1])
     assert counts == [5, 7]
 

@@ -17,13 +17,13 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.front.as_tables import as_tables
 from stickslip.front.result import Result
 from stickslip.front.screen import by_default
+from stickslip.model.blas_threads import one_loaded_blas_thread
 from stickslip.model.part import Part
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
-from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.run import answer
 from stickslip.units import RPM
 

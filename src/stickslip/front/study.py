@@ -11,9 +11,9 @@ from typing import Any
 from stickslip.front.model import Model
 from stickslip.front.result import Result
 from stickslip.front.screen import by_default
+from stickslip.model.blas_threads import one_loaded_blas_thread
 from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME
 from stickslip.study.check import check_study
-from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study

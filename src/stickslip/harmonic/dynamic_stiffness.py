@@ -21,6 +21,7 @@ from stickslip.harmonic.fourier import padded
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
 from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
 from stickslip.harmonic.support import Harmonics
+from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 
 DIAGONAL_TOLERANCE = (
@@ -371,7 +372,8 @@ def _interior_modes(stiffness: FloatArray, mass: FloatArray) -> FloatArray:
             f"the coordinates that are condensed can move without stiffness (smallest scaled eigenvalue {softest:.3g})",
             "Retain the dofs of free bodies, or clamp them.",
         )
-    return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
+    with threads_for(len(mass)):
+        return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
 
 
 def _is_diagonal(damping: FloatArray) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.model.blas_threads import threads_for
 
 # condition number of an eigenvalue above which rounding could reach 1e-10 of a receptance
 ILL_CONDITIONED = 1e4
@@ -50,7 +51,8 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
     root = np.diag(np.sqrt(np.maximum(mass, 0.0)))
     # displacement and root times displacement over ν: normal if C = 0, whatever the spread of frequencies
     state = np.block([[-damping, -root], [root, np.zeros((n, n))]])
-    nu, vectors = np.linalg.eig(state)
+    with threads_for(2 * n):
+        nu, vectors = np.linalg.eig(state)
     try:
         inverse = np.linalg.inv(vectors)
     except np.linalg.LinAlgError:

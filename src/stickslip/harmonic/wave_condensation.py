@@ -16,6 +16,7 @@ import scipy.linalg
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.matrices import SYMMETRY, checked_matrix
 from stickslip.harmonic.spectral import PARALLEL
+from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 
@@ -292,7 +293,8 @@ def _interior_modes(stiffness: Array, mass: Array) -> Array | None:
     try:
         if np.linalg.eigvalsh(stiffness / np.outer(size, size))[0] <= HELD:
             return None
-        return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
+        with threads_for(len(mass)):
+            return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
     except np.linalg.LinAlgError:
         return None
 

@@ -16,6 +16,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import as_array, real_part, solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
 from stickslip.harmonic.local import AnyBalance
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.fe.factorisation import factorise
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
@@ -39,6 +40,7 @@ class _Held:
         )
 
 
+@by_one_thread
 def preload(system: System, static_load: FloatArray) -> FloatArray:
     """Place the structure under a static load, its contacts sticking, slipping or open.
 

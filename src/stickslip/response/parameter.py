@@ -12,6 +12,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
 from stickslip.response.follow import follow
 from stickslip.response.ladder import without_branch
@@ -112,6 +113,7 @@ def parameter_family(
     return law_field(balance, parameter)
 
 
+@by_one_thread
 def branch_in_parameter(
     system: System,
     load: HarmonicLoad,

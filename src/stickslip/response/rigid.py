@@ -9,6 +9,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
@@ -49,6 +50,7 @@ class RigidPoint:
         return self.status.converged
 
 
+@by_one_thread
 def rigid_response(
     system: System,
     load: HarmonicLoad,

@@ -8,6 +8,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.guarded_alert import doubled
 from stickslip.harmonic.support import Harmonics, harmonics_of
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 
 SAMPLES_A_HARMONIC = 8
@@ -43,6 +44,7 @@ class SupportCheck:
     seconds_contact: float
 
 
+@by_one_thread
 def check_support(
     problem: ForcedProblem,
     points: Sequence[ForcedPoint],

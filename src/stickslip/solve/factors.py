@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import FloatArray
+from stickslip.model.blas_threads import threads_for
 
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 
@@ -32,7 +33,8 @@ class Factored:
 
 def lu_factors(matrix: FloatArray) -> Factored | None:
     """Factorise an array, which is overwritten; None if it is singular to working precision."""
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
+    with threads_for(len(matrix)):
+        lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
     size = np.abs(lu.diagonal())
     size.sort()
     # neither NaN, which is sorted to the end, nor infinity passes

@@ -22,6 +22,7 @@ from stickslip.harmonic.selection.alert import silent
 from stickslip.harmonic.selection.strategy import FLOOR, NOISE, ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics, rows_of
+from stickslip.model.blas_threads import threads_for
 
 Goal = Literal["motion", "amplitude"]
 SINGULAR = 1e-15  # smallest pivot over largest below which a Jacobian has no usable factors
@@ -113,7 +114,8 @@ def factored(jac: FloatArray | StructuredJacobian, solve: Solve | None) -> Facto
         if solve is not None:
             return Factored(jac, None, solve)
         jac = jac.dense()
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(jac)
+    with threads_for(len(jac)):
+        lu, pivots, info = scipy.linalg.lapack.dgetrf(jac)
     size = np.abs(np.diagonal(lu))
     usable = info == 0 and np.all(np.isfinite(size)) and size.min() > SINGULAR * size.max()
     return Factored(jac, (lu, pivots) if usable else None, None)

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import array_of
 from stickslip.solve.iterate import Evaluation
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -54,6 +55,7 @@ def distance_among(weights: FloatArray, known: Sequence[FloatArray]) -> Distance
     return Distance(weights, min((s for s in sizes if s > 0.0), default=1.0))
 
 
+@by_one_thread
 def deflated_newton(
     evaluate: Callable[[FloatArray], Evaluation],
     start: FloatArray,

@@ -10,6 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import harmonics_of
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.all_motions.basins import (
@@ -54,6 +55,7 @@ WHOLE = "it reaches the end of the range"
 LONGEST = 6  # times the points of a sweep that a branch may have
 
 
+@by_one_thread
 def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> AllMotions:
     """Search for all periodic motions under a load, with its period.
 

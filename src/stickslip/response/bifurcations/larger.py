@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import one_structure
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
@@ -14,6 +15,7 @@ from stickslip.response.system import System
 from stickslip.response.time.sectors import SectorsInTime, all_sectors
 
 
+@by_one_thread
 def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProblem:
     """Return the forced response whose period is that of several `periods` of the load.
 
@@ -112,6 +114,7 @@ class EverySector:
         return replace(point, coefficients=moved, kept=np.zeros((0, 0), dtype=np.int64))
 
 
+@by_one_thread
 def every_sector(problem: ForcedProblem) -> EverySector:
     """Return the forced response of a tuned wheel with all its sectors as one structure.
 

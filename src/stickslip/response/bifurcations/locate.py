@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import StickslipError, input_error
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.bifurcations.found import Bifurcation, BifurcationKind, Bifurcations
 from stickslip.response.bifurcations.spectra import (
     ON_AXIS,
@@ -47,6 +48,7 @@ ROUGHLY = "multipliers seem to cross the unit circle, and more harmonics change 
 SPENT = "the multipliers of as many motions were asked for as was allowed"
 
 
+@by_one_thread
 def bifurcations(
     problem: ForcedProblem,
     points: Sequence[ForcedPoint],

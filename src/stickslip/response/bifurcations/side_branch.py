@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation
 from stickslip.response.bifurcations.larger import every_sector, in_periods, over_periods
@@ -112,6 +113,7 @@ class SideBranch:
         )
 
 
+@by_one_thread
 def side_branches(
     problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS
 ) -> list[SideBranch]:
@@ -166,6 +168,7 @@ def side_branches(
     return made or [SideBranch(own, periods, (), nothing, group)]
 
 
+@by_one_thread
 def subharmonic_branch(
     problem: ForcedProblem,
     omega: float,

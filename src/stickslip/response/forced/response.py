@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.accepted import accepted_pairs, accepted_points
 from stickslip.response.forced.along import along_the_branch
@@ -31,6 +32,7 @@ __all__ = [
 OF_PEAK = ("peak", "check")
 
 
+@by_one_thread
 def forced_response(
     system: System, load: HarmonicLoad, sweep: Sweep, done: Sequence[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:

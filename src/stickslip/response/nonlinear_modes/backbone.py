@@ -15,6 +15,7 @@ from stickslip.arrays import ComplexArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, Route, branch_of
 from stickslip.response.follow import LEAPS, follow
 from stickslip.response.nonlinear_modes.levels import ModeCurve
@@ -211,6 +212,7 @@ class ModeWay:
         return self.to_gross_slip and one.converged and self.curve.slips_grossly(one)
 
 
+@by_one_thread
 def nonlinear_mode(
     system: System,
     load: HarmonicLoad,

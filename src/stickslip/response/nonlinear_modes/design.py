@@ -6,6 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
@@ -47,6 +48,7 @@ class PeakCurve:
         return self.amplitude / self.level
 
 
+@by_one_thread
 def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
     """Return the resonances of all levels, without solving for any of them: each place of the backbone needs one level."""
     after = oscillator.table >= oscillator.begins

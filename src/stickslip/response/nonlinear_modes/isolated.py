@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_basis, in_coordinates
@@ -106,6 +107,7 @@ class Isolation:
         return share * float(np.clip(1.0 - self.growth, HELD, 1.0)) + self.overlap**2
 
 
+@by_one_thread
 def other_modes(oscillator: ModalOscillator) -> OtherModes:
     """Return the linear modes beside the followed one."""
     system = oscillator.backbone.system
@@ -142,6 +144,7 @@ def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
     return np.asarray(found.level * oscillator.load.harmonics[1] - plain * inertia - 1j * off * dashpots)  # fmt: skip
 
 
+@by_one_thread
 def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
     """Return how isolated a mode is at a resonance.
 
@@ -194,6 +197,7 @@ def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) ->
     return bool(oscillator.begins > 0.0 and max(np.max(moved), np.max(damped)) < CHANGES)
 
 
+@by_one_thread
 def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> ComplexArray:
     """Return (p, k) first harmonics of dofs with the share of the other modes, in the phase of the load, m."""
     own = others.oscillator
@@ -203,6 +207,7 @@ def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> Compl
     return np.asarray(motion + others.answer(found.omega, left_over(own, found), rows))
 
 
+@by_one_thread
 def peak_with_others(
     others: OtherModes, curve: Synthesised, found: Resonance, dof: int
 ) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
 from stickslip.response.nonlinear_modes.levels import ModeCurve
@@ -22,6 +23,7 @@ DOUBT = 4.0  # times the tolerance by which a point is off what those twice as f
 SHORTEST = 1e-3  # of ln a: points are not set closer
 
 
+@by_one_thread
 def refined(
     backbone: Backbone,
     load: HarmonicLoad,

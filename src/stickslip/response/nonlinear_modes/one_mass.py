@@ -20,6 +20,7 @@ from scipy.interpolate import PchipInterpolator
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint
 
 FEWEST = 4  # points of a backbone between which there is something to interpolate
@@ -185,6 +186,7 @@ class ModalOscillator:
         return modal_oscillator(replace(self.backbone, points=tuple(kept)), self.load)
 
 
+@by_one_thread
 def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
     """Make the oscillator of a nonlinear mode under a harmonic load.
 

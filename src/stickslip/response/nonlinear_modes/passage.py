@@ -17,6 +17,7 @@ import scipy.integrate
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import checked_level, motions_at
 
@@ -101,6 +102,7 @@ class Passage:
         return float(self.amplitude[top]), float(self.omega[top])
 
 
+@by_one_thread
 def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: Swept) -> Passage:
     """Follow the amplitude of a nonlinear mode while the frequency of its force is swept at a constant rate.
 

@@ -14,6 +14,7 @@ import scipy.optimize
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 
 POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
@@ -93,6 +94,7 @@ class Resonance:
     top: bool
 
 
+@by_one_thread
 def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
     """Return the resonances of a level in the order of the backbone; none where its end does not need so much.
 
@@ -120,6 +122,7 @@ def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
     return found
 
 
+@by_one_thread
 def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) -> Synthesised:
     """Return the forced response at a level.
 
@@ -160,6 +163,7 @@ def at_resonance(oscillator: ModalOscillator, found: Resonance) -> Synthesised:
     return Synthesised(found.level, place, omega, here.amplitude, phase, no, stable, (found,))
 
 
+@by_one_thread
 def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> FloatArray:
     """Return the places of the steady motions at a frequency, rad/s, in the order of the backbone."""
     table = oscillator.table
@@ -178,6 +182,7 @@ def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> Float
     return np.array(found)
 
 
+@by_one_thread
 def free_motions(oscillator: ModalOscillator) -> FloatArray:
     """Return the places of limit cycles: zeros of the damping, which with aerodynamic forces may be negative."""
     table = oscillator.table

@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import forced_response
@@ -56,6 +57,7 @@ class Found:
     near: float
 
 
+@by_one_thread
 def tone_beside(
     problem: TwoTones,
     omega: float,

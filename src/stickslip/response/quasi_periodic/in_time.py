@@ -13,6 +13,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart
@@ -114,6 +115,7 @@ class Statistics:
         return self.spread <= ALIKE
 
 
+@by_one_thread
 def course(  # noqa: PLR0913
     structure: LinearSide,
     contacts: Interface,

@@ -18,6 +18,7 @@ from stickslip.harmonic.torus import (
 from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.harmonic.torus_side import TorusSide
 from stickslip.harmonic.travelling import condense_side
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import preload
@@ -157,6 +158,7 @@ class TwoTones:
         return replace(self, balance=replace(self.balance, side=own))
 
 
+@by_one_thread
 def two_tones(
     system: System,
     first: HarmonicLoad,

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.torus_path import TorusPath
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.response.quasi_periodic.motion import TorusMotion
 from stickslip.response.quasi_periodic.problem import TwoTones
@@ -94,6 +95,7 @@ class _Evaluation:
     seconds_contact: float
 
 
+@by_one_thread
 def forced_motion(
     problem: TwoTones, omega: float, start: ComplexArray | None = None
 ) -> TorusMotion:
@@ -153,6 +155,7 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
     return sorted(found, key=lambda b: (-round(b.share, 2), b.defect))
 
 
+@by_one_thread
 def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
     """Yield second tones of growing amplitude, up to where they go on by themselves or are lost."""
     balance = beginning.problem.balance
@@ -179,6 +182,7 @@ def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
         y = _guess(before, last, amplitude)
 
 
+@by_one_thread
 def second_tone(beginning: Beginning) -> TorusMotion | None:
     """Return the motion whose second tone goes on by itself; None where no amplitude has one."""
     last: ToneOfAmplitude | None = None
@@ -217,6 +221,7 @@ def _between(
     return None
 
 
+@by_one_thread
 def solve_free(
     problem: TwoTones,
     x: FloatArray,

@@ -13,6 +13,7 @@ from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Driven, driven_by
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed
 from stickslip.response.ladder import without_branch
 from stickslip.response.parameter import Discretisation
@@ -143,6 +144,7 @@ def _own_sliders(starts: Starts) -> FloatArray:
     return np.array([getattr(law, "slider", None) or (0.0, 0.0) for law in starts.given.laws]).reshape(-1, 2)  # fmt: skip
 
 
+@by_one_thread
 def traction_bounds(
     system: System,
     load: HarmonicLoad,
@@ -198,6 +200,7 @@ def traction_bounds(
         yield _bounds(setup, last)
 
 
+@by_one_thread
 def resonance_bounds(
     system: System,
     load: HarmonicLoad,

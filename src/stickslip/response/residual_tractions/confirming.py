@@ -9,6 +9,7 @@ from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
 from stickslip.harmonic.peak import driven_by
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.bounds import Bound
@@ -48,6 +49,7 @@ class Confirmation:
     agrees: bool
 
 
+@by_one_thread
 def confirmed(
     system: System,
     load: HarmonicLoad,

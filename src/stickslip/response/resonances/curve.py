@@ -9,6 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
 from stickslip.response.follow import follow
 from stickslip.response.resonances.first import PeakSearch
@@ -24,6 +25,7 @@ BEYOND = 0.5  # of the span by which a corrector may go beyond it
 MOST = 10  # multiples of the smallest number of points at which a curve ends
 
 
+@by_one_thread
 def peak_curve(
     search: PeakSearch, span: tuple[float, float], points: int = 30, peak: int = 0
 ) -> Iterator[PeakPoint]:

@@ -13,6 +13,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Peak
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.parameter import Discretisation, Parameter
 from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint
@@ -22,6 +23,7 @@ from stickslip.response.system import System
 APART = 1e-5  # relative distance of the frequencies of two peaks that are not the same
 
 
+@by_one_thread
 def track_peak(
     system: System,
     load: HarmonicLoad,
@@ -71,6 +73,7 @@ def track_peak(
     yield from follow_peaks(one, values, 1)
 
 
+@by_one_thread
 def follow_peaks(
     search: PeakSearch,
     values: Sequence[float] | FloatArray,
@@ -148,6 +151,7 @@ def _way(before: PeakPoint | None, point: PeakPoint) -> float:
     return 0.0 if before is None else abs(point.omega / before.omega - 1.0)
 
 
+@by_one_thread
 def later_peaks(
     search: PeakSearch,
     values: Sequence[float] | FloatArray,
@@ -181,6 +185,7 @@ def later_peaks(
     yield from _through(found, list(values)[::-1], done, known)
 
 
+@by_one_thread
 def smallest_peak(
     system: System,
     load: HarmonicLoad,

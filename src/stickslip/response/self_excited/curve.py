@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.bordered import PeriodicProblem
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, OneLevel, Route, branch_of, steps_through
 from stickslip.response.equilibrium import preload
 from stickslip.response.follow import follow
@@ -177,6 +178,7 @@ class _Sticking:
         return bool(np.max(np.abs(left)) > max(SLIPS, self.noise))
 
 
+@by_one_thread
 def damping_over_amplitude(
     problem: SelfExcited, span: tuple[float, float], points: int = 30
 ) -> list[AmplitudePoint]:
@@ -196,6 +198,7 @@ def damping_over_amplitude(
     ]
 
 
+@by_one_thread
 def parameter_over_amplitude(
     problem: SelfExcited,
     parameter: Parameter,

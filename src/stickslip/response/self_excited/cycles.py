@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.self_excited.curve import AmplitudePoint, at_amplitude
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.solve.linear import factorised
@@ -62,6 +63,7 @@ class LimitCycle:
         return self.slope > 0.0
 
 
+@by_one_thread
 def limit_cycles(
     problem: SelfExcited,
     curve: Sequence[AmplitudePoint],

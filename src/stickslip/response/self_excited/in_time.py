@@ -10,6 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import (
     last_third,
@@ -69,6 +70,7 @@ class Marched:
         return np.asarray(self.omega * (1.0 + gained / (2.0 * np.pi)))
 
 
+@by_one_thread
 def march_periods(  # noqa: PLR0913
     structure: LinearSide,
     contacts: Interface,

@@ -8,6 +8,7 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.harmonic.linear import one_structure
 from stickslip.harmonic.sparse_stiffness import Unreduced
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
@@ -51,6 +52,7 @@ class StuckMode:
         return self.ratio < 0.0
 
 
+@by_one_thread
 def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> list[StuckMode]:
     """Return the lowest modes of the structure in the first harmonic; of a wheel, those of the wave that its engine order excites.
 

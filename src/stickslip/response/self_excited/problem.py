@@ -22,6 +22,7 @@ from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, Sta
 from stickslip.harmonic.decaying import DecayingStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import times
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family
 from stickslip.response.self_excited.modes import StuckMode
@@ -206,6 +207,7 @@ def _by_size(state: State) -> FloatArray:
     return np.append(times(at.jac, state.x) - at.residual, np.zeros(state.extra.size))
 
 
+@by_one_thread
 def self_excited_motions(
     system: System, load: HarmonicLoad, mode: StuckMode, dof: int, how: Discretisation
 ) -> SelfExcited:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
@@ -37,6 +38,7 @@ class CycleStability:
     wave: WaveDisturbance | None
 
 
+@by_one_thread
 def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
     """Return the stability of a limit cycle of a problem with as many harmonics.
 

@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.fourier import to_real
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.contact_states import (
@@ -74,6 +75,7 @@ class HillStability:
         return self.stability.reason
 
 
+@by_one_thread
 def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
 
@@ -106,6 +108,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     return _judged(found, change, states, hill)
 
 
+@by_one_thread
 def hill_exponents(
     system: System, gaps: ComplexArray, omega: float, order: int | None = None
 ) -> Exponents:

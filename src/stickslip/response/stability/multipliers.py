@@ -10,6 +10,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.contact_states import (
@@ -149,6 +150,7 @@ class Stability:
         return self.verdict == "stable"
 
 
+@by_one_thread
 def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
     """Return the stability of a solved point of a forced response.
 
@@ -199,6 +201,7 @@ def _with_change(solved: Stability, better: Stability, times: float) -> Stabilit
     return replace(better, errors=better.errors + times * change)
 
 
+@by_one_thread
 def motion_stability(
     structure: LinearSide, interface: Interface, gap_coefficients: FloatArray, omega: float
 ) -> Stability:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import ComplexArray
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.multipliers import period_matrix
 from stickslip.response.system import System
@@ -41,12 +42,14 @@ class WaveDisturbance:
         return min(self.wave, sectors - self.wave)
 
 
+@by_one_thread
 def point_disturbances(problem: ForcedProblem, point: ForcedPoint) -> list[WaveDisturbance]:
     """Return the disturbances of a forced motion of a wheel as it was solved; see `wave_disturbances`."""
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
     return wave_disturbances(problem.system, gaps, point.omega)
 
 
+@by_one_thread
 def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[WaveDisturbance]:
     """Return the disturbances of a motion of all sectors, the fastest growing first; none if nothing is known.
 

@@ -10,6 +10,7 @@ import scipy.sparse
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.response.time.time_step import StepOperators
 
@@ -90,7 +91,8 @@ def _coordinates(
     omega: float,
 ) -> ModalCoordinates:
     mass = _dense(structure.mass)
-    values, basis = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
+    with threads_for(len(mass)):
+        values, basis = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
     speed = np.maximum(1.0, np.sqrt(np.abs(values)) / omega)
     gaps = gap_operator @ basis
     none = np.zeros_like(gaps)

@@ -15,6 +15,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
 from stickslip.response.time.marcher import Marcher, prepared
 from stickslip.response.time.period_map import Derivative, PeriodMap, period_map
@@ -123,6 +124,7 @@ class _Search:
     derivative: Derivative | None = None
 
 
+@by_one_thread
 def shoot(  # noqa: PLR0913
     structure: LinearSide,
     gap_operator: Matrix,

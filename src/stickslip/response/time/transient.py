@@ -18,6 +18,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide
+from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.contact_step import StepState
 from stickslip.response.time.marcher import Marcher, Record, prepared
 from stickslip.response.time.propagator import PeriodicLoad
@@ -155,6 +156,7 @@ class TransientResult:
         )
 
 
+@by_one_thread
 def integrate(  # noqa: PLR0913
     structure: LinearSide,
     gap_operator: Matrix,

@@ -21,8 +21,8 @@ from time import monotonic
 from typing import IO, Any
 
 from stickslip.errors import StickslipError, input_error
+from stickslip.model.blas_threads import BLAS_THREADS
 from stickslip.study.keep.progress import LOG, OF_RECORDS
-from stickslip.study.keep.threads import BLAS_THREADS
 
 EVERY = 0.1  # seconds between two looks at a process
 STATM = "/proc/{}/statm"  # where Linux says what memory a process takes

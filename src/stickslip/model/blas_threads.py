@@ -1,0 +1,136 @@
+"""How many threads the OpenBLAS of NumPy and SciPy takes: one where matrices are small, all of them where a large one is factorised.
+
+The matrices of a response have a few hundred rows. More threads wait for each other there: with two, a point of 9 ms of work
+takes 220 ms of the processor. Sums then have the order, and so the bits, of a run of the command.
+"""
+
+import ctypes
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, wraps
+from importlib.util import find_spec
+from inspect import isgeneratorfunction
+from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar, cast
+
+BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+SAID = any(name in os.environ for name in BLAS_THREADS)  # by the user: what comes later is ours
+# where the wheels of NumPy and SciPy keep OpenBLAS, and what they call its functions
+FOLDERS = ("{0}.libs", "{0}/.dylibs")
+NAMES = ("scipy_openblas_{0}_num_threads64_", "scipy_openblas_{0}_num_threads")
+LARGE = 1500  # rows of a dense matrix whose factors pay for the threads
+
+Counts = list[tuple[Callable[[], int], Callable[[int], Any]]]
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@cache
+def loaded() -> Counts:
+    """Return the functions that get and set the number of threads of each OpenBLAS in a wheel of NumPy or SciPy."""
+    found: Counts = []
+    for package in ("numpy", "scipy"):
+        spec = find_spec(package)
+        site = Path(str(spec.origin)).parents[1] if spec is not None else Path()
+        files = [f for folder in FOLDERS for f in site.glob(f"{folder.format(package)}/*openblas*")]
+        for library in map(ctypes.CDLL, map(str, files)):
+            pairs = [(name.format("get"), name.format("set")) for name in NAMES]
+            found += [
+                (getattr(library, get), getattr(library, put))
+                for get, put in pairs
+                if hasattr(library, get) and hasattr(library, put)
+            ]
+    return found
+
+
+class _Blocks:
+    """The blocks at work that hold BLAS to one thread, of all threads of the program: its number is one for all."""
+
+    def __init__(self) -> None:
+        self.lock, self.count, self.strict = Lock(), 0, 0
+        self.before: list[tuple[Callable[[int], Any], int]] = []
+
+    def begin(self, *, strict: bool) -> None:
+        with self.lock:
+            if not self.count:
+                self.before = [(put, get()) for get, put in loaded()]
+                self.put(1)
+            self.count += 1
+            self.strict += strict
+
+    def end(self, *, strict: bool) -> None:
+        with self.lock:
+            self.count -= 1
+            self.strict -= strict
+            if not self.count:
+                self.put()
+
+    def put(self, most: int | None = None) -> None:
+        for put, count in self.before:
+            put(count if most is None else most)
+
+
+_BLOCKS = _Blocks()
+
+
+@contextmanager
+def one_loaded_blas_thread(*, strict: bool = True) -> Iterator[None]:
+    """Give the loaded OpenBLAS of NumPy and SciPy one thread while the block runs, unless the user said how many.
+
+    Other BLAS libraries are left alone.
+
+    Parameters
+    ----------
+    strict
+        Whether large matrices have one thread, too: the numbers of a study do not depend on how many there are.
+    """
+    if SAID:
+        yield
+        return
+    _BLOCKS.begin(strict=strict)
+    try:
+        yield
+    finally:
+        _BLOCKS.end(strict=strict)
+
+
+@contextmanager
+def threads_for(rows: int) -> Iterator[None]:
+    """Give BLAS back the threads that `by_one_thread` took while a dense matrix of so many rows is factorised, if that is large."""
+    if rows < LARGE or not _BLOCKS.count or _BLOCKS.strict:
+        yield
+        return
+    _BLOCKS.put()
+    try:
+        yield
+    finally:
+        _BLOCKS.put(1)
+
+
+def by_one_thread(function: F) -> F:
+    """Let a function, or each step of a generator, give BLAS one thread; what happens between the steps has those that it had."""
+    if isgeneratorfunction(function):
+
+        @wraps(function)
+        def steps(*words: Any, **named: Any) -> Any:
+            made = function(*words, **named)
+            try:
+                while True:
+                    with one_loaded_blas_thread(strict=False):
+                        try:
+                            step = next(made)
+                        except StopIteration as end:
+                            return end.value
+                    yield step
+            finally:
+                made.close()
+
+        return cast("F", steps)
+
+    @wraps(function)
+    def whole(*words: Any, **named: Any) -> Any:
+        with one_loaded_blas_thread(strict=False):
+            return function(*words, **named)
+
+    return cast("F", whole)
