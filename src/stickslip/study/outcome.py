@@ -129,7 +129,7 @@ class Book:
         if asked.name == "forced_response":
             node = with_regimes(with_measured(node, self.measured))
         unsolved = sum(UNSOLVED in s.notes for s in solved)
-        failed = int(node.attrs.get("failed", 0)) + unsolved
+        failed = max(int(node.attrs.get("failed", 0)), unsolved)
         own = {ATTRIBUTE: to_json(found), "failed": failed}
         self.nodes[asked.name] = node.assign_attrs(own)
 

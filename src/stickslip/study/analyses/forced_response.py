@@ -43,7 +43,7 @@ from stickslip.study.analyses.forced.not_periodic import (
     without_periodic,
 )
 from stickslip.study.analyses.forced.physics import PHYSICS, beforehand, of_physics, physics_of
-from stickslip.study.analyses.forced.points import Accepted, Response, collect
+from stickslip.study.analyses.forced.points import Accepted, Response, collect, lost_point
 from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
     HARMONICS,
@@ -126,11 +126,16 @@ class ForcedResponseAnalysis:
                 yield point
         except NO_SOLUTION as error:
             failure = error  # what was found before counts
+            if not points:
+                points.append(lost_point(inputs.problem, error))
+                yield points[-1]
         notes.put("finished", {"points": len(points)})
         response = collect(inputs.problem, points, inputs.model.peak_output)
         _put_down(inputs, response, notes)
         if inputs.model.blades is not None and notes.get(BLADES) is None:
             notes.put(BLADES, of_blades(inputs, response))
+        if failure is not None and response.top is None:
+            raise failure  # nothing to judge
         _judge(inputs, response, notes)
         if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
             notes.put(BIFURCATIONS, _bifurcations(inputs, response, notes))
@@ -219,6 +224,8 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     told = {"known_verdicts": to_json(known(question, response, shift))}
     notes.put("response", of_response(question, response, shift) | told)
     peak = f"peak {1e3 * response.peak_amplitude:.4g} mm at {response.peak_hz:.3f} Hz, {len(response.accepted)} points"
+    if response.top is None:
+        peak = f"no peak, {len(response.accepted)} points"
     lost = f"{response.failed} not converged"
     line = question.said(f"{peak}, {lost}, {response.newton_steps} Newton steps")
     sum_up(f"{peak}, {lost}" if response.failed else peak, line)

@@ -10,6 +10,7 @@ from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
 from stickslip.response.verification import own_error
+from stickslip.solve.status import Status
 from stickslip.units import HZ
 
 FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
@@ -181,6 +182,27 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
     return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)
+
+
+def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
+    """Return the point at which a response ended that could not begin: no solution, like any that did not converge."""
+    sweep, harmonics = problem.sweep, np.array(problem.sweep.first_harmonics, dtype=np.int64)
+    shape = (int(harmonics[-1]) + 1, problem.system.retained.size)
+    return ForcedPoint(
+        stage="point" if sweep.auto else "low",
+        index=0,
+        omega=sweep.ends[0],
+        coefficients=np.zeros(shape, dtype=complex),
+        tangent=np.zeros(0),
+        step=0.0,
+        status=Status.NOT_FINITE if isinstance(error, FloatingPointError) else Status.SINGULAR,
+        iterations=0,
+        predicted_error=float("nan"),
+        seconds_contact=0.0,
+        seconds_linear=0.0,
+        seconds_total=0.0,
+        harmonics=harmonics,
+    )
 
 
 def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
