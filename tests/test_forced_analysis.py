@@ -329,14 +329,14 @@ def test_of_always_low_the_remedy_names_the_selection_and_says_what_was_compared
     few = lifted(low=1, high="auto", selection="always_low", points=4, peak_points=0)
     data = dataset(solved(replace(few, checks=frozenset({"verify_harmonics"}))))
     at = int(np.nanargmax(data.reference_error_percent.values))
-    assert "10 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()  # fmt: skip
+    assert "up to 15 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()  # fmt: skip
     remedy = (
         'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
     )
     assert {f.remedy for f in twice_the_harmonics(Curve(data, 0))} == {f"{remedy}."}
     (told,) = [t for t in FORCED_RESPONSE.summary(data) if t.title == "Against more harmonics"]
     (line,) = told.lines
-    assert "10 harmonics, twice the 5 that harmonics.high stands for" in line
+    assert "against harmonics up to 15, where harmonics.high stands for 5" in line
     assert f"{remedy}, and compare; with H = 5 a solution has 11 unknowns a coordinate instead of 3" in line  # fmt: skip
     assert "Raise harmonics.high" not in line
 

@@ -83,7 +83,7 @@ def run(
         bool,
         typer.Option(
             "--verify-harmonics",
-            help="Predict at every frequency what twice as many harmonics would change, in amplitude and phase.",
+            help="Predict at every frequency what more harmonics would change, in amplitude and phase.",
         ),
     ] = False,
     fresh: Annotated[

@@ -1,5 +1,6 @@
 """Harmonic supports: which harmonics a periodic motion keeps, and where their real coefficients stand."""
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -41,6 +42,12 @@ def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmo
     return tuple(sorted({0, *whole}))
 
 
+def multiples(harmonics: Iterable[int], highest: int) -> Harmonics:
+    """Return the multiples, from 0 up to `highest`, of what divides all `harmonics`: a motion of these feeds no others."""
+    step = math.gcd(*harmonics) or 1
+    return tuple(range(0, highest + 1, step))
+
+
 def named(harmonics: Iterable[int]) -> str:
     """Return a support as text: ``5`` where it holds all up to the fifth, else ``1, 3, 5``."""
     own = [int(h) for h in harmonics if h > 0]
@@ -58,6 +65,13 @@ def rows_of(harmonics: Harmonics) -> IntArray:
     """Return where the real coefficients of a support stand among those of all harmonics up to its highest."""
     h = np.array(harmonics[1:], dtype=np.int64)
     return np.concatenate([[0], np.stack([2 * h - 1, 2 * h], axis=1).reshape(-1)])
+
+
+def rows_among(harmonics: Harmonics, some: Iterable[int]) -> IntArray:
+    """Return where the real coefficients of `some` harmonics stand among those of a support that holds them."""
+    chosen = set(some)
+    wanted = rows_of((0, *sorted(h for h in chosen if h > 0)))[0 if 0 in chosen else 1 :]
+    return np.searchsorted(rows_of(harmonics), wanted)
 
 
 def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:

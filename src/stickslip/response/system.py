@@ -9,6 +9,7 @@ from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.harmonic.sparse_stiffness import Unreduced
@@ -17,6 +18,7 @@ from stickslip.harmonic.turning import condense_line
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
 
 NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -101,8 +103,10 @@ class System:
     def condensed(
         self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS
     ) -> DynamicStiffness:
-        """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`."""
+        """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`; of a wheel that has them for all waves towards which these are judged."""
         side, retained = self.structure, np.union1d(self.retained, more)
+        made = side.harmonics if isinstance(side, TunedWheel | SpeedLine) else None
+        order = max(order, min(REACH * order, made or 0))
         if isinstance(side, SpeedLine):
             return condense_line(side, retained, load, order)
         return condense_side(side, retained, load, order)

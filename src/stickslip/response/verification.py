@@ -1,17 +1,21 @@
-"""Whether the reference harmonics were enough: the alert from a solved response to twice as many (Gastaldi & Berruti 2017, section 6)."""
+"""Whether harmonics were enough: the alert from a solved response to a judging set (Gastaldi & Berruti 2017, section 6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.judging import (
+    SAMPLES_A_HARMONIC,
+    UNSEEN,
+    covers,
+    judging_balance,
+    judging_set_of,
+)
 from stickslip.harmonic.selection.alert import jacobian_alert
-from stickslip.harmonic.selection.guarded_alert import doubled
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
-
-SAMPLES_A_HARMONIC = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +54,7 @@ def check_support(
     points: Sequence[ForcedPoint],
     factor: int = 2,
 ) -> tuple[SupportCheck, ...]:
-    """Predict at every solved point what all harmonics up to a multiple of the reference order would change.
+    """Predict at every solved point what all harmonics up to a multiple of the reference order, and those of its judging set, would change.
 
     One contact evaluation and one linear solution a point; nothing is iterated. It is a warning and no bound: one Newton step, which
     keeps the contact states of the point, in amplitude and phase; mostly early, and at times too small. Harmonics that the reference leaves out, such as
@@ -80,14 +84,14 @@ def check_support(
         raise input_error(
             "check_support: factor",
             f"must be an integer of at least 2, got {factor!r}",
-            "2 asks for twice as many harmonics as the reference has.",
+            "2 asks for at least twice as many harmonics as the reference has.",
         )
     enlarged = _enlarged(problem, int(factor))
     return tuple(_check(problem, enlarged, point) for point in points if point.converged)
 
 
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Predict what twice its own harmonics would change in a solution, a fraction; NaN where that cannot be told.
+    """Predict what the harmonics of its judging set would change in a solution, a fraction: 0 where nothing acts on them; NaN where that cannot be told.
 
     Parameters
     ----------
@@ -99,24 +103,30 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     if problem.system.interface.rigid:
         return float("nan")
     own = with_stiffness(problem.balance(point.support))
-    more = doubled(own)
-    if more.harmonics == own.harmonics:  # all waves of a wheel that were condensed
-        return _of_more_waves(problem, point)
+    more = judging_balance(_with_waves(problem, own))
+    if more.harmonics == own.harmonics:
+        return float("nan")  # the wheel has no more waves
     x = own.unknowns(point.coefficients)
-    return jacobian_alert(own, more, x, point.omega, problem.measure, problem.alert_solve).error
+    found = jacobian_alert(own, more, x, point.omega, problem.measure, problem.alert_solve)
+    known = covers(own, more) and point.by_dof is None
+    return found.error if known else max(found.error, UNSEEN)
 
 
-def _of_more_waves(problem: ForcedProblem, point: ForcedPoint) -> float:
+def _with_waves(problem: ForcedProblem, own: HarmonicBalance) -> HarmonicBalance:
+    """Return a problem condensed for its judging set, if the wheel has the waves."""
+    most, top = own.linear.most, judging_set_of(own)[-1]
+    if most is None or most >= top:
+        return own
     try:
-        return check_support(problem, [point], 2)[0].error
+        return replace(own, linear=problem.system.condensed(own.linear.load, top))
     except InputError:
-        return float("nan")  # the wheel has no more
+        return own
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `factor` times the reference order, with samples enough for them."""
+    """Return the problem with all harmonics up to `factor` times the reference order and its judging set, with samples enough for them."""
     high = with_stiffness(problem.high)
-    harmonics = harmonics_of(factor * high.order)
+    harmonics = tuple(sorted({*harmonics_of(factor * high.order), *judging_set_of(high)}))
     linear = problem.system.condensed(high.linear.load, harmonics[-1])
     samples = max(high.samples, SAMPLES_A_HARMONIC * harmonics[-1])
     return replace(high, linear=linear, samples=samples).with_harmonics(harmonics)

@@ -21,7 +21,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import silent
 from stickslip.harmonic.selection.strategy import FLOOR, NOISE, ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import Harmonics, rows_of
+from stickslip.harmonic.support import Harmonics, rows_among
 from stickslip.model.blas_threads import threads_for
 
 Goal = Literal["motion", "amplitude"]
@@ -269,11 +269,11 @@ def contributions(
         adjoint = _adjoints(high, omega, outputs, mean.factors)
         weighted = -adjoint * found.residual[:, None]
         by_row = weighted.reshape(high.n_rows, -1, outputs.dofs.size).sum(axis=1)
-        parts = [by_row[_rows(high.harmonics, (h,))].sum(axis=0) for h in missing]
+        parts = [by_row[rows_among(high.harmonics, (h,))].sum(axis=0) for h in missing]
     else:
         for h in missing:
             alone = np.zeros((high.n_rows, high.linear.n))
-            own = _rows(high.harmonics, (h,))
+            own = rows_among(high.harmonics, (h,))
             alone[own] = -found.residual.reshape(alone.shape)[own]
             change = mean.solve(alone.reshape(-1))
             if change is None:
@@ -291,9 +291,9 @@ def _adjoints(
     gradient = np.zeros((high.n_rows, high.linear.n, k), dtype=complex)
     for h in np.unique(outputs.harmonics):
         mine = np.flatnonzero(outputs.harmonics == h)
-        row = high.linear.output_rows(omega, int(h), outputs.dofs[mine])
+        row = high.linear.outputrows_among(omega, int(h), outputs.dofs[mine])
         row *= high.displacement_scale / outputs.motion[mine, None]
-        rows = _rows(high.harmonics, (int(h),))
+        rows = rows_among(high.harmonics, (int(h),))
         gradient[rows[0]][:, mine] = row.T
         if h > 0:  # Q = C - iS
             gradient[rows[1]][:, mine] = -1j * row.T
@@ -312,10 +312,3 @@ def _relative(
 
 def _missing(low: HarmonicBalance, high: HarmonicBalance) -> Harmonics:
     return tuple(h for h in high.harmonics if h not in low.harmonics)
-
-
-def _rows(harmonics: Harmonics, some: Harmonics) -> IntArray:
-    """Return the rows of `some` harmonics among the real coefficients of a support."""
-    place = rows_of(harmonics)
-    wanted = rows_of((0, *(h for h in some if h > 0)))[0 if 0 in some else 1 :]
-    return np.searchsorted(place, wanted)

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray
 from stickslip.errors import check_choice, input_error
+from stickslip.harmonic.judging import covers
 from stickslip.harmonic.selection.adjoint import (
     Estimate,
     Goal,
@@ -17,7 +18,7 @@ from stickslip.harmonic.selection.adjoint import (
 )
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import Harmonics, is_full
+from stickslip.harmonic.support import Harmonics
 
 GOALS = 8  # outputs with the largest errors by which harmonics are chosen
 NOTHING = 1e-6  # relative change that is no reason to keep a harmonic
@@ -67,9 +68,9 @@ class GoalOriented:
         start = high.coefficients(found.start)
         if found.bound > self.threshold:
             again = self._needed(step, outputs, found)
-        elif self.guarded and (found.bound > 0.0 or not is_full(high.harmonics)):
+        elif self.guarded and (found.bound > 0.0 or not covers(low, high)):
             doubted = GuardedAlert(threshold=self.threshold).judge(step)
-            if doubted.again is not None or not is_full(high.harmonics):
+            if doubted.again is not None or not covers(low, high):
                 return replace(doubted, indicator=max(doubted.indicator, found.bound))
         return Verdict(found.bound, again, step.smallest, start)
 

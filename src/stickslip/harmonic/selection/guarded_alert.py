@@ -4,7 +4,7 @@ The published alert (Gastaldi & Berruti 2017) takes the contact states of the lo
 they change on the way, its one Newton step says little: in the blade-damper-blade benchmark it predicts 1.1 % where 7.3 % are true. Here a
 prediction above the threshold is an alarm as it was; one below it has to prove itself, by steps whose cost grows with the doubt:
 
-1. Nothing acts on the missing harmonics: silent, without a factorisation, as before.
+1. Nothing acts on the missing harmonics, nor on any other of the judging set (`harmonic.judging`): silent, without a factorisation.
 2. The contacts are evaluated at ``q + Δq``, with twice the harmonics of the reference, and a chord step is taken with the factors that
    are there: ``Δq₂ = -J̃⁻¹ (r̃(q + Δq) + K̃ₓ Δqₓ)``. The harmonics x beyond the reference are solved one by one,
    ``Δqₓ = -(Z + K)ₓₓ⁻¹ rₓ``. A residual that fell, and a small ``|Δq₁| + 2 |Δq₂|``, prove the prediction.
@@ -25,11 +25,12 @@ from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.factors import solved, with_contacts
+from stickslip.harmonic.judging import UNSEEN, covers, judging_balance
 from stickslip.harmonic.selection.adjoint import Factored, factored
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Solve, Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import harmonics_of, is_full, rows_of
+from stickslip.harmonic.support import multiples, rows_among
 
 SAMPLES_A_HARMONIC = 8
 DOUBT = 2.0  # times the chord step that the true change may go beyond the prediction
@@ -78,12 +79,15 @@ class GuardedAlert:
         alert = jacobian_alert(
             step.balance, high, step.x, step.omega, step.measure, solve, events=step.events
         )
-        if not kept and not is_full(high.harmonics):
-            # silent on harmonics that the reference has; what acts on those left out?
+        if not kept and not covers(step.balance, high):
+            # silent on harmonics that the reference has; what acts on the others of the judging set?
+            wide = judging_balance(step.balance, high.harmonics)
             alert = jacobian_alert(
-                step.balance, doubled(high), step.x, step.omega, step.measure, step.solve, events=step.events
-            )  # fmt: skip
-            return self._verdict(step, alert.error, doubled(high).coefficients(alert.start))
+                step.balance, wide, step.x, step.omega, step.measure, step.solve, events=step.events
+            )
+            known = covers(step.balance, wide)
+            error = alert.error if known else max(alert.error, UNSEEN)
+            return self._verdict(step, error, wide.coefficients(alert.start))
         if not kept or alert.error > self.threshold:
             return self._verdict(step, alert.error, high.coefficients(alert.start))
         bound, start = self._doubted(step, *kept[0], alert.error, alert.start)
@@ -150,7 +154,7 @@ def _unbalanced(step: Step, beyond: HarmonicBalance, begin: FloatArray) -> float
     period = beyond.forces(begin, step.omega, step.events)
     force = np.zeros((beyond.n_rows, beyond.linear.n))
     beyond.rows.add_forces(period.coefficients, force)
-    force[rows_of(step.reference.harmonics)] = 0.0
+    force[rows_among(beyond.harmonics, step.reference.harmonics)] = 0.0
     return float(np.linalg.norm(force)) / beyond.force_scale
 
 
@@ -173,12 +177,12 @@ def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
 
 @lru_cache(maxsize=8)
 def doubled(reference: HarmonicBalance) -> HarmonicBalance:
-    """Return the same problem with all harmonics up to twice the highest, or as many as there are waves of a tuned wheel."""
+    """Return the same problem with harmonics up to twice the highest, or as many as there are waves of a tuned wheel: multiples of what divides all that are kept."""
     order = 2 * reference.order
     most = reference.linear.most
     order = order if most is None else min(order, most)
     samples = max(reference.samples, SAMPLES_A_HARMONIC * order)
-    return replace(reference, samples=samples).with_harmonics(harmonics_of(order))
+    return replace(reference, samples=samples).with_harmonics(multiples(reference.harmonics, order))
 
 
 def truncated(
@@ -208,7 +212,8 @@ def truncated(
     gap, own = np.empty((3, beyond.n_rows)), np.empty((3, beyond.n_rows))
     out = np.zeros_like(force)
     contact_product(period.blocks, rows.columns, rows.values, moved, False, gap, own, out)
-    return np.asarray(out[rows_of(high.harmonics)].reshape(-1) / high.force_scale)
+    kept = rows_among(beyond.harmonics, high.harmonics)
+    return np.asarray(out[kept].reshape(-1) / high.force_scale)
 
 
 def _moved(
@@ -225,16 +230,16 @@ def _moved(
     if beyond.structured and solve is not None:
         own = period.blocks - less_means(period.blocks, means)
         moved -= force
-        moved[rows_of(high.harmonics)] = 0.0
+        moved[rows_among(beyond.harmonics, high.harmonics)] = 0.0
         found = solve(beyond.by_parts(omega, own), moved.reshape(-1) / beyond.force_scale)
         return np.zeros_like(force) if found is None else beyond.displacement_scale * found.reshape(force.shape)  # fmt: skip
-    for h in beyond.harmonics:
+    for place, h in enumerate(beyond.harmonics):
         if h in high.harmonics:
             continue
-        matrix = with_contacts(beyond.linear_block(omega, h), means[h], beyond.rows)
+        matrix = with_contacts(beyond.linear_block(omega, h), means[place], beyond.rows)
         try:
-            q = -solved(matrix, force[2 * h - 1] - 1j * force[2 * h])
+            q = -solved(matrix, force[2 * place - 1] - 1j * force[2 * place])
         except np.linalg.LinAlgError:
             continue  # a resonance without damping: the Newton steps that follow see it
-        moved[2 * h - 1], moved[2 * h] = q.real, -q.imag
+        moved[2 * place - 1], moved[2 * place] = q.real, -q.imag
     return moved

@@ -1,13 +1,14 @@
 """The forced response as a branch whose harmonics change on the way: raised until the judgement is quiet, audited, lowered again."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set_of
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.harmonic.support import Harmonics
@@ -60,6 +61,9 @@ class ForcedCurve:
     forced: ForcedProblem
     supports: tuple[Harmonics, ...]
     raises: bool = True
+    references: dict[int, HarmonicBalance] = field(
+        default_factory=dict, repr=False
+    )  # made when first needed
 
     @property
     def levels(self) -> int:
@@ -113,7 +117,7 @@ class ForcedCurve:
         if self.raises and level > 0:
             return self._predicted(level, step)
         if level + 1 < self.levels:
-            step = replace(step, reference=with_stiffness(self.problem(level + 1)))
+            step = replace(step, reference=self._reference(level))
         verdict = judged(strategy, step)
         bound = (SAFETY[0] if self.raises else 1.0) * verdict.indicator
         if verdict.again is None:
@@ -122,7 +126,7 @@ class ForcedCurve:
 
     def _predicted(self, level: int, step: Step) -> Judged:
         """Predict the error by a Newton step with the harmonics of the next level, and doubt it by what the step after it would change."""
-        more = with_stiffness(self.problem(level + 1))
+        more, following = self._reference(level), self.supports[level + 1]
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
         kept: list[tuple[_Inverse | None, float]] = []
 
@@ -138,8 +142,24 @@ class ForcedCurve:
         bound = SAFETY[1] * alert.error
         if kept and bound <= self.forced.strategy.threshold:
             bound += self._doubt(step, more, alert.start, *kept[0])
+        if bound == 0.0 and (kept or not covers(step.balance, more)):
+            bound = UNSEEN
         far = bound > START * self.forced.strategy.threshold
-        return Judged(bound, (), more.coefficients(alert.start) if far else None)
+        start = more.coefficients(alert.start)[: following[-1] + 1] if far else None
+        return Judged(bound, (), start)
+
+    def _reference(self, level: int) -> HarmonicBalance:
+        """Return the problem towards which solutions of a level are judged: with the harmonics of the next one, and with the judging set."""
+        if level not in self.references:
+            own = with_stiffness(self.problem(level))
+            wide = set(self.supports[level + 1]) >= set(judging_set_of(own))
+            more = (
+                with_stiffness(self.problem(level + 1))
+                if wide
+                else judging_balance(own, self.supports[level + 1])
+            )
+            self.references[level] = more
+        return self.references[level]
 
     def _doubt(
         self,
@@ -167,7 +187,8 @@ class ForcedCurve:
         if not fewer.status.converged:
             return Judged(np.inf)
         safety = SAFETY[min(level - 1, 1)]
-        return Judged(safety * self._difference(point.p, (level - 1, fewer.x), (level, point.x)))
+        change = self._difference(point.p, (level - 1, fewer.x), (level, point.x))
+        return Judged(max(safety * change, UNSEEN))
 
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a bound is below the threshold, or nobody can tell."""

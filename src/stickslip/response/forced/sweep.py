@@ -12,7 +12,7 @@ from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.harmonic.support import Harmonics, harmonics_of
+from stickslip.harmonic.support import Harmonics, harmonics_of, multiples
 from stickslip.response.branch import steps_through
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages, Rescue
 from stickslip.solve.continuation import StepControl
@@ -32,7 +32,7 @@ class Sweep:
     low
         Harmonics with which a response begins: the highest of all, or a list such as (1, 3, 5). The static term is always kept.
     high
-        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41) until the judgement is quiet, and audited. A number or a list:
+        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41; of a load in harmonic 2 alone their doubles) until the judgement is quiet, and audited. A number or a list:
         those of the repeats, which are the reference of the Jacobian Alert as published; nothing goes beyond. Strategies that do not
         verify take 5 for ``auto``.
     cap
@@ -157,10 +157,12 @@ class Sweep:
 
     @property
     def supports(self) -> tuple[Harmonics, ...]:
-        """Harmonics that ``auto`` goes through, the fewest first."""
+        """Harmonics that ``auto`` goes through, the fewest first: multiples of what divides those of the first passage, which a load in harmonic 2 alone feeds."""
         low = self.low_harmonics
-        rungs = sorted({*(rung for rung in RUNGS if rung < self.cap), self.cap})
-        return (low, *(harmonics_of(rung) for rung in rungs if rung > low[-1]))
+        step = multiples(low, low[-1])[1]
+        rungs = sorted({*(step * rung for rung in RUNGS if step * rung < self.cap), self.cap})
+        more = (multiples(low, rung) for rung in rungs if rung >= low[-1] + step)
+        return (low, *dict.fromkeys(more))
 
     @property
     def strategy(self) -> Strategy:

@@ -1,7 +1,7 @@
 """A nonlinear mode as a curve whose harmonics are raised where frequency or damping ratio ask for it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,6 +51,9 @@ class ModeCurve(Curve):
     control: StepControl
     tolerance: float
     decaying: bool = False
+    wider: dict[int, tuple[SelfExcited, PeriodicProblem] | None] = field(
+        default_factory=dict, repr=False
+    )  # of each level, made when first needed
 
     @classmethod
     def of(
@@ -81,12 +84,18 @@ class ModeCurve(Curve):
     @cached_property
     def equations(self) -> tuple[PeriodicProblem, ...]:
         """The equation of each level."""
-        return tuple(
-            p.over_amplitude(
-                p.decaying if self.decaying else None, held=by_energy(p), linear_alone=True
-            )
-            for p in self.problems
-        )
+        return tuple(map(self._equation, self.problems))
+
+    def _equation(self, own: SelfExcited) -> PeriodicProblem:
+        family = own.decaying if self.decaying else None
+        return own.over_amplitude(family, held=by_energy(own), linear_alone=True)
+
+    def judging(self, level: int) -> tuple[SelfExcited, PeriodicProblem] | None:
+        """Return the mode and its equation with the harmonics towards which motions of a level are judged; None where a wheel has no such waves."""
+        if level not in self.wider:
+            made = self.problems[level].judging()
+            self.wider[level] = None if made is None else (made, self._equation(made))
+        return self.wider[level]
 
     def linear(self, level: int, y: FloatArray) -> DynamicStiffness:
         """Return what vibrates as a motion feels it."""
@@ -141,29 +150,36 @@ class ModeCurve(Curve):
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
         """Return unknowns of one level as those of another; missing harmonics are zero."""
-        if level == to:
-            return x
-        balances = (replace(self.problems[i].balance, displacement_scale=1.0) for i in (level, to))
-        own, other = balances
-        return np.append(other.unknowns(own.coefficients(x[:-2])), x[-2:])
+        return x if level == to else _lifted(self.problems[level], self.problems[to], x)
 
     def cost(self, level: int) -> float:
         """Return the work of a Newton step."""
         return 1.0 + self.problems[level].balance.size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Foretell by a Newton step with the harmonics of the next level what these change of frequency and damping ratio."""
+        """Foretell by a Newton step with the harmonics towards which motions are judged what these change of frequency and damping ratio; with the most harmonics the difference from fewer counts, too."""
         if self.levels == 1:
             return Judged()
         if level + 1 == self.levels:
-            return self.at_the_cap(level, point)
-        more = self.lifted(point.x, level, level + 1)
-        at = self.problem(level + 1).linearise(more, point.p)
-        inverse = factorised(self.problems[level + 1].how.newton.linear, at.jac)
+            last = self.at_the_cap(level, point)
+            return (
+                last
+                if last.bound > self.tolerance
+                else Judged(np.fmax(last.bound, self._foretold(level, point)))
+            )
+        return Judged(self._foretold(level, point))
+
+    def _foretold(self, level: int, point: Point) -> float:
+        """Return the change by a Newton step towards the judging set; NaN where a wheel has no such waves."""
+        wider = self.judging(level)
+        if wider is None:
+            return np.nan
+        mode, equation = wider
+        more = _lifted(self.problems[level], mode, point.x)
+        at = equation.linearise(more, point.p)
+        inverse = factorised(mode.how.newton.linear, at.jac)
         step = None if inverse is None else inverse(-at.residual)
-        if step is None:
-            return Judged(np.inf)
-        return Judged(SAFETY * self._change(level + 1, more, more + step))
+        return np.inf if step is None else SAFETY * self._change(level, more, more + step)
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
         """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
@@ -206,3 +222,9 @@ class ModeCurve(Curve):
         (slow, few), (fast, many) = (self.frequency_and_damping(level, y) for y in (one, other))
         size = max(abs(few), abs(many), FAINT_RATIO)
         return max(abs(fast / slow - 1.0), abs(many - few) / size)
+
+
+def _lifted(own: SelfExcited, other: SelfExcited, x: FloatArray) -> FloatArray:
+    """Return unknowns of a mode as those of the same mode with other harmonics."""
+    a, b = (replace(p.balance, displacement_scale=1.0) for p in (own, other))
+    return np.append(b.unknowns(a.coefficients(x[:-2])), x[-2:])

@@ -109,6 +109,8 @@ class ModalOscillator:
         (p, H+1, n) displacements of the points, m; the phases of the first harmonic are such that the shape does not turn along the backbone.
     begins
         Place at which the backbone itself begins; before it, the linear mode.
+    change
+        (p,) relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make.
     """
 
     backbone: Backbone
@@ -117,6 +119,7 @@ class ModalOscillator:
     motion: ComplexArray
     begins: float
     numbers: PchipInterpolator
+    change: FloatArray
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -136,6 +139,13 @@ class ModalOscillator:
         own = np.abs(here.stiffness(here.resonance())) * here.amplitude
         with np.errstate(divide="ignore"):
             return np.asarray(own / np.abs(here.force))
+
+    def by_harmonics(self, place: float) -> float:
+        """Return the relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make at the points of the backbone on either side of a place; NaN where nobody can tell."""
+        if place < self.begins:
+            return 0.0
+        after = int(np.clip(np.searchsorted(self.place, place), 1, self.place.size - 1))
+        return float(np.max(self.change[after - 1 : after + 1]))
 
     @cached_property
     def table(self) -> FloatArray:
@@ -224,7 +234,7 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
         for shape in [motion[i, 1] / p.modal_amplitude]
     ]  # fmt: skip
     place = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(logs)))])
-    begins = 0.0
+    begins, change = 0.0, np.array([p.change for p in points])
     if begins_linear:  # below the first point the mode is linear, and its motion in proportion
         less = np.log(BELOW)
         faint = motion[:1].copy()
@@ -232,10 +242,12 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
         motion = np.concatenate([faint, motion])
         rows = [[rows[0][0] + less, *rows[0][1:]], *rows]
         place = np.append(0.0, place - less)
-        begins = -less
+        begins, change = -less, np.append(0.0, change)
     kept = np.append(True, np.diff(place) > 0.0)
     numbers = PchipInterpolator(place[kept], np.array(rows)[kept])
-    return ModalOscillator(backbone, load, place[kept], motion[kept], float(begins), numbers)
+    return ModalOscillator(
+        backbone, load, place[kept], motion[kept], float(begins), numbers, change[kept]
+    )
 
 
 def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:

@@ -45,12 +45,15 @@ class Bound:
         (n_springs, 2) where the springs of `TractionBounds.springs` started, m.
     multipliers
         (n_springs, 2) tractions along t and w at t = 0 as shares of the friction limit there; NaN where a spring does not stick all the time.
+    error
+        Relative change of the output that the harmonics of its judging set are predicted to make; 0 where nothing acts on them, NaN where nobody can tell.
     """
 
     amplitude: float
     coefficients: ComplexArray
     sliders: FloatArray
     multipliers: FloatArray
+    error: float = np.nan
 
     @property
     def stuck(self) -> int:
@@ -359,4 +362,4 @@ def _lost(setup: _Setup, omega: float) -> TractionBounds:
 def _bound(state: TractionState) -> Bound:
     room = state.room
     rests = np.where(room.sticks, room.slider, state.sliders)
-    return Bound(state.amplitude, state.coefficients, rests, room.multiplier)
+    return Bound(state.amplitude, state.coefficients, rests, room.multiplier, state.error)

@@ -16,11 +16,16 @@ from stickslip.contact.law import PAIRS
 from stickslip.contact.starts import Starts
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.judging import covers, judging_balance
 from stickslip.harmonic.peak import Driven
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.response.residual_tractions.discs import farthest_in_discs, in_all_discs
+from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
 
+ALERT_TOLERANCE = 1e-6  # relative residual of the step that predicts what more harmonics change
 HALVINGS = 4  # of the way between two starts where Newton does not come from one to the other
 INSIDE = 1e-7  # of the room of a spring: how far from its walls a slider is put for a gradient
 RESTS = 1e-7  # of the largest stretch: movement of a slider over a period that counts as none
@@ -91,6 +96,19 @@ class TractionState:
         """Where the sliders rest and might rest."""
         balance = self.problem.at(self.sliders)
         return room_of(self.problem.starts, balance.contacts(self.x, self.omega))
+
+    @property
+    def error(self) -> float:
+        """Relative change of the output that the harmonics of the judging set are predicted to make; 0 where nothing acts on them, NaN where a wheel has no such waves."""
+        problem = self.problem
+        low = problem.at(self.sliders)
+        high = judging_balance(low)
+        if not covers(low, high):
+            return float("nan")
+        dof = low.linear.retained[problem.driven.position]
+        measure = ErrorMeasure(np.array([dof]), problem.driven.harmonics)
+        solve = to_tolerance(problem.newton.linear, ALERT_TOLERANCE).solve
+        return jacobian_alert(low, high, self.x, self.omega, measure, solve).error
 
     def inside(self) -> FloatArray:
         """Return the sliders (n, 2) with those at a wall put a little inside, where their spring can be pulled either way."""

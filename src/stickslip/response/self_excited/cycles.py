@@ -208,10 +208,25 @@ def _refined(problem: SelfExcited, cycle: LimitCycle, most: int, tolerance: floa
             break
         moved = abs(float(np.exp(found[-1])) / cycle.amplitude - 1.0)
         change = max(moved, abs(more.omega(found) / cycle.omega - 1.0))
+        if change <= tolerance:
+            change = max(change, _foretold(more, found))
         cycle = _cycle(more, found, change, enough=change <= tolerance)
         if cycle.enough:
             break
     return cycle
+
+
+def _foretold(problem: SelfExcited, y: FloatArray) -> float:
+    """Return the relative change of amplitude or frequency, the larger one, by a Newton step towards the judging set; where a wheel has no such waves infinite."""
+    wider = problem.judging()
+    if wider is None:
+        return np.inf
+    motion = problem.relative(y)
+    start = np.append(wider.unknowns(motion, problem.omega(y), 0.0)[:-1], y[-1])
+    at = wider.limit_cycle().linearise(start, 0.0)
+    inverse = factorised(problem.how.newton.linear, at.jac)
+    step = None if inverse is None else inverse(-at.residual)
+    return np.inf if step is None else float(np.max(np.abs(step[-2:])))
 
 
 def _cycle(problem: SelfExcited, y: FloatArray, change: float, *, enough: bool) -> LimitCycle:

@@ -16,11 +16,12 @@ from functools import partial
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, State
 from stickslip.harmonic.decaying import DecayingStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.judging import judging_set_of
 from stickslip.harmonic.parameters import BalanceAt
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import times
@@ -97,6 +98,15 @@ class SelfExcited:
         samples = max(self.how.samples, SAMPLES_A_HARMONIC * order)
         how = replace(self.how, order=order, samples=samples)
         return self_excited_motions(self.system, self.load, self.mode, self.dof, how)
+
+    def judging(self) -> "SelfExcited | None":
+        """Return the same with the harmonics towards which its motions are judged; None where a wheel has no such waves."""
+        harmonics = judging_set_of(self.balance)
+        try:
+            made = self.with_order(harmonics[-1])
+        except InputError:
+            return None
+        return replace(made, balance=made.balance.with_harmonics(harmonics))
 
     @property
     def dof(self) -> int:

@@ -6,8 +6,9 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.judging import judging_set_of
 from stickslip.harmonic.selection.alert import silent
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.solve.newton_method import newton
 
@@ -26,7 +27,8 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
     """
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
-    high = _more(problem, max(LEAST, FACTOR * low.order + MORE))
+    fed = {*judging_set_of(low), *harmonics_of(max(LEAST, FACTOR * low.order + MORE))}
+    high = _more(problem, tuple(sorted(fed)))
     x, padded = low.unknowns(point.coefficients), high.unknowns(point.coefficients)
     period = high.forces(padded, omega, problem.step(low, x, omega).events)
     if silent(low, high, period):
@@ -47,8 +49,7 @@ def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPo
     return replace(point, coefficients=high.coefficients(x), harmonics=np.array(high.harmonics))
 
 
-def _more(problem: ForcedProblem, order: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `order`, and the samples that they need."""
-    if problem.high.samples > 4 * order:
-        return with_stiffness(problem.balance(harmonics_of(order)))
-    return replace(with_stiffness(problem.high), samples=8 * order).with_order(order)
+def _more(problem: ForcedProblem, harmonics: Harmonics) -> HarmonicBalance:
+    """Return the problem with these harmonics, or as many of them as a wheel has waves for, and the samples that they need."""
+    most = problem.high.linear.most
+    return with_stiffness(problem.balance(tuple(h for h in harmonics if most is None or h <= most)))

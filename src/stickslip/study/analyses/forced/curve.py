@@ -226,7 +226,7 @@ class Curve:
 
     @cached_property
     def reference(self) -> FloatArray:
-        """(n,) change that twice as many harmonics are predicted to make, a fraction; NaN where it was not asked for."""
+        """(n,) change that the judging set of the most harmonics is predicted to make, a fraction; NaN where it was not asked for."""
         return self.floats("reference_error_percent") / 100
 
     @property

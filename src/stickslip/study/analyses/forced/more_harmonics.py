@@ -1,23 +1,24 @@
-"""Whether the harmonics of a study are enough at all: each accepted solution against twice the highest that the study stands for (``--verify-harmonics``)."""
+"""Whether the harmonics of a study are enough at all: each accepted solution towards the judging set of the most that the study keeps (``--verify-harmonics``)."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import Harmonics, named
 from stickslip.response.verification import check_support
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.points import Response
-from stickslip.study.analyses.forced.question import FACTOR, MORE_THAN_LOW, Question
+from stickslip.study.analyses.forced.question import MORE_THAN_LOW, Question
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.units import HZ
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceDoubt:
-    """What twice as many harmonics would change in a response.
+    """What the harmonics of the judging set would change in a response.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ class ReferenceDoubt:
         if not self.known:
             return "no solution that could be checked."
         told = (
-            f"against {self.harmonics} harmonics, twice the {self.high[-1]} that harmonics.high stands for, {self.above} of {self.known} solutions are predicted to change by more than "
+            f"against harmonics up to {self.harmonics}, where harmonics.high stands for {named(self.high)}, {self.above} of {self.known} solutions are predicted to change by more than "
             f"{100 * self.limit:g} % of their complex amplitude, phase included; the largest change is {error_text(self.worst)} "
             f"of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
         )
@@ -103,7 +104,7 @@ class ReferenceDoubt:
 
 
 def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
-    """Predict what twice the highest harmonic of the study would change.
+    """Predict what the judging set of the most harmonics that the study keeps would change.
 
     Parameters
     ----------
@@ -111,14 +112,14 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
         The model, and its finished response.
     """
     problem = question.problem
-    checks = check_support(problem, [a.point for a in response.accepted], FACTOR)
+    checks = check_support(problem, [a.point for a in response.accepted])
     solved = np.array([a.point.converged for a in response.accepted], dtype=bool)
     errors = np.full(solved.size, np.nan)
     errors[solved] = [c.error for c in checks]
     high = question.sweep.high_harmonics
     low = always_kept(question.problem.strategy) == "low"
     only = question.sweep.low_harmonics if low else None
-    doubt = ReferenceDoubt(FACTOR * high[-1], high, question.limit, errors, only=only)
+    doubt = ReferenceDoubt(REACH * high[-1], high, question.limit, errors, only=only)
     if not checks:
         return doubt
     worst = max(checks, key=lambda c: c.error)

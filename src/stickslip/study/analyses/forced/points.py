@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.judging import judging_set
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
@@ -206,11 +207,12 @@ def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
 
 
 def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the bound of a solution's own error: what was said of it on the way, else what one step with twice its harmonics changes."""
+    """Return the bound of a solution's own error: what was said of it on the way, else what one step with the harmonics of its judging set changes."""
     if not point.converged:
         return float("nan")
-    # in the published passages a strategy has no harmonics left to look at beyond the reference, and finds nothing
-    looked = problem.sweep.auto or point.support != problem.high.harmonics
+    # in the published passages a strategy looks at nothing beyond its reference
+    fed = judging_set(point.support, problem.driven)
+    looked = problem.sweep.auto or set(fed) <= set(problem.high.harmonics)
     if problem.strategy.verifies and looked and not np.isnan(point.predicted_error):
         return point.predicted_error
     return own_error(problem, point)

@@ -82,7 +82,7 @@ _OF = {
         "marched_sentence": ("1", "what the motion in time from rest did where the point was not found otherwise, empty elsewhere"),
         "verdict": ("1", "whether the point is to be trusted"),
         "verdict_reason": ("1", "why not, empty where it is"),
-        "reference_error_percent": ("percent", "change of the complex amplitude that twice as many harmonics would make, NaN where unsolved"),
+        "reference_error_percent": ("percent", "change of the complex amplitude that the judging set of the most harmonics would make, NaN where unsolved"),
     },
     "point harmonic": {
         "harmonic_kept": ("1", "1 if the solution keeps the harmonic"),

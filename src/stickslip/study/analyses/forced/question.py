@@ -13,6 +13,7 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.whole import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
+from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.support import is_full, named
@@ -38,7 +39,6 @@ MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundre
 MORE_THAN_LOW = (
     'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
 )
-FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +181,8 @@ def question_of(case: Case, model: Model) -> Question:
         _require_integrable(model)
     _refuse_for_rigid(model, sweep, case.checks)
     check_limits(settings.limits, estimate(model, sweep))
-    # the guard and the check of the harmonics look at twice as many as are kept
-    harmonics = FACTOR * sweep.high_harmonics[-1]
+    # solutions are judged towards up to three times the harmonics that are kept
+    harmonics = REACH * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
     assembled = model.assembled(harmonics, case.store)

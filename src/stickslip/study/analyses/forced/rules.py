@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
@@ -14,7 +15,6 @@ from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
 from stickslip.study.analyses.forced.jumps import jumps
 from stickslip.study.analyses.forced.question import (
     ALONE,
-    FACTOR,
     MORE_THAN_LOW,
     MOST_IN_TIME,
     TOO_MANY,
@@ -167,7 +167,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
             why = (
-                f"{FACTOR * case.cap} harmonics instead of H = {case.kept[i]} are predicted to change it, in amplitude or phase, by "
+                f"up to {REACH * case.cap} harmonics instead of H = {case.kept[i]} are predicted to change it, in amplitude or phase, by "
                 f"{error_text(case.reference[i])}"
             )
             remedy = f"{_more(case, int(i))}."

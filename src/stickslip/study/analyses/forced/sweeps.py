@@ -1,5 +1,6 @@
 """The sweep that the table [forced_response] becomes."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -8,6 +9,7 @@ from stickslip.errors import input_error
 from stickslip.response.forced.choices import RUNGS
 from stickslip.response.forced.response import Sweep
 from stickslip.study.analyses.forced.section import ForcedResponse
+from stickslip.study.file.harmonics import HIGHEST
 from stickslip.units import HZ, RPM
 
 MULTIPLE = 3  # of the highest harmonic that loads drive, which friction answers with
@@ -63,7 +65,7 @@ def sweep_through(
         samples=h.samples,
         evaluator=settings.solver.evaluator,
         rescue=settings.solver.rescue,
-        cap=max(RUNGS[-1], MULTIPLE * low[-1]),
+        cap=max(min(RUNGS[-1] * math.gcd(*low), HIGHEST), MULTIPLE * low[-1]),
         threshold=h.alert_threshold_percent / 100,
         selection=h.chooser,
         passages=h.passages,

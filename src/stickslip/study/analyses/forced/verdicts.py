@@ -7,9 +7,9 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import IntArray
+from stickslip.harmonic.judging import REACH
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import Curve
-from stickslip.study.analyses.forced.question import FACTOR
 from stickslip.study.analyses.forced.rules import RULES, Finding, without_place
 from stickslip.study.analyses.verdict import LEVELS, Level, Verdict, of_all_cases, worst
 
@@ -79,7 +79,7 @@ def _examined(case: Curve) -> str:
     for value, about in (
         (np.nan if case.exact[peak] else case.own_error[peak], "predicted error"),
         (case.audit[peak], "difference from more harmonics"),
-        (case.reference[peak], f"predicted change with {FACTOR * case.cap} harmonics"),
+        (case.reference[peak], f"predicted change with up to {REACH * case.cap} harmonics"),
     ):
         said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
     said += ["attained in time integration"] * bool(case.attained[peak])

@@ -12,6 +12,7 @@ from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.judging import judging_set
 from stickslip.harmonic.peak import PeakProblem
 from stickslip.response.parameter import LoadName, Parameter
 from stickslip.response.resonances.first import PeakSearch
@@ -84,8 +85,8 @@ class Question:
 
 
 def more_than(harmonics: int) -> int:
-    """Return the harmonics that the highest peak is held against: twice as many and the next one, since symmetric contacts answer in odd ones."""
-    return 2 * harmonics + 1
+    """Return the highest harmonic of what the highest peak is held against: all of its judging set are below."""
+    return judging_set(range(harmonics + 1))[-1]
 
 
 def question_of(case: Case, model: Model) -> Question:

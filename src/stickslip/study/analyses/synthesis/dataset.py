@@ -42,6 +42,7 @@ ABOUT = {
     "growth": ("level", "1", "relative growth of the peak with the level: 1 where nothing slips"),
     "higher_harmonics": ("level", "1", "higher harmonics over the first, at the output"),
     "resolved": ("level", "1", "relative change of the peak if every second point of the nonlinear mode is left out"),
+    "by_harmonics": ("level", "1", "relative change of frequency or damping ratio of the nonlinear mode at the peak that more harmonics are foretold to make"),
     "detached": ("level", "1", "number of curves that do not hang together with small amplitudes"),
     "seconds": ("level", "s", "time of the processor for the response"),
     "frequency_hz": ("level point", "Hz", "frequency of the response"),

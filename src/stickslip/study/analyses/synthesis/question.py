@@ -12,6 +12,7 @@ from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.judging import REACH
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
@@ -32,7 +33,6 @@ from stickslip.units import RPM
 
 NAME = "modal_synthesis"
 MOST_FORCE = 1e60  # N of a level: beyond, the polynomial of the response overflows
-FACTOR = 2  # times the highest harmonic: what direct solutions are held against
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def question_of(case: Case, model: Model) -> Question:
                 f"is {harmonic}, and the mode of [{NAME}] answers to harmonic 1",
                 "Leave the load out, or ask for the forced response.",
             )
-    most = FACTOR * max(asked.harmonics, asked.most_harmonics)
+    most = REACH * max(asked.harmonics, asked.most_harmonics)
     refuse_whole(NAME, model)
     assembled = peak_first(model.assembled(most, case.store))
     refuse_rigid(NAME, assembled)

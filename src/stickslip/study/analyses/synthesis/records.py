@@ -43,6 +43,8 @@ class SynthesisLevel:
         What either took, s of the processor.
     passage_omega, passage_amplitude
         (rates, moments) frequency, rad/s, and amplitude of the output, m, while the frequency is swept; NaN where it did not begin.
+    changed
+        Relative change of frequency or damping ratio of the nonlinear mode at the peak, the larger one, that more harmonics are foretold to make.
     passage_finished, passage_change
         (rates,) 1 where a passage came to its end, and the relative change of the amplitude in a radian.
     """
@@ -80,3 +82,4 @@ class SynthesisLevel:
     passage_amplitude: FloatArray
     passage_finished: IntArray
     passage_change: FloatArray
+    changed: float = float("nan")

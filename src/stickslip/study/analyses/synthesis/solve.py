@@ -86,8 +86,8 @@ def solve(
         yield record
 
 
-def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
-    """Return what is to be thought of a peak, and why."""
+def judged(alone: Isolation, resolved: float, changed: float) -> tuple[str, str]:
+    """Return what is to be thought of a peak, and why; `changed`: by how much more harmonics are foretold to change the nonlinear mode there."""
     off = percent(alone.foreign)
     motion = f"the other modes move by {percent(max(alone.output, alone.gaps))} of the mode"
     near = f"the next frequency is {percent(alone.distance)} away"
@@ -97,13 +97,16 @@ def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
         return "trusted", "nothing slips: the other modes are added, and the response is exact"
     if alone.foreign > DOUBTFUL:
         return "refused", f"{motion}, {near}: the peak would be off by about {off}"
-    if alone.foreign > TRUSTED:
-        return "doubtful", f"{motion}, {near}: the peak may be off by about {off}"
-    if resolved > COARSE:
-        return "doubtful", f"the nonlinear mode has too few points here: without every second one the peak moves by {percent(resolved)}"  # fmt: skip
-    if alone.harmonics > HARMONICS:
-        return "doubtful", f"higher harmonics have {percent(alone.harmonics)} of the first, and the load works on that alone"  # fmt: skip
-    return "trusted", motion if not np.isfinite(alone.distance) else f"{motion}, {near}"
+    more = "raise modal_synthesis.most_harmonics"
+    doubts = (
+        (alone.foreign > TRUSTED, f"{motion}, {near}: the peak may be off by about {off}"),
+        (resolved > COARSE, f"the nonlinear mode has too few points here: without every second one the peak moves by {percent(resolved)}"),
+        (alone.harmonics > HARMONICS, f"higher harmonics have {percent(alone.harmonics)} of the first, and the load works on that alone"),
+        (np.isnan(changed), f"the nonlinear mode was solved with one set of harmonics alone: {more}"),
+        (changed > TRUSTED, f"more harmonics change frequency or damping ratio of the nonlinear mode by {percent(changed)}: {more}"),
+    )  # fmt: skip
+    trusted = motion if not np.isfinite(alone.distance) else f"{motion}, {near}"
+    return next((("doubtful", why) for doubted, why in doubts if doubted), ("trusted", trusted))
 
 
 def _level(shared: Synthesis, level: float) -> SynthesisLevel:
@@ -117,8 +120,9 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]  # fmt: skip
     alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[0]) if peaks else np.nan
+    changed = own.by_harmonics(tops[0].place) if peaks else np.nan
     detached = max(peaks[1:], default=(np.nan, np.nan))
-    answer, why = _answer(shared, curve, alone, resolved)
+    answer, why = _answer(shared, curve, alone, (resolved, changed))
     shown = answer in ("trusted", "doubtful")
     if shown and len(peaks) > 1 and curve.resonances[0].top:
         swept = f"the highest peak that a sweep meets has {1e3 * peaks[0][0]:.4g} mm at {peaks[0][1] / HZ:.5g} Hz"
@@ -164,6 +168,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         passage_amplitude=share * passages[1],
         passage_finished=passages[2],
         passage_change=passages[3],
+        changed=changed,
     )
 
 
@@ -176,14 +181,14 @@ def _in_proportion(own: ModalOscillator, level: float) -> float:
 
 
 def _answer(
-    shared: Synthesis, curve: Synthesised, alone: Isolation, resolved: float
+    shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tuple[float, float]
 ) -> tuple[str, str]:
     """Say whether a level has an answer, of its peaks the one from small amplitudes, and why."""
     if not curve.place.size:
         return "beyond", "the nonlinear mode begins with more than the level reaches"
     if not curve.peaks or float(curve.place.max()) >= shared.oscillator.ends[1]:
         return "beyond", "the nonlinear mode ends before it needs so much of the load"
-    answer, why = judged(alone, resolved)
+    answer, why = judged(alone, *errors)
     if answer in ("trusted", "doubtful") and not curve.resonances[0].top:
         return "doubtful", f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}"  # fmt: skip
     return answer, why

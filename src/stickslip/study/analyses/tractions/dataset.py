@@ -27,6 +27,8 @@ ABOUT = {
     "branches": ("traction_point", "1", "motions from the model's own start that sweeps up and down met; the bounds hold them all"),
     "resonance_hz": ("bound", "Hz", "where the curve of each bound is highest: own start, smallest, largest amplitude"),
     "resonance_amplitude": ("bound", "m", "its height there"),
+    "harmonics_error": ("traction_point bound", "1", "relative change of the output that more harmonics are predicted to make, phase included; 0 where nothing acts on them, NaN where nobody can tell"),
+    "resonance_harmonics_error": ("bound", "1", "the same at the resonance of each bound"),
     "resonance_inside": ("bound", "1", "1 where that is within the range, 0 at its ends"),
     "spring": ("traction_spring", "1", "contact of each spring that has a start"),
     "multiplier": ("bound traction_spring tangent", "1", "traction at t = 0 over the friction limit there, at the resonance of each bound; NaN: it does not stick"),
@@ -78,6 +80,7 @@ def _of_points(points: Sequence[TractionRecord]) -> dict[str, Any]:
         "solves": np.array([r.solves for r in points]),
         "failures": np.array([r.failures for r in points]),
         "branches": np.array([r.branches for r in points]),
+        "harmonics_error": np.array([r.errors for r in points]),
     }
 
 
@@ -92,6 +95,7 @@ def _of_resonance(
     return {
         "resonance_hz": np.array([r.omega for r in tops]) / HZ,
         "resonance_amplitude": np.array([r.amplitude[k] for k, r in enumerate(tops)]),
+        "resonance_harmonics_error": np.array([r.errors[k] for k, r in enumerate(tops)]),
         "resonance_inside": np.array([int(r.omega not in ends) for r in tops]),
         "spring": np.array(json.loads(own.springs), dtype=str),
         "multiplier": np.array([r.multipliers[k] for k, r in enumerate(tops)]),

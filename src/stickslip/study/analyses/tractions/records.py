@@ -1,7 +1,7 @@
 """Bounds at a frequency as they are kept in the journal of a job."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -35,6 +35,8 @@ class TractionRecord:
         Motions solved for, and starts from which none was found.
     branches
         As of `TractionBounds`.
+    errors
+        (3,) as of `Bound`.
     """
 
     stage: Stage
@@ -47,6 +49,7 @@ class TractionRecord:
     solves: int
     failures: int
     branches: int = 1
+    errors: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
 
 
 def to_record(bounds: TractionBounds, stage: Stage) -> TractionRecord:
@@ -58,14 +61,14 @@ def to_record(bounds: TractionBounds, stage: Stage) -> TractionRecord:
 
     return TractionRecord(
         stage, bounds.omega, every("amplitude"), np.array([one.coefficients for one in each]),
-        every("sliders"), every("multipliers"), json.dumps(bounds.springs), bounds.solves, bounds.failures, bounds.branches,
+        every("sliders"), every("multipliers"), json.dumps(bounds.springs), bounds.solves, bounds.failures, bounds.branches, every("error"),
     )  # fmt: skip
 
 
 def of_record(record: TractionRecord) -> TractionBounds:
     """Return the bounds of a record."""
     reference, least, most = (
-        Bound(float(record.amplitude[k]), record.coefficients[k], record.sliders[k], record.multipliers[k])
+        Bound(float(record.amplitude[k]), record.coefficients[k], record.sliders[k], record.multipliers[k], float(record.errors[k]))
         for k in range(len(ENDS))
     )  # fmt: skip
     names = tuple(json.loads(record.springs))

@@ -11,6 +11,7 @@ from stickslip.study.keep.netcdf import one_case
 
 SMALL = 1e-3  # relative width below which residual tractions change nothing that counts
 LARGE = 1e-2  # above which the user is warned
+FEW = 0.05  # relative change by more harmonics above which those kept are too few
 ENDS = ("smallest", "largest")
 
 
@@ -23,7 +24,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if not np.all(case["resonance_inside"].values):
         why = "a bound is highest at the end of residual_tractions.frequency_hz, which is no resonance"
         found.append(Verdict("doubtful", label, None, why, "Widen the range."))
-    found += _of_branches(label, case)
+    found += [*_of_harmonics(label, case), *_of_branches(label, case)]
     failures = int(case["failures"].values.sum())
     if failures:
         count = int(case["solves"].values.sum())
@@ -54,6 +55,31 @@ def _of_width(
     return Verdict(
         "trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least
     )
+
+
+def _of_harmonics(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Doubt resonances that more harmonics are predicted to change; tell of other frequencies."""
+    if "resonance_harmonics_error" not in case:
+        return []
+    kept, remedy = int(case["harmonics"].values), "Raise residual_tractions.harmonics."
+    error, hertz = case["resonance_harmonics_error"].values, case["resonance_hz"].values
+    found = []
+    if np.isnan(error).any():
+        why = f"harmonics were not examined: nothing says how wrong H = {kept} is"
+        found.append(Verdict("doubtful", label, None, why, remedy))
+    if (worst := np.flatnonzero(error > FEW)).size:
+        k = int(worst[np.argmax(error[worst])])
+        names = ("resonance from the model's own start", *(f"{end} resonance" for end in ENDS))
+        by = "over 100 %" if error[k] > 1.0 else f"{100 * error[k]:.2g} %"
+        why = f"more harmonics than {kept} are predicted to change the {names[k]} by {by}"
+        found.append(Verdict("doubtful", label, float(hertz[k]), why, remedy))
+    each = np.nanmax(np.nan_to_num(case["harmonics_error"].values, nan=0.0), axis=1)
+    if (above := np.flatnonzero(each > FEW)).size and not worst.size:
+        at = int(above[np.argmax(each[above])])
+        by = "over 100 %" if each[at] > 1.0 else f"{100 * each[at]:.2g} %"
+        why = f"more harmonics than {kept} are predicted to change the bounds by {by} there, and by more than {100 * FEW:g} % at {above.size} of {each.size} frequencies"
+        found.append(Verdict("trusted", label, float(case["frequency_hz"].values[at]), why, remedy))
+    return found
 
 
 def _of_branches(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:

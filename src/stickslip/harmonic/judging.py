@@ -1,0 +1,71 @@
+"""The harmonics towards which a solution is judged: those that a nonlinear force of its harmonics may feed first.
+
+A force that is odd in one harmonic h answers in 3 h, one that is even in 2 h and in the mean; a product of two harmonics in their sum and their
+difference. A contact may see one kept harmonic alone, by its place in the shape or by the wave of a wheel, so that each of them counts by itself. A
+solution is exact if nothing acts on any harmonic of this set; no other set, and no name of a law, tells so.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.support import Harmonics
+
+REACH = 3  # highest harmonic of a judging set over the highest that is kept or driven
+SAMPLES_A_HARMONIC = 8  # of the contact forces at least: with fewer, aliasing may hide what acts
+# error of a solution that is not known to be exact, and that a prediction leaves as it is: `exact` is 0, and nothing else is
+UNSEEN = float(np.finfo(float).tiny)
+
+
+def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
+    """Return 0 and, for all harmonics that are kept or driven, themselves, their doubles and triples, and their sums and differences.
+
+    Parameters
+    ----------
+    kept
+        Harmonics of the solution.
+    driven
+        Harmonics that the load acts in.
+    """
+    own = sorted({*kept, *driven} - {0})
+    fed = {0, *own, *(3 * h for h in own)}
+    for i, one in enumerate(own):
+        for other in own[i:]:
+            fed |= {one + other, other - one}
+    return tuple(sorted(fed))
+
+
+def driven_by(load: HarmonicLoad) -> Harmonics:
+    """Return the harmonics above zero that a load acts in."""
+    return tuple(h for h in sorted(load.harmonics) if h > 0 and np.any(load.harmonics[h]))
+
+
+def judging_set_of(low: HarmonicBalance) -> Harmonics:
+    """Return the judging set of a periodic problem: of the harmonics that it keeps and of those of its load."""
+    return judging_set(low.harmonics, driven_by(low.linear.load))
+
+
+def judging_balance(low: HarmonicBalance, also: Iterable[int] = ()) -> HarmonicBalance:
+    """Return the same problem with its judging set, with samples enough for it.
+
+    Of a wheel that was condensed for few harmonics these alone are left: `covers` says no then.
+
+    Parameters
+    ----------
+    low
+        The problem of the solution.
+    also
+        Further harmonics, such as those with which it would be solved next.
+    """
+    most = low.linear.most
+    harmonics = tuple(h for h in sorted({*judging_set_of(low), *also}) if most is None or h <= most)
+    samples = max(low.samples, SAMPLES_A_HARMONIC * harmonics[-1])
+    return replace(low, samples=samples).with_harmonics(harmonics)
+
+
+def covers(low: HarmonicBalance, high: HarmonicBalance) -> bool:
+    """Whether `high` holds the judging set of `low`: only then does its silence make a solution exact."""
+    return set(judging_set_of(low)) <= set(high.harmonics)
