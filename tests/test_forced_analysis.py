@@ -336,7 +336,7 @@ def test_of_always_low_the_remedy_names_the_selection_and_says_what_was_compared
     assert {f.remedy for f in twice_the_harmonics(Curve(data, 0))} == {f"{remedy}."}
     (told,) = [t for t in FORCED_RESPONSE.summary(data) if t.title == "Against more harmonics"]
     (line,) = told.lines
-    assert "against harmonics up to 15, where harmonics.high stands for 5" in line
+    assert "gainst harmonics up to 15, where harmonics.high stands for 5" in line
     assert f"{remedy}, and compare; with H = 5 a solution has 11 unknowns a coordinate instead of 3" in line  # fmt: skip
     assert "Raise harmonics.high" not in line
 

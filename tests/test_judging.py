@@ -9,7 +9,12 @@ import pytest
 import stickslip as ss
 from evidence.models.lumped import chain_stiffness, jenkins, lumped, system
 from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set
+from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.harmonic.support import harmonics_of, multiples
+from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.verification import own_error
 
 HERTZ = (10.5, 12.5)
@@ -127,3 +132,129 @@ def test_wheel_with_too_few_waves_is_not_called_exact():
     assert covers(low, judging_balance(low))
     assert not covers(low, low.with_harmonics((0, 1, 2)))
     assert UNSEEN > 0.0
+
+
+def test_mode_of_one_and_two_harmonics_hears_the_third():
+    """Friction of a mode is odd: with up to two harmonics the difference is nothing, and the damping a third off."""
+    made, load = chain(1)
+    mode = stuck_modes(made, 1)[0]
+    rest = ss.HarmonicLoad(load.static)
+    span = (1e-4, 3e-3)
+
+    def backbone(order: int, most: int) -> Backbone:
+        sweep = ModeSweep(span=span, points=5, most_harmonics=most)
+        return nonlinear_mode(made, rest, mode, 3, Discretisation(order=order), sweep)
+
+    few = backbone(1, 2)
+    said = np.array([p.change for p in few.solutions])
+    assert np.max(said) > 0.02
+    more = np.array([p.change for p in backbone(5, 23).solutions])
+    slips = 1e-10  # of what sticks nothing acts on any harmonic
+    assert np.median(said[said > slips]) > 20 * np.median(more[more > slips])
+
+
+# ---- what an error is relative to, and what an amplitude is ------------------------------------------------------------
+
+
+def test_largest_change_of_an_output_decides():
+    """As vectors, relative to the output or to 1 % of the largest of its unit: an output that stands still is no doubt, rotations stand apart."""
+    before = np.zeros((3, 5), dtype=complex)
+    before[1] = [1.0, 0.5j, 1e-4, 1e-5, 2e-5]
+    moved = np.zeros((3, 5), dtype=complex)
+    moved[1] = [0.01, 0.02, 1e-4, 1e-6, 0.0]
+    units = np.array([0, 0, 0, 1, 1])
+    measure = ErrorMeasure(np.arange(5), (1,), units)
+    # 0.01 / 1, 0.02 / 0.5, 1e-4 / 0.01, and of the rotations 1e-6 / 1e-5
+    error, place, harmonic = measure.change(before, moved)
+    assert (error, place, harmonic) == (pytest.approx(0.1), 3, 1)
+    assert ErrorMeasure(np.arange(3), (1,), units[:3]).change(before, moved)[0] == pytest.approx(
+        0.04
+    )
+    assert ErrorMeasure(np.array([2, 0]), (1,), units[:2]).change(before, moved)[
+        0
+    ] == pytest.approx(0.01)
+    # a unit in which nothing moves at all
+    before[1, 3:] = moved[1, 3:] = 0.0
+    assert measure.change(before, moved)[0] == pytest.approx(0.04)
+
+
+def test_several_driven_harmonics_are_one_vector():
+    before, moved = np.zeros((3, 1), dtype=complex), np.zeros((3, 1), dtype=complex)
+    before[1:, 0], moved[1:, 0] = [3.0, 4.0], [0.0, 1.0]
+    assert ErrorMeasure(np.array([0]), (1, 2), np.array([0])).change(before, moved)[
+        0
+    ] == pytest.approx(0.2)
+    assert ErrorMeasure(np.array([0]), (1, 2)).change(before, moved)[0] == pytest.approx(0.25)
+
+
+def test_units_do_not_change_an_error():
+    rng = np.random.default_rng(3)
+    before, moved = (rng.normal(size=(4, 6)) + 1j * rng.normal(size=(4, 6)) for _ in range(2))
+    measure = ErrorMeasure(np.arange(6), (1, 3), np.array([0, 1, 0, 1, 1, 0]))
+    scale = np.where(measure.units == 0, 1e3, 2.0)
+    assert measure.change(before * scale, moved * scale) == pytest.approx(
+        measure.change(before, moved)
+    )
+
+
+def test_change_of_the_whole_motion_counts_harmonics_that_were_missing():
+    before, moved = np.zeros((2, 1), dtype=complex), np.zeros((4, 1), dtype=complex)
+    before[1], moved[3] = 1.0, 0.3
+    whole = ErrorMeasure(np.array([0]), None, np.array([0]))
+    assert whole.rows(2, 4) == 4
+    assert whole.change(before, moved) == (pytest.approx(0.3), 0, 3)
+
+
+@pytest.mark.parametrize("order", [1, 3, 9])
+def test_amplitudes_are_those_of_the_time_series(order):
+    rng = np.random.default_rng(order)
+    motion = rng.normal(size=(order + 1, 3)) + 1j * rng.normal(size=(order + 1, 3))
+    motion[0] = motion[0].real + 5.0
+    angle = np.linspace(0, 2 * np.pi, 40_000, endpoint=False)
+    signal = np.real(np.exp(1j * np.outer(angle, np.arange(order + 1))) @ motion)
+    ptp = amplitudes(motion, (1,), "half_peak_to_peak")
+    # of 40000 samples the highest is below the extreme by its curvature over half a step
+    left = (np.pi / 40_000) ** 2 * (np.arange(order + 1)[:, None] ** 2 * np.abs(motion)).sum(axis=0)
+    assert np.all(ptp - 0.5 * np.ptp(signal, axis=0) <= left)
+    assert np.all(ptp - 0.5 * np.ptp(signal, axis=0) >= -1e-12)
+    np.testing.assert_allclose(amplitudes(motion, (1,), "rms"), signal.std(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(amplitudes(motion, (1,), "first"), np.abs(motion[1]), rtol=1e-12)
+
+
+PLANE = """schema_version = 2
+title = "Sliding in the plane under a normal force that varies"
+[part.mass]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 3e4]]
+dashpots_n_s_per_m = [["ground", 1, 5.0]]
+[contact.stop]
+between = ["mass.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 2e4
+slip_limit_n = 2.0
+[load.shaker]
+on = "mass.m1"
+force_n = 4.0
+[forced_response]
+frequencies_hz = [9.2]
+peak_points = 0
+stability = "off"
+[output]
+points = { p = "mass.m1" }
+"""
+
+
+@pytest.mark.parametrize("measure", ["first", "half_peak_to_peak", "rms"])
+def test_study_tells_the_amplitude_that_it_measures(tmp_path, measure):
+    """Dataset, axis and peak of each measure agree with the motion; the third harmonic near resonance is told where it is left out."""
+    (tmp_path / "study.toml").write_text(f'{PLANE}measure = "{measure}"\n')
+    data = ss.Study.from_file(tmp_path / "study.toml").run().data["forced_response"]
+    motion = (
+        data.output_displacement.values[0, :, :, 0]
+        + 1j * data.output_displacement.values[0, :, :, 1]
+    )
+    own = amplitudes(motion, (1,), measure)
+    assert data.attrs["amplitude_of"] == measure
+    np.testing.assert_allclose(data.amplitude.values[0], own, rtol=1e-12)
+    assert float(data.peak_amplitude[0]) == pytest.approx(float(own[0]))

@@ -327,7 +327,7 @@ REFUSED = {
     ),
     "no such place": (
         {"alert_over": "contact"},
-        "harmonics.alert_over: must be along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?",
+        "harmonics.alert_over: must be answer, along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?",
     ),
     "no such passages": ({"passages": "triple"}, "harmonics.passages: is not known, got 'triple'."),
 }

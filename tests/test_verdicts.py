@@ -308,7 +308,10 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
     errors = np.array([30.0, 1.0, 6.0, 7.0, 8.0, 1.0])
     (found,) = (v for v in verdicts(response(own_error_percent=errors), [""]) if v.rank)
     assert found.frequency_hz == 13.0
-    assert "by 7 %; the like holds at 4 of 6 points, 10.00 to 14.00 Hz" in found.why
+    assert (
+        "by 7 %; the same is said of 4 of 6 points, 10.00 to 14.00 Hz, the most at 10.00 Hz (30 %)"
+        in found.why
+    )
     (found,) = (
         v for v in verdicts(response(own_error_percent=values(0, 30.0, 1.0)), [""]) if v.rank
     )

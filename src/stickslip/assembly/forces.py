@@ -13,6 +13,8 @@ from stickslip.assembly.load import Load, Output
 from stickslip.assembly.places import AXES, COMPONENTS, Places, Spot
 from stickslip.errors import did_you_mean, input_error
 
+# what says that the error of missing harmonics is that of the answer: all outputs, each as a vector
+ANSWER: tuple[tuple[str, ...], ...] = ((), ("answer",))
 FAR = 0.1  # of a part's size: no mesh is so coarse
 ALONG = 1e-6  # share of a direction below which it has no such component
 
@@ -292,12 +294,12 @@ def _nearest(places: Places, output: Output, key: str) -> IntArray:
 def error_names(
     labels: Labels, contacts: Labels, loads: Mapping[str, Load], over: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Return the labels over which the error of missing harmonics is taken: by default the outputs along the excitation."""
-    if over == ("outputs",):
+    """Return the labels over which the error of missing harmonics is taken: by default all outputs."""
+    if over in (*ANSWER, ("outputs",)):
         return labels.names
     if over == ("contacts",):
         return contacts.names
-    if over and over != ("along",):
+    if over != ("along",):
         return tuple(dict.fromkeys(over))
     axis = _axis_of_excitation(loads)
     along = tuple(name for name in labels.names if axis is not None and name.endswith(f".{axis}"))

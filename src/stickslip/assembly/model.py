@@ -37,6 +37,7 @@ from stickslip.model.structure import Structure, join
 from stickslip.reduction.coupled_stages import Multistage
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
+from stickslip.response.forced.choices import AmplitudeOf
 
 ContactsAs = Literal["static", "stuck", "open"]
 
@@ -51,11 +52,10 @@ class Model:
         By name.
     outputs
         Where motion is reported; none: where harmonic loads act. The first label decides the peak unless `peak_output` names another.
-    peak_output
-        Label ``name.direction`` of the output whose peak is resolved; empty: the first one.
+    peak_output, amplitude_of
+        Label of the output whose peak is resolved, empty: the first one; what an amplitude is: ``first``, ``half_peak_to_peak``, ``rms``.
     alert_over
-        Labels over which the error of missing harmonics is taken, or one of the words ``outputs``, ``contacts``, ``along``; empty:
-        the outputs along the excitation.
+        Labels over which the error of missing harmonics is taken, or ``answer``, ``outputs``, ``contacts``, ``along``; empty: the answer.
     speed
         Of rotation, rad/s.
     tangent, coriolis
@@ -87,6 +87,7 @@ class Model:
     loads: Mapping[str, Load] = field(default_factory=dict)
     outputs: tuple[Output, ...] = ()
     peak_output: str = ""
+    amplitude_of: AmplitudeOf = "first"
     alert_over: tuple[str, ...] = ()
     speed: float = 0.0
     tangent: Literal["consistent", "textbook"] = "consistent"

@@ -9,6 +9,8 @@ from stickslip.arrays import FloatArray, IntArray
 
 _NUMBERED = re.compile(r"dof[1-9]\d*")
 
+ROTATIONS = ("rx", "ry", "rz")  # components that are angles
+
 
 @dataclass(frozen=True, eq=False)
 class Dofs:

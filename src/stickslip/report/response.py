@@ -23,6 +23,7 @@ from stickslip.study.analyses.forced.curve import (
     of_largest_blade,
     peak_output,
 )
+from stickslip.study.analyses.forced.summary import MEASURED
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
@@ -125,7 +126,8 @@ class Response(Node):
     @property
     def quantity(self) -> str:
         """What `response` is called on an axis."""
-        return "amplitude / force" if self.per_force else "amplitude"
+        own = MEASURED.get(str(self.data.attrs.get("amplitude_of", "first")), "amplitude")
+        return f"{own} / force" if self.per_force else own
 
     @cached_property
     def converged(self) -> npt.NDArray[np.bool_]:

@@ -161,7 +161,7 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        return levels_left(self.curve, self.route, self.spent)
+        return levels_left(self.curve, self.route, len(self.branch) + 1, self.spent)
 
     def _spent_up(self) -> bool:
         return self._levels() <= FEWEST < self.curve.levels

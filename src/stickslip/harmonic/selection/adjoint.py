@@ -19,7 +19,7 @@ from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import silent
-from stickslip.harmonic.selection.strategy import FLOOR, NOISE, ErrorMeasure, Solve
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics, rows_among
 from stickslip.model.blas_threads import threads_for
@@ -41,7 +41,7 @@ class Outputs:
     harmonics, dofs
         (k,) what the outputs are.
     motion
-        (k,) complex displacement, m.
+        (k,) what changes are relative to, m: the complex displacement, or with its phase the larger size that the measure has.
     goal
         ``motion``: relative changes are complex; ``amplitude``: only their real parts count.
     """
@@ -65,7 +65,7 @@ class Outputs:
 
 
 def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion") -> Outputs:
-    """Return the outputs of a measure that move enough to have a relative error.
+    """Return the outputs of a measure that have a relative error, with what it is relative to.
 
     Parameters
     ----------
@@ -76,13 +76,12 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
     goal
         What of their changes counts.
     """
-    own = np.array([h for h in measure.harmonics if h < len(before)], dtype=np.int64)
-    motion = before[own[:, None], measure.dofs]
-    size = np.abs(motion)
-    largest = float(np.max(np.abs(before[:, measure.dofs])))
-    floor = np.maximum(FLOOR * size.max(axis=1, initial=0.0, keepdims=True), NOISE * largest)
-    row, column = np.nonzero(size > floor)
-    return Outputs(own[row], measure.dofs[column], motion[row, column], goal)
+    scales = measure.scales(before, len(before))
+    motion = before[scales.harmonics[:, None], measure.dofs]
+    turn = np.exp(1j * np.angle(motion))  # what a change is relative to has the phase of the motion
+    row, column = np.nonzero(scales.size > 0.0)
+    harmonics, dofs = scales.harmonics[row], measure.dofs[column]
+    return Outputs(harmonics, dofs, (scales.size * turn)[row, column], goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +290,7 @@ def _adjoints(
     gradient = np.zeros((high.n_rows, high.linear.n, k), dtype=complex)
     for h in np.unique(outputs.harmonics):
         mine = np.flatnonzero(outputs.harmonics == h)
-        row = high.linear.outputrows_among(omega, int(h), outputs.dofs[mine])
+        row = high.linear.output_rows(omega, int(h), outputs.dofs[mine])
         row *= high.displacement_scale / outputs.motion[mine, None]
         rows = rows_among(high.harmonics, (int(h),))
         gradient[rows[0]][:, mine] = row.T

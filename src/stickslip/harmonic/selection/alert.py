@@ -90,18 +90,19 @@ def jacobian_alert(
     start = perf_counter()
     stuck = events is not None and events.none
     if form == "newton" and stuck and not drives_missing(low, high):
-        return Alert(0.0, 0, measure.harmonics[0], padded, 0.0)
+        return Alert(0.0, 0, 0, padded, 0.0)
     period = high.forces(padded, omega, events)
     seconds = perf_counter() - start
     if form == "newton" and silent(low, high, period):
-        return Alert(0.0, 0, measure.harmonics[0], padded, seconds)
+        return Alert(0.0, 0, 0, padded, seconds)
     at = high.linearise(padded, omega, period)
     right = -at.residual if form == "newton" else _published(high, at.jac, padded, omega)
     change = (solve or solve_array)(at.jac, right)
     if change is None:
-        return Alert(np.inf, 0, measure.harmonics[0], padded, seconds)
+        return Alert(np.inf, 0, 0, padded, seconds)
     before = high.linear.recover(omega, q)
-    moved = high.linear.recover_change(omega, high.coefficients(change)[: len(q)])
+    rows = measure.rows(len(q), high.order + 1)
+    moved = high.linear.recover_change(omega, high.coefficients(change)[:rows])
     error, worst, harmonic = measure.change(before, moved)
     return Alert(error, worst, harmonic, padded + change, seconds)
 

@@ -171,7 +171,8 @@ def _left(size: float, before: float) -> float:
 def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
     """Return the relative change of the measured dofs by a change of the scaled unknowns of `balance`."""
     linear, q = balance.linear, step.balance.coefficients(step.x)
-    moved = linear.recover_change(step.omega, balance.coefficients(change)[: len(q)])
+    rows = step.measure.rows(len(q), balance.order + 1)
+    moved = linear.recover_change(step.omega, balance.coefficients(change)[:rows])
     return step.measure.change(linear.recover(step.omega, q), moved)[0]
 
 

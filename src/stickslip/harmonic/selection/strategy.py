@@ -23,6 +23,7 @@ from stickslip.harmonic.support import ByDof, Harmonics, of_all
 Kept = Literal["low", "high"]
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
+SHARE = 0.01  # of the largest output of its unit: one that moves less is compared with that
 FLOOR = 1e-3  # dofs moving less than this share of the largest have no meaningful relative error
 # the same over all harmonics: below, a static part or a driven harmonic is what the solver left of zero
 NOISE = 1e-6
@@ -30,51 +31,119 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ErrorMeasure:
-    """The largest relative change over some dofs and harmonics (Gastaldi & Berruti 2017, eq. 22, 23 and 29).
+    """The largest relative change over some dofs.
+
+    Of the *answer*, where dofs have units: the change of each dof as a vector of its complex amplitudes, relative to that vector or to 1 % of the largest
+    of its unit, whichever is larger; a dof that stands still beside others is compared with these, and a unit in which nothing moves is left out. *As published*, without units (Gastaldi & Berruti 2017, eq. 22,
+    23 and 29): of each harmonic by itself, and dofs that move less than a thousandth of the largest are left out.
 
     Parameters
     ----------
     dofs
         Dofs of the structure: outputs, contact dofs, chosen directions.
     harmonics
-        Harmonics of which the change is taken: 1; 0 for the static part; those that the excitation drives.
+        Harmonics of which the change is taken: 1; 0 for the static part; those that the excitation drives. None: all but the static part, which
+        only an error of the answer has.
+    units
+        (k,) number of the unit of each dof: lengths apart from rotations. None: as published.
 
     Raises
     ------
     InputError
-        If there are no dofs or no harmonics.
+        If there are no dofs or no harmonics, or all harmonics without units.
     """
 
     dofs: IntArray
-    harmonics: tuple[int, ...] = (1,)
+    harmonics: tuple[int, ...] | None = (1,)
+    units: IntArray | None = None
 
     def __post_init__(self) -> None:
-        if self.dofs.size == 0 or not self.harmonics:
+        none = self.harmonics is None and self.units is None
+        if self.dofs.size == 0 or none or self.harmonics == ():
             raise input_error(
                 "ErrorMeasure",
                 f"has {self.dofs.size} dofs and harmonics {self.harmonics}",
                 "Give dofs of the structure (System.outputs, System.alert_dofs) and one harmonic or more.",
             )
 
+    def rows(self, fewer: int, more: int) -> int:
+        """Return how many rows (harmonics from 0 on) of two motions of so many rows are compared: all that both have, or all where all harmonics count."""
+        return max(fewer, more) if self.harmonics is None else min(fewer, more)
+
     def change(self, before: ComplexArray, moved: ComplexArray) -> tuple[float, int, int]:
-        """Return the largest ``|moved| / |before|`` and the position of its dof and its harmonic.
+        """Return the largest relative change and the position of its dof and its harmonic.
 
         Parameters
         ----------
         before, moved
-            (H+1, n_all) displacement of all dofs and its change, m. In each harmonic, dofs that move less than a thousandth of the
-            largest are left out, and harmonics in which all move less than a millionth of the largest motion.
+            (H+1, n_all) displacement of all dofs and its change, m.
         """
-        own = np.array([h for h in self.harmonics if h < len(before)])
-        size = np.abs(before[own[:, None], self.dofs])
-        gone = np.abs(moved[own[:, None], self.dofs])
-        largest = np.max(np.abs(before[:, self.dofs]))
-        floor = np.maximum(FLOOR * size.max(axis=1, keepdims=True), NOISE * largest)
-        relevant = size > floor
-        error = np.where(relevant, gone / np.where(relevant, size, 1.0), 0.0)
+        scales = self.scales(before, len(moved))
+        gone = np.abs(_rows(moved, scales.harmonics)[:, self.dofs])
+        if self.units is None:
+            error = np.divide(gone, scales.size, out=np.zeros_like(gone), where=scales.size > 0.0)
+        else:
+            whole = np.linalg.norm(gone, axis=0, keepdims=True)
+            # of a vector the harmonic that changes most stands for all
+            whole = np.where(gone == gone.max(axis=0, keepdims=True), whole, 0.0)
+            error = np.divide(whole, scales.size, out=np.zeros_like(gone), where=scales.size > 0.0)
         place = int(np.argmax(error))
         row, column = divmod(place, self.dofs.size)
-        return float(error.reshape(-1)[place]), column, int(own[row])
+        return float(error.reshape(-1)[place]), column, int(scales.harmonics[row])
+
+    def scales(self, before: ComplexArray, rows: int) -> "Scales":
+        """Return what changes of each harmonic and dof are compared with.
+
+        Parameters
+        ----------
+        before
+            (H+1, n_all) displacement of all dofs, m.
+        rows
+            Harmonics from 0 on that the change has.
+        """
+        if self.harmonics is None:
+            own = np.arange(1, max(len(before), rows))
+        else:
+            own = np.array([h for h in self.harmonics if h < len(before)])
+        size = np.abs(_rows(before, own)[:, self.dofs])
+        largest = np.max(np.abs(before[:, self.dofs]))
+        if self.units is None:
+            floor = np.maximum(FLOOR * size.max(axis=1, keepdims=True), NOISE * largest)
+            return Scales(own, np.where(size > floor, size, 0.0))
+        whole = np.linalg.norm(size, axis=0)
+        for unit in np.unique(self.units):
+            same = self.units == unit
+            most = np.max(whole[same])
+            # what the solver left of zero beside a static part, or beside harmonics that do not count, is no motion
+            still = most <= NOISE * np.max(np.abs(before[:, self.dofs[same]]))
+            whole[same] = 0.0 if still else np.maximum(whole[same], SHARE * most)
+        return Scales(own, np.broadcast_to(whole, size.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What changes are compared with.
+
+    Attributes
+    ----------
+    harmonics
+        (k,) harmonics that count.
+    size
+        (k, n_dofs) m; 0 where a change does not count.
+    """
+
+    harmonics: IntArray
+    size: FloatArray
+
+
+def _rows(motion: ComplexArray, harmonics: IntArray) -> ComplexArray:
+    """Return the rows of some harmonics of a motion (H+1, n), zero beyond its own."""
+    known = harmonics[harmonics < len(motion)]
+    if known.size == harmonics.size:
+        return motion[harmonics]
+    out = np.zeros((harmonics.size, motion.shape[1]), dtype=complex)
+    out[: known.size] = motion[known]
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from stickslip.response.forced.problem import ForcedPoint
 
 # relative difference of two vibrations below which a branch has come back to the other
 ALIKE = 0.25
+AUDITS: tuple[Stage, ...] = ("audit", "check", "compared")
 
 
 def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
@@ -35,9 +36,23 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     ]
     in_time = {p.omega: p for p in points if p.stage == "in_time"}
     pairs = [(p if p.converged else in_time.get(p.omega, p), low) for p, low in pairs]
+    settled = {p.omega: p for p in points if p.stage == "settled" and p.converged}
+    pairs = [
+        (settled[p.omega] if p.omega in settled and _fewer(p, settled[p.omega]) else p, low)
+        for p, low in pairs
+    ]
     return pairs + [
         (p, None) for omega, p in best.items() if again.get(omega) is p or not p.converged
     ]
+
+
+def audits_by_frequency(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:
+    """Return the solutions with more harmonics that were made to compare, by frequency, rad/s."""
+    found: dict[float, list[ForcedPoint]] = {}
+    for p in points:
+        if p.stage in AUDITS and p.converged:
+            found.setdefault(p.omega, []).append(p)
+    return found
 
 
 def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:

@@ -175,7 +175,8 @@ class ForcedCurve:
         if chord is None or not float(np.linalg.norm(rest)) <= residual:
             return np.inf
         linear, q = more.linear, step.balance.coefficients(step.x)
-        moved = linear.recover_change(step.omega, more.coefficients(chord)[: len(q)])
+        rows = step.measure.rows(len(q), more.order + 1)
+        moved = linear.recover_change(step.omega, more.coefficients(chord)[:rows])
         return DOUBT * step.measure.change(linear.recover(step.omega, q), moved)[0]
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
@@ -212,9 +213,7 @@ class ForcedCurve:
         self, omega: float, fewer: tuple[int, FloatArray], more: tuple[int, FloatArray]
     ) -> float:
         a, b = (self.problem(level).coefficients(x) for level, x in (fewer, more))
-        rows, linear = min(len(a), len(b)), self.forced.low.linear
-        one, other = (linear.recover(omega, q[:rows]) for q in (a, b))
-        return self.forced.measure.change(one, other - one)[0]
+        return self.forced.difference(omega, a, b)
 
     def stored(self, found: Followed) -> Followed:
         """Return a solution as it comes back from where it was written down."""

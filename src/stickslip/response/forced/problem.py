@@ -11,6 +11,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import padded
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.local import AnyBalance, LocalBalance
 from stickslip.harmonic.selection.strategy import (
@@ -24,7 +25,9 @@ from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, s
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import Judged, following_vibration
+from stickslip.response.forced.amplitude import amplitudes, error_measure
 from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.ill_posed import refuse_ill_posed
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, start_point, step_to
@@ -50,7 +53,8 @@ class ForcedPoint:
         With ``high = "auto"`` the kinds of `stickslip.response.follow.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
         passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
         repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
-        ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time.
+        ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time. ``settled``: with more harmonics, where a prediction alone spoke for a point
+        or against it; of several at a frequency that with most counts. ``compared``: solved with more harmonics, to compare.
     index
         Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
         first repeat that it replaces.
@@ -146,12 +150,18 @@ class ForcedProblem:
         """How harmonics are chosen."""
         return self.sweep.strategy
 
-    @property
+    @cached_property
     def measure(self) -> ErrorMeasure:
         """What an error is taken of."""
-        system, chosen = self.system, self.sweep.error_harmonics
+        system = self.system
         dofs = system.outputs if system.alert_dofs is None else system.alert_dofs
-        return ErrorMeasure(dofs, self.driven if chosen is None else tuple(chosen))
+        return error_measure(system, self.sweep, self.driven, dofs)
+
+    @cached_property
+    def of_outputs(self) -> ErrorMeasure:
+        """The same of the outputs, as positions among them."""
+        outputs = self.system.outputs
+        return error_measure(self.system, self.sweep, self.driven, outputs, np.arange(outputs.size))
 
     @property
     def alert_solve(self) -> Solve:
@@ -251,12 +261,13 @@ class ForcedProblem:
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
-        """Return the largest relative error of a point against another at its frequency (eq. 29), a fraction."""
-        linear = self.low.linear
-        rows = min(len(point.coefficients), len(reference.coefficients))
-        motion, exact = (
-            linear.recover(point.omega, p.coefficients[:rows]) for p in (point, reference)
-        )
+        """Return the largest relative error of a point against another at its frequency (eq. 29 where the measure is the published one), a fraction."""
+        return self.difference(point.omega, point.coefficients, reference.coefficients)
+
+    def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> float:
+        """Return the largest relative difference of two motions (H+1, n_retained) at a frequency, a fraction of the first one."""
+        linear, rows = self.low.linear, self.measure.rows(len(one), len(other))
+        motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
         return self.measure.change(motion, exact - motion)[0]
 
     @cached_property
@@ -272,20 +283,20 @@ class ForcedProblem:
     def amplitude_of(
         self, omega: float, coefficients: ComplexArray, output: int | None = None
     ) -> float:
-        """Return the amplitude of output number `output` over the harmonics that the load drives, m: of several the root of their squares.
+        """Return the amplitude of output number `output`, m, as the sweep measures it.
 
         None: the largest one of those that the system's peak is of.
         """
         motion, system = self.low.linear.recover(omega, coefficients), self.system
         first = np.zeros(1, dtype=np.int64) if system.peak_of is None else system.peak_of
         chosen = first if output is None else np.array([output])
-        rows = motion[list(self.driven)][:, system.outputs[chosen]]
-        return float(np.linalg.norm(rows, axis=0).max())
+        every = amplitudes(motion[:, system.outputs[chosen]], self.driven, self.sweep.amplitude_of)
+        return float(every.max())
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
-    _refuse_ill_posed(system)
+    refuse_ill_posed(system)
     if (
         sweep.auto
         and isinstance(system.structure, TunedWheel | SpeedLine)
@@ -314,25 +325,6 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
     high = low if sweep.auto else low.with_harmonics(reference)
     made = ForcedProblem(system, sweep, low, high)
     return replace(made, high=made.balance(reference)) if sweep.auto else made
-
-
-def _refuse_ill_posed(system: System) -> None:
-    """Refuse a system without unknowns, and masses that are negative."""
-    if not system.retained.size:
-        raise input_error(
-            "System.interface",
-            "touches no dof that can move: nothing is left to solve for",
-            "Let a contact touch a free dof; without contacts the response is linear.",
-        )
-    structure = system.structure.of_harmonic(0)
-    mass = structure.mass.diagonal().real
-    if np.any(mass < 0):
-        dof = int(np.argmin(mass))
-        raise input_error(
-            "System.structure",
-            f"has the mass {mass[dof]:.6g} at {structure.dofs.labels[dof]}",
-            "A mass matrix is positive definite: check its source.",
-        )
 
 
 def with_stiffness(balance: AnyBalance) -> HarmonicBalance:

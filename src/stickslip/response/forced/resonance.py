@@ -1,6 +1,6 @@
 """The resonance peak of a forced response, resolved by a few points, and audited."""
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -27,7 +27,7 @@ PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its freq
 def resolve_peak(
     problem: ForcedProblem,
     accepted: Sequence[ForcedPoint],
-    done: Sequence[ForcedPoint] = (),
+    done: Iterable[ForcedPoint] = (),
 ) -> Iterator[ForcedPoint]:
     """Add points around the highest one until its bracket is narrow; each gets the harmonics that it needs.
 
@@ -46,7 +46,7 @@ def resolve_peak(
         Points not in `done`: ``peak``, of which that with most harmonics counts at its frequency, and ``check``: more harmonics, to compare.
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
-    search = _Search(problem, iter(done))
+    search = _Search(problem, iter(done))  # an iterator is used as far as the peak needs it
     yield from _refined(problem, search, known, problem.sweep.peak_points)
     if not known or not problem.sweep.auto or not problem.sweep.peak_points:
         return

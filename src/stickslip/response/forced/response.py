@@ -15,6 +15,7 @@ from stickslip.response.forced.double_passage import double_passage
 from stickslip.response.forced.from_time import found_in_time
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.resonance import resolve_peak
+from stickslip.response.forced.settled import settle
 from stickslip.response.forced.single_passage import single_passage
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
@@ -30,6 +31,7 @@ __all__ = [
 ]
 
 OF_PEAK = ("peak", "check")
+SETTLED = ("settled", "compared")
 
 
 @by_one_thread
@@ -61,7 +63,7 @@ def forced_response(
         If the static load finds no equilibrium.
     """
     problem = forced_problem(system, load, sweep)
-    solved = [p for p in done if p.stage not in (*OF_PEAK, "in_time")]
+    solved = [p for p in done if p.stage not in (*OF_PEAK, *SETTLED, "in_time")]
     before = tuple(solved)
     if sweep.auto:
         passage = along_the_branch(problem, before)
@@ -79,5 +81,16 @@ def forced_response(
     for point in found_in_time(problem, accepted_points(solved), marched):
         solved.append(point)
         yield point
-    peak = [p for p in done if p.stage in OF_PEAK]
-    yield from resolve_peak(problem, accepted_points(solved), peak)
+    stored = [p for p in done if p.stage in SETTLED]
+    for point in settle(problem, accepted_points(solved), solved, iter(stored)):
+        stored.append(point)
+        yield point
+    solved += stored
+    known = [p for p in done if p.stage in OF_PEAK]
+    peak, left = list(known), iter(known)
+    for point in resolve_peak(problem, accepted_points(solved), left):
+        peak.append(point)
+        yield point
+    last = list(left)  # of an interrupted run, made after the peak was resolved
+    solved += [p for p in peak if not any(p is one for one in last)]
+    yield from settle(problem, accepted_points(solved), solved, iter(last), of_peak=True)

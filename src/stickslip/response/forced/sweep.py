@@ -14,7 +14,15 @@ from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_s
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import Harmonics, harmonics_of, multiples
 from stickslip.response.branch import steps_through
-from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages, Rescue
+from stickslip.response.forced.choices import (
+    PUBLISHED,
+    RUNGS,
+    SELECTION,
+    AmplitudeOf,
+    Passages,
+    RelativeTo,
+    Rescue,
+)
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
@@ -52,6 +60,11 @@ class Sweep:
         take the single one. Not used with ``high = "auto"``.
     error_harmonics
         Harmonics over which the predicted error is taken; None: those that the load drives.
+    relative_to
+        What a predicted error is relative to. ``answer``: of each output the vector of its complex amplitudes, or 1 % of the largest output of its unit if
+        that is more. ``each``: each harmonic of each dof by itself, those that hardly move left out, as published.
+    amplitude_of
+        What the amplitude of an output is: ``first``, of the harmonics that the load drives; ``half_peak_to_peak``; ``rms``, over a period about the mean.
     points
         Smallest number of points of the first passage; more are taken where the response turns.
     frequencies
@@ -81,6 +94,8 @@ class Sweep:
     selection: str | Strategy = SELECTION
     passages: Passages = "double"
     error_harmonics: Sequence[int] | None = None
+    relative_to: RelativeTo = "answer"
+    amplitude_of: AmplitudeOf = "first"
     points: int = 40
     frequencies: int = 0
     at: tuple[float, ...] = ()
@@ -108,6 +123,10 @@ class Sweep:
         _check_steps(self)
         hint = "'double' repeats what needs more harmonics."
         check_choice("Sweep.passages", self.passages, get_args(Passages), hint)
+        hint = "'answer' judges what is reported."
+        check_choice("Sweep.relative_to", self.relative_to, get_args(RelativeTo), hint)
+        hint = "'first' is that of the harmonics that loads drive."
+        check_choice("Sweep.amplitude_of", self.amplitude_of, get_args(AmplitudeOf), hint)
         check_choice("Sweep.rescue", self.rescue, get_args(Rescue), "'off' gives up sooner.")
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")

@@ -158,9 +158,7 @@ class ModeCurve(Curve):
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
         """Foretell by a Newton step with the harmonics towards which motions are judged what these change of frequency and damping ratio; with the most harmonics the difference from fewer counts, too."""
-        if self.levels == 1:
-            return Judged()
-        if level + 1 == self.levels:
+        if level + 1 == self.levels > 1:
             last = self.at_the_cap(level, point)
             return (
                 last

@@ -16,7 +16,7 @@ from stickslip.study.file.section import Positive, Section, custom_error, refuse
 HIGHEST = 200  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
 SAMPLES_A_HARMONIC = 8  # of a period, at least
-PLACES = ("along", "outputs", "contacts")
+PLACES = ("answer", "along", "outputs", "contacts")
 
 Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
 Kept = Harmonic | list[Harmonic]
@@ -63,9 +63,10 @@ class Harmonics(Section):
         False,
         description="solve a frequency again until it has the harmonics that it foretells (for grolet, laxalde, suess_spectral and suess_jacobian)",
     )
-    alert_over: Literal["along", "outputs", "contacts"] | list[str] = Field(
-        "along",
-        description="where the error is taken: along (the outputs' motion along the excitation), outputs (all of it), contacts "
+    alert_over: Literal["answer", "along", "outputs", "contacts"] | list[str] = Field(
+        "answer",
+        description="where the error is taken: answer (every output, as a vector, relative to itself or to 1 % of the largest of its unit); or as "
+        "published, each harmonic and dof by itself: along (the outputs' motion along the excitation), outputs (all of it), contacts "
         '(of the second surfaces at the contact points) or a list of labels such as ["tip1.x", "L1.1.z", "damper.x"]',
     )
     alert_harmonics: list[Annotated[int, Field(ge=0, le=HIGHEST)]] | None = Field(

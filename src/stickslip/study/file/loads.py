@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.study.file.bodies import AXES, Triple
 from stickslip.study.file.section import (
     FilePath,
@@ -180,6 +181,12 @@ class Output(Section):
         "",
         max_length=100,
         description="label whose peak is resolved, such as tip.x; left out: the first",
+    )
+
+    measure: AmplitudeOf = Field(
+        "first",
+        description="what the amplitude of an output is: first (of the harmonic that loads drive, the norm over several), half_peak_to_peak, or rms (over "
+        "a period, about the mean); for the forced response and run-ups",
     )
 
     @field_validator("points")

@@ -63,6 +63,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
         loads={name: _load(tables, parts, table, home) for name, table in tables.load.items()},
         outputs=_outputs(tables, parts),
         peak_output=tables.output.peak,
+        amplitude_of=tables.output.measure,
         alert_over=_alert_over(tables),
         speed=RPM * rotation.speed_rpm,
         tangent=rotation.tangent,

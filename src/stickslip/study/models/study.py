@@ -229,7 +229,8 @@ def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
     for name, content in fields.items():
         loads[name].append(content)
     static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}
-    output = tables.output.model_dump(mode="json", exclude={"folder"})
+    usual = {"measure"} if tables.output.measure == "first" else set()
+    output = tables.output.model_dump(mode="json", exclude={"folder", *usual})
     driven = [own, parts, loads, output, tables.harmonics.alert_over]
     return _hash(driven), _hash([own, parts, static])
 

@@ -32,6 +32,8 @@ class Check:
         Whether the integration became periodic.
     periods
         Periods integrated.
+    outputs_percent
+        Largest difference of an output, as the vector of its driven harmonics with their phases, by the measure of errors; NaN where it was not taken.
     scatter
         Largest distance of a period's harmonics from that average, relative to it; over all outputs.
     drifting
@@ -65,6 +67,7 @@ class Check:
     refined: float = float("nan")
     motion: Motion | Literal[""] = ""
     shows_after: int = 0
+    outputs_percent: float = float("nan")
 
     @property
     def difference_percent(self) -> float:
@@ -83,7 +86,15 @@ class Check:
         return (
             f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
             f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.3g} %; "
-            f"{self._motion}{self._step}{self._verdict}{self._became}"
+            f"{self._outputs}{self._motion}{self._step}{self._verdict}{self._became}"
+        )
+
+    @property
+    def _outputs(self) -> str:
+        known = self.outputs_percent > LARGE
+        return (
+            f"largest difference of an output, with its phase, {self.outputs_percent:.2g} %; "
+            * known
         )
 
     @property

@@ -10,6 +10,7 @@ import xarray as xr
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.harmonic.support import named
+from stickslip.response.forced.amplitude import amplitudes
 from stickslip.study.analyses.forced.jumps import stored_energy
 from stickslip.study.analyses.forced.question import RIGID
 
@@ -310,8 +311,36 @@ class Curve:
 
     @cached_property
     def attained(self) -> BoolArray:
-        """(n,) whether a time integration settled to the same amplitude."""
-        return np.array([abs(off) <= ATTAINED for off in self.integrated], dtype=bool)
+        """(n,) whether a time integration settled to the same amplitude, and to the same outputs within the error that is tolerated."""
+        near = [abs(off) <= ATTAINED for off in self.integrated]
+        return np.array(near, dtype=bool) & ~(self.outputs_off > self.limit)
+
+    @cached_property
+    def left_out(self) -> tuple[int, float, float] | None:
+        """Of the peak the largest harmonic that its amplitude leaves out, the mean apart, its share of half of peak to peak, and that, m; None where none is."""
+        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has(
+            "output_displacement"
+        ):
+            return None
+        parts = self.data["output_displacement"].values[self.at[self.peak]]
+        column = peak_output(self.data, self.case)
+        motion = parts[:, column, 0] + 1j * parts[:, column, 1]
+        driven = [int(h) for h in np.atleast_1d(self.data.attrs.get("driven_harmonics", [1]))]
+        rest = np.abs(motion)
+        rest[[0, *(h for h in driven if h < rest.size)]] = 0.0
+        whole = float(amplitudes(motion[:, None], (), "half_peak_to_peak")[0])
+        if not whole > 0.0:
+            return None
+        return int(rest.argmax()), float(rest.max()) / whole, whole
+
+    @cached_property
+    def outputs_off(self) -> FloatArray:
+        """(n,) largest difference of an output from a time integration that attains the motion, with its phase, a fraction; NaN where none was taken."""
+        found = np.full(self.at.size, np.nan)
+        for point, said in self.examined("verify_difference_percent"):
+            if motion_of(said) == "attained":
+                found[point] = float(said.get("verify_outputs_percent", np.nan)) / 100
+        return found
 
     @cached_property
     def integrated(self) -> FloatArray:

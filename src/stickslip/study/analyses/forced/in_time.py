@@ -10,6 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.system import System
 from stickslip.response.time.sectors import all_sectors, sectors_in_time
@@ -35,6 +36,7 @@ RINGS = 1e-3  # scatter of a motion that repeats but for what goes on ringing
 DECAYS, GROWS = 0.5, 1.1  # change of the last third of an integration over that of the third before
 MOST_TOLD = 10**6  # periods
 GOLDEN = 2.399963  # rad, of which no few multiples are alike
+WHOLE = 41  # harmonics of an integration where amplitudes are of the whole motion
 REPORTED = 7  # harmonics of an integration, or those that the load drives
 FLOPS = 4e9  # a second, of a march
 MOST_STEPS = (
@@ -88,7 +90,7 @@ def check_in_time(
         better = refined(question, point, check.refined_order)
         if better is not None:
             balances.append(_of_balance(question, response, better))
-            check = replace(check, refined=float(np.linalg.norm(balances[1])))
+            check = replace(check, refined=_amplitude(question, response, better))
     motion = _motion(check, found, min(_apart(one, known) for one in balances))
     return replace(check, motion=motion, shows_after=after)
 
@@ -137,6 +139,16 @@ def _of_balance(question: Question, response: Response, point: ForcedPoint) -> C
     return _driven(question, motion[:, question.problem.system.outputs[response.output]])
 
 
+def _amplitude(question: Question, response: Response, point: ForcedPoint) -> float:
+    return question.problem.amplitude(point, response.output)
+
+
+def _size(question: Question, harmonics: ComplexArray) -> float:
+    """Return the amplitude of an output from its harmonics, m."""
+    of = question.sweep.amplitude_of
+    return float(amplitudes(harmonics[:, None], question.driven, of)[0])
+
+
 def _driven(question: Question, harmonics: ComplexArray) -> ComplexArray:
     """Return of the harmonics of an output those that the load drives: amplitudes are their norm."""
     return np.array([harmonics[h] if h < len(harmonics) else 0.0 for h in question.driven])
@@ -151,18 +163,31 @@ def _compared(
     question: Question, response: Response, point: ForcedPoint, found: TransientResult, steps: int
 ) -> Check:
     """Return the comparison with an integration."""
-    known = _known(found)[:, response.output]
+    every = _known(found)
+    known = every[:, response.output]
+    motion = question.problem.low.linear.recover(point.omega, point.coefficients)
+    outputs = motion[:, question.problem.system.outputs]
     return Check(
         frequency_hz=point.omega / HZ,
-        balance=float(np.linalg.norm(_of_balance(question, response, point))),
-        transient=float(np.linalg.norm(_driven(question, known))),
+        balance=_amplitude(question, response, point),
+        transient=_size(question, known),
         settled=bool(found.settled),
         periods=int(found.periods),
         scatter=float(found.scatter),
         drifting=listed(found.drifting),
         order=point.order,
         steps=steps,
+        outputs_percent=100 * _of_outputs(question.problem, every, outputs),
     )
+
+
+def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray) -> float:
+    """Return the largest relative difference of outputs (H+1, n_outputs) from those of an integration, by the measure of errors, a fraction."""
+    if not np.all(np.isfinite(true)):
+        return float("nan")
+    rows = min(len(true), len(found))
+    measure = problem.of_outputs
+    return measure.change(true[:rows], found[:rows] - true[:rows])[0]
 
 
 def _with_steps_enough(
@@ -248,7 +273,9 @@ def integrated(
             steps_per_period=steps,
             max_periods=periods,
             min_periods=least,
-            harmonics=max(REPORTED, *load.harmonics),
+            harmonics=max(
+                REPORTED if problem.sweep.amplitude_of == "first" else WHOLE, *load.harmonics
+            ),
         ),
         weights=contacts.weights,
     )

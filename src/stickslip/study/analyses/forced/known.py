@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from stickslip.model.dofs import ROTATIONS
 from stickslip.response.free_motion import drift
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
 
-ROTATIONS = ("rx", "ry", "rz")
 COULOMB = (
     "elastic_coulomb",
     "coupled_coulomb",
@@ -35,7 +35,11 @@ def known(
     """
     return (
         *(doubt(text) for text in question.model.warnings),
-        *mixed_places(question.model.error_labels),
+        *(
+            mixed_places(question.model.error_labels)
+            if question.sweep.relative_to == "each"
+            else ()
+        ),
         *nothing_pressed(question),
         *off_engine_order(question),
         *_of_drift(question, response),

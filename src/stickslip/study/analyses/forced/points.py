@@ -8,6 +8,9 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.judging import judging_set
 from stickslip.harmonic.support import Harmonics
+from stickslip.response.forced.accepted import audits_by_frequency
+from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
 from stickslip.response.verification import own_error
@@ -33,6 +36,8 @@ class Accepted:
         Difference between both, a fraction; NaN unless the point repeats the first one.
     driven
         Harmonics that the load drives: those of its amplitudes.
+    amplitude_of
+        What an amplitude is, as of a `Sweep`.
     own_error
         Bound of its own error, a fraction: 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
     audit_error
@@ -45,6 +50,7 @@ class Accepted:
     low_fields: Fields | None
     real_error: float
     driven: Harmonics = (1,)
+    amplitude_of: AmplitudeOf = "first"
     own_error: float = float("nan")
     audit_error: float = float("nan")
 
@@ -59,8 +65,8 @@ class Accepted:
         return (self.low or self.point).predicted_error
 
     def amplitudes(self, n_outputs: int) -> FloatArray:
-        """Return the (n_outputs,) amplitudes, m: norms over the driven harmonics; NaN where the point did not converge."""
-        return _amplitudes(self.fields, n_outputs, self.driven)
+        """Return the (n_outputs,) amplitudes, m; NaN where the point did not converge."""
+        return _amplitudes(self.fields, n_outputs, self.driven, self.amplitude_of)
 
     def driven_amplitudes(self, n_outputs: int) -> FloatArray:
         """Return the (driven, n_outputs) amplitudes of each driven harmonic, m; NaN where the point did not converge."""
@@ -71,7 +77,8 @@ class Accepted:
     def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
         """Return the same of the first solution, NaN where that had other harmonics than these."""
         known = self.low is not None and self.low.support == harmonics
-        return _amplitudes(self.low_fields if known else None, n_outputs, self.driven)
+        first = self.low_fields if known else None
+        return _amplitudes(first, n_outputs, self.driven, self.amplitude_of)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,17 +176,20 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     output
         Position of the output whose peak counts; of the largest of several, where the system says so.
     """
-    audits = _audits(points)
+    audits = audits_by_frequency(points)
     accepted = []
     for point, low in accepted_pairs(points):
         own = _own_error(problem, point)
         audit = _audit_error(problem, point, audits.get(point.omega, []))
         made = _accept(problem, point, low)
-        accepted.append(replace(made, driven=problem.driven, own_error=own, audit_error=audit))
-    of = problem.system.peak_of
-    if of is not None and any(a.fields for a in accepted):
-        sizes = np.array([a.amplitudes(problem.system.outputs.size)[of] for a in accepted])
-        output = int(of[np.argmax(np.nanmax(sizes, axis=0))])
+        of = problem.sweep.amplitude_of
+        accepted.append(
+            replace(made, driven=problem.driven, amplitude_of=of, own_error=own, audit_error=audit)
+        )
+    some = problem.system.peak_of
+    if some is not None and any(a.fields for a in accepted):
+        sizes = np.array([a.amplitudes(problem.system.outputs.size)[some] for a in accepted])
+        output = int(some[np.argmax(np.nanmax(sizes, axis=0))])
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
     return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)
@@ -218,15 +228,6 @@ def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     return own_error(problem, point)
 
 
-def _audits(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:
-    """Return the solutions with more harmonics that were made to compare, by frequency."""
-    found: dict[float, list[ForcedPoint]] = {}
-    for p in points:
-        if p.stage in ("audit", "check") and p.converged:
-            found.setdefault(p.omega, []).append(p)
-    return found
-
-
 def _audit_error(
     problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]
 ) -> float:
@@ -248,8 +249,9 @@ def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None)
     return Accepted(point, low, found, fields(problem, low), error)
 
 
-def _amplitudes(found: Fields | None, n_outputs: int, driven: Harmonics) -> FloatArray:
+def _amplitudes(
+    found: Fields | None, n_outputs: int, driven: Harmonics, of: AmplitudeOf
+) -> FloatArray:
     if found is None:
         return np.full(n_outputs, np.nan)
-    own = found.outputs[list(driven), :n_outputs]
-    return np.asarray(np.linalg.norm(own, axis=0))
+    return amplitudes(found.outputs[:, :n_outputs], driven, of)

@@ -88,7 +88,7 @@ _OF = {
         "harmonic_kept": ("1", "1 if the solution keeps the harmonic"),
     },
     "point output": {
-        "amplitude": ("m", "amplitude of the harmonic that the load drives (attribute driven_harmonics), the norm over several"),
+        "amplitude": ("m", "amplitude as the attribute amplitude_of says: of the harmonics that loads drive (driven_harmonics), half of peak to peak, or rms"),
         "amplitude_low": ("m", "the same with the harmonics of the first passage"),
     },
     "point driven output": {
@@ -158,11 +158,12 @@ _OF = {
     "check": {
         "verify_case": ("1", "case"),
         "verify_frequency_hz": ("Hz", "frequency"),
-        "verify_transient": ("m", "first-harmonic amplitude by time integration"),
-        "verify_balance": ("m", "first-harmonic amplitude by harmonic balance"),
+        "verify_transient": ("m", "amplitude by time integration"),
+        "verify_balance": ("m", "amplitude by harmonic balance"),
         "verify_difference_percent": ("percent", "their difference"),
         "verify_settled": ("1", "1 if it became periodic"),
         "verify_periods": ("1", "periods integrated"),
+        "verify_outputs_percent": ("percent", "largest difference of an output, with its phase, by the measure of errors"),
         "verify_scatter": ("1", "scatter about the average of a motion that did not become periodic"),
         "verify_motion": ("1", "attained, left, not periodic or not settled: what the motion in time did that began with the balance's state"),
         "verify_refined": ("m", "amplitude by harmonic balance with three times the harmonics"),

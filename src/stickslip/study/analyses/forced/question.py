@@ -26,7 +26,7 @@ from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
 from stickslip.study.analyses.forced.examination import examines_every_wave
-from stickslip.study.analyses.forced.sweeps import sweep_of
+from stickslip.study.analyses.forced.sweeps import measured, sweep_of
 from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM
 
@@ -175,6 +175,7 @@ def question_of(case: Case, model: Model) -> Question:
     sweep = within_limits(
         model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits
     )
+    sweep = measured(sweep, model)
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
         refuse_whole("--verify", model, "run without --verify")

@@ -48,6 +48,8 @@ class Finding:
         Positions of its points within the case; none: the case as a whole.
     size
         Of several findings of a rule the largest stands for all.
+    value
+        Its size as text, where a sentence about several points tells the largest.
     """
 
     level: Level
@@ -55,6 +57,7 @@ class Finding:
     remedy: str
     points: tuple[int, ...] = ()
     size: float = 0.0
+    value: str = ""
 
 
 Rule = Callable[[Curve], Iterator[Finding]]
@@ -91,7 +94,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
             remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
-            yield Finding("doubtful", why, remedy, (int(i),), float(own))
+            yield Finding("doubtful", why, remedy, (int(i),), float(own), error_text(own))
         elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
@@ -141,7 +144,8 @@ def audited(case: Curve) -> Iterator[Finding]:
         if not case.attained[i]:
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
             remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
-            yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]))
+            told = error_text(case.audit[i])
+            yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]), told)
 
 
 def not_audited(case: Curve) -> Iterator[Finding]:
@@ -171,7 +175,8 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
                 f"{error_text(case.reference[i])}"
             )
             remedy = f"{_more(case, int(i))}."
-            yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]))
+            told = error_text(case.reference[i])
+            yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]), told)
 
 
 def on_other_motions(case: Curve) -> Iterator[Finding]:
@@ -283,6 +288,25 @@ def in_time(case: Curve) -> Iterator[Finding]:
             why = f"time integration and harmonic balance differ by {off:+.3g} %, more than {ATTAINED:g} %"
             remedy = f"{_more(case, point)}; the table of checks says which of the two is wrong."
             yield Finding("doubtful", why, remedy, (point,), abs(off))
+        elif case.outputs_off[point] > case.limit:
+            why = f"time integration and harmonic balance differ by {error_text(case.outputs_off[point])} in an output, phase included"
+            remedy = f"{_more(case, point)}; believe the time integration."
+            yield Finding("doubtful", why, remedy, (point,), float(case.outputs_off[point]))
+
+
+def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
+    """Tell of harmonics at the peak that the amplitude does not hold, where they count in its extreme value."""
+    if case.peak < 0 or case.left_out is None:
+        return
+    harmonic, share, whole = case.left_out
+    if share > case.limit:
+        own = case.amplitude[case.peak]
+        why = (
+            f"half of peak to peak is {1e3 * whole:.4g} mm at {case.output}, {100 * (whole / own - 1):+.2g} % from the amplitude that is told: "
+            f"harmonic {harmonic}, which that leaves out, holds {error_text(share)}"
+        )
+        remedy = 'output.measure = "half_peak_to_peak" tells extreme values.'
+        yield Finding("trusted", why, remedy, (case.peak,))
 
 
 def not_periodic(case: Curve) -> Iterator[Finding]:
@@ -364,6 +388,7 @@ RULES: tuple[Rule, ...] = (
     twice_the_harmonics,
     not_audited,
     on_other_motions,
+    beside_the_amplitude,
     folds,
     at_the_end,
     retention,

@@ -58,8 +58,13 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     return tuple(table for table in found if table.rows or table.lines)
 
 
+MEASURED = {"half_peak_to_peak": "half of peak to peak", "rms": "root mean square"}
+
+
 def amplitude_name(data: xr.Dataset) -> str:
-    """Return of which harmonics amplitudes are: those that the load drives."""
+    """Return what amplitudes are: of the harmonics that the load drives, unless the study measures otherwise."""
+    if (told := MEASURED.get(str(data.attrs.get("amplitude_of", "first")))) is not None:
+        return told
     driven = [int(h) for h in np.atleast_1d(data.attrs.get("driven_harmonics", [1]))]
     orders = several_orders(data)
     if orders:

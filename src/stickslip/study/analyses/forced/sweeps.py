@@ -5,8 +5,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+from stickslip.assembly.forces import ANSWER
+from stickslip.assembly.model import Model
 from stickslip.errors import input_error
-from stickslip.response.forced.choices import RUNGS
+from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import Sweep
 from stickslip.study.analyses.forced.section import ForcedResponse
 from stickslip.study.file.harmonics import HIGHEST
@@ -73,6 +75,12 @@ def sweep_through(
         points=table.points,
         peak_points=table.peak_points,
     )
+
+
+def measured(sweep: Sweep, model: Model) -> Sweep:
+    """Return a sweep with the amplitudes that a model asks for, whose errors are those of the answer, or as published where the model names places over which they are taken."""
+    relative_to: RelativeTo = "answer" if model.alert_over in ANSWER else "each"
+    return replace(sweep, amplitude_of=model.amplitude_of, relative_to=relative_to)
 
 
 def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, float]:

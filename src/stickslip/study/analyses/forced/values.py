@@ -58,6 +58,7 @@ def _attributes(question: Question, output: int) -> Values:
         "samples": sweep.samples,
         "evaluator": sweep.evaluator,
         "report_output": model.output_labels[output],
+        "amplitude_of": sweep.amplitude_of,
         "sectors": model.sectors,
         "driven_harmonics": list(question.driven),
         "direction": sweep.direction,
@@ -90,7 +91,15 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
 
 def of_checks(checks: Sequence[Check]) -> Values:
     """Return comparisons with time integration."""
-    real = ("frequency_hz", "transient", "balance", "difference_percent", "scatter", "refined")
+    real = (
+        "frequency_hz",
+        "transient",
+        "balance",
+        "difference_percent",
+        "outputs_percent",
+        "scatter",
+        "refined",
+    )
     columns = {f"verify_{name}": np.array([getattr(c, name) for c in checks]) for name in real}
     return columns | {
         "verify_settled": _whole(int(c.settled) for c in checks),

@@ -56,7 +56,7 @@ class Judged:
             if group:
                 first = max(group, key=self._weight)
                 at = self.case.peak if self.case.peak in first.points else first.points[0]
-                why = first.why + (self._others(group) if len(group) > 1 else "")
+                why = first.why + (self._others(group, first) if len(group) > 1 else "")
                 yield Verdict(level, self.label, float(self.case.hz[at]), why, first.remedy)
 
     def _weight(self, found: Finding) -> tuple[bool, float, float]:
@@ -64,10 +64,15 @@ class Judged:
         apart = np.abs(self.case.hz[list(found.points)] - self.case.peak_hz).min()
         return self.case.peak in found.points, found.size, -float(np.nan_to_num(apart))
 
-    def _others(self, group: Sequence[Finding]) -> str:
+    def _others(self, group: Sequence[Finding], first: Finding) -> str:
+        """Say at how many points the same was found, and the largest value with its own frequency."""
         hz = self.case.hz[sorted({i for f in group for i in f.points})]
         count = f"{hz.size} of {self.case.hz.size} points"
-        return f"; the like holds at {count}, {hz.min():.2f} to {hz.max():.2f} Hz"
+        most = max(group, key=lambda f: f.size)
+        told = ""
+        if most.value and most is not first:
+            told = f", the most at {self.case.hz[most.points[0]]:.2f} Hz ({most.value})"
+        return f"; the same is said of {count}, {hz.min():.2f} to {hz.max():.2f} Hz{told}"
 
 
 def _examined(case: Curve) -> str:

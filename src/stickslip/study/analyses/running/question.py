@@ -24,6 +24,7 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
 from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.forced.sweeps import measured
 from stickslip.study.analyses.running.sweeps import sweep_along
 from stickslip.study.analyses.running.table import RunUpTable
 from stickslip.study.analyses.verdict import said
@@ -170,6 +171,7 @@ def question_of(case: Case, model: Model) -> Question:
             )
         turning = model if table.engine_orders is None else with_engine_order(model, order)
         sweep = sweep_along(settings, order, turning.driven.values())
+        sweep = measured(sweep, turning)
         sweep = within_limits(turning, sweep, settings.limits)
         check_limits(settings.limits, estimate(turning, sweep))
         harmonics, tolerance = sweep.high_harmonics[-1], table.tolerance

@@ -73,7 +73,7 @@ ABOUT = {
 PLAIN = {
     "level": "level", "answer": "answer", "why": "why", "peak_amplitude": "peak", "foreign": "foreign", "others_in_output": "output",
     "others_in_gaps": "gaps", "next_frequency": "distance", "overlap": "overlap", "growth": "growth", "higher_harmonics": "harmonics",
-    "resolved": "resolved", "detached": "detached", "seconds": "seconds",
+    "resolved": "resolved", "by_harmonics": "changed", "detached": "detached", "seconds": "seconds",
 }  # fmt: skip
 
 

@@ -1,0 +1,69 @@
+"""What the amplitude of a response is, and what its error is taken of."""
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.selection.strategy import ErrorMeasure
+from stickslip.harmonic.support import Harmonics
+from stickslip.model.dofs import ROTATIONS
+from stickslip.response.forced.choices import AmplitudeOf
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.system import System
+
+SAMPLES_A_HARMONIC = (
+    16  # of a period, from the highest of which Newton's method goes on to the extreme
+)
+REFINED = 4  # of its steps
+
+
+def amplitudes(motion: ComplexArray, driven: Harmonics, of: AmplitudeOf) -> FloatArray:
+    """Return the (k,) amplitudes of k displacements.
+
+    Parameters
+    ----------
+    motion
+        (H+1, k) complex coefficients, m.
+    driven
+        Harmonics that the load drives.
+    of
+        ``first``: of these harmonics, the norm over several. ``half_peak_to_peak``: half the distance from the least to the largest displacement in a
+        period. ``rms``: root mean square about the mean.
+    """
+    if of == "first":
+        rows = [h for h in driven if h < len(motion)]
+        return np.asarray(np.linalg.norm(motion[rows], axis=0))
+    if of == "rms":
+        return np.asarray(np.sqrt(0.5) * np.linalg.norm(motion[1:], axis=0))
+    return np.asarray(0.5 * (extremes(motion) + extremes(-motion)))
+
+
+def extremes(motion: ComplexArray) -> FloatArray:
+    """Return the (k,) largest displacements in a period about the mean, m, of complex coefficients (H+1, k)."""
+    h = np.arange(1, len(motion))[:, None]
+    count = SAMPLES_A_HARMONIC * max(len(motion) - 1, 1)
+    angles = 2 * np.pi * np.arange(count) / count
+    signal = np.real(np.exp(1j * np.outer(angles, h)) @ motion[1:])
+    at = angles[np.argmax(signal, axis=0)]
+    for _ in range(REFINED):
+        turned = motion[1:] * np.exp(1j * h * at)
+        slope, bend = (np.sum((1j * h) ** d * turned, axis=0).real for d in (1, 2))
+        step = np.divide(slope, bend, out=np.zeros_like(slope), where=bend < 0.0)
+        at = at - np.clip(step, -0.5 * angles[1], 0.5 * angles[1])
+    found = np.sum(motion[1:] * np.exp(1j * h * at), axis=0).real
+    return np.asarray(np.maximum(found, signal.max(axis=0)))
+
+
+def error_measure(
+    system: System, sweep: Sweep, driven: Harmonics, dofs: IntArray, places: IntArray | None = None
+) -> ErrorMeasure:
+    """Return what an error of `dofs` is taken of; `places`: where these stand among what is compared, if that is not all dofs.
+
+    Where the amplitude is more than the driven harmonics, all that vibrate count.
+    """
+    at = dofs if places is None else places
+    chosen = driven if sweep.error_harmonics is None else tuple(sweep.error_harmonics)
+    if sweep.relative_to == "each":
+        return ErrorMeasure(at, chosen)
+    every = sweep.error_harmonics is None and sweep.amplitude_of != "first"
+    turns = np.isin(np.array(system.structure.dofs.component)[dofs], ROTATIONS)
+    return ErrorMeasure(at, None if every else chosen, turns.astype(np.int64))

@@ -1,0 +1,141 @@
+"""Doubts that more work settles: points whose errors are predicted alone are solved with more harmonics and compared, until two levels agree.
+
+What a prediction says of a point, and not how many others were asked for, decides whether it is solved again, and each point has its own budget.
+"""
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.response.forced.accepted import audits_by_frequency
+from stickslip.response.forced.along import AGREE, NEAR, SAFETY
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
+from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.newton_method import Solution, newton
+
+SOLUTIONS = 10  # of a point at most
+# share of the threshold above which a prediction that nothing has confirmed is not believed
+BELIEVED = 0.5
+CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
+BESIDE = 2  # neighbours on either side from which a motion with more harmonics is looked for
+
+Taken = Generator[ForcedPoint, None, ForcedPoint]
+
+
+def settle(
+    problem: ForcedProblem,
+    accepted: Sequence[ForcedPoint],
+    solved: Sequence[ForcedPoint],
+    stored: Iterator[ForcedPoint],
+    *,
+    of_peak: bool = False,
+) -> Iterator[ForcedPoint]:
+    """Solve points that predictions alone stand for, or speak against, with more harmonics until two levels agree.
+
+    Parameters
+    ----------
+    problem
+        The forced response, whose harmonics are raised along the branch.
+    accepted
+        Points of the response in the order of the branch.
+    solved
+        All that was solved, audits among it.
+    stored
+        What an interrupted run has yielded, in its order.
+    of_peak
+        Whether the points that resolve the peak are meant, or all others.
+
+    Yields
+    ------
+    ForcedPoint
+        Points not in `stored`: ``settled`` (of a peak ``peak``), which takes the place of what it has more harmonics than; ``compared`` (``check``), to compare.
+    """
+    if not problem.sweep.auto:
+        return
+    stages: tuple[Stage, Stage] = ("peak", "check") if of_peak else ("settled", "compared")
+    settling = _Settling(problem, list(accepted), stored, stages)
+    audits = audits_by_frequency(solved)
+    for place, point in enumerate(accepted):
+        mine = point.converged and (point.stage == "peak") == of_peak
+        if mine and _open(problem, point, audits.get(point.omega, [])):
+            yield from settling.settle(place)
+
+
+def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
+    """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
+    bound, limit = point.predicted_error, problem.strategy.threshold
+    if bound == 0.0:
+        return False
+    most = max(audits, key=lambda p: p.harmonics.size, default=point)
+    if most.harmonics.size > point.harmonics.size:
+        return problem.real_error(point, most) > limit
+    return not bound <= BELIEVED * limit
+
+
+@dataclass(slots=True, eq=False)
+class _Settling:
+    problem: ForcedProblem
+    known: list[ForcedPoint]
+    stored: Iterator[ForcedPoint]
+    stages: tuple[Stage, Stage]
+
+    def settle(self, place: int) -> Iterator[ForcedPoint]:
+        """Raise the harmonics of a point until the motion stays, a solution after the other."""
+        problem, spent = self.problem, 0
+        limit = AGREE * problem.strategy.threshold
+        for support in problem.sweep.supports:
+            here = self.known[place]
+            if len(support) <= here.harmonics.size or not set(here.support) <= set(support):
+                continue
+            balance, change = problem.balance(support), np.inf
+            more: ForcedPoint | None = None
+            for make in self._ways(place, balance):
+                if spent == SOLUTIONS:
+                    return
+                spent += 1
+                found = yield from self._take(make)
+                off = problem.real_error(here, found) if found.converged else np.inf
+                if off < change:
+                    more, change = found, off
+                if change <= NEAR:
+                    break
+            if more is None or change <= limit:
+                return
+            last = support == problem.sweep.supports[-1]
+            bound = CAP_SAFETY * change if last else np.nan
+            self.known[place] = yield from self._take(lambda p=more, b=bound: self._raised(p, b))  # type: ignore[misc]
+
+    def _ways(self, place: int, balance: Balance) -> Iterator[Callable[[], ForcedPoint]]:
+        """Yield ways to the motion with more harmonics: from that with fewer, then from neighbours that have as many."""
+        here = self.known[place]
+        yield lambda: self._solved(balance, here, here)
+        near = [place + side * d for d in range(1, BESIDE + 1) for side in (-1, 1)]
+        for i in near:
+            other = self.known[i] if 0 <= i < len(self.known) else here
+            if other.converged and set(balance.harmonics) <= set(other.support):
+                yield lambda p=other: self._solved(balance, p, here)  # type: ignore[misc]
+
+    def _solved(self, balance: Balance, start: ForcedPoint, here: ForcedPoint) -> ForcedPoint:
+        x, options = balance.unknowns(start.coefficients), self.problem.sweep.newton
+        found: Solution = newton(
+            lambda v: balance.linearise(v, here.omega), x, options, NaturalLevel()
+        )
+        return forced_point(balance, found, self.stages[1], here.index, here.omega, 0.0)
+
+    def _raised(self, more: ForcedPoint, bound: float) -> ForcedPoint:
+        """Return a solution that was to compare as one that stands for its frequency; with the most harmonics the change from fewer bounds its error."""
+        return replace(
+            more, stage=self.stages[0], predicted_error=bound, iterations=0, seconds_contact=0.0, seconds_linear=0.0
+        )  # fmt: skip
+
+    def _take(self, make: Callable[[], ForcedPoint]) -> Taken:
+        known = next(self.stored, None)
+        if known is None:
+            began = perf_counter()
+            made = make()
+            known = replace(made, seconds_total=perf_counter() - began)
+            yield known
+        return known
