@@ -26,6 +26,7 @@ from stickslip.model import (
     read_ansys_results,
 )
 from stickslip.model.fe.elements import Quadrature
+from stickslip.model.readers.ansys_archive import ansys_passed_over
 from stickslip.model.readers.ansys_nodes import read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_records import Records
 from stickslip.model.readers.units import Units
@@ -636,3 +637,20 @@ def test_options_that_make_a_brick_another_are_refused(tmp_path, line, message):
 def test_options_that_change_nothing_are_passed_over(tmp_path, line):
     (tmp_path / "cube.cdb").write_text(f"{cube()}\n{line}\n")
     assert len(read_ansys_archive(tmp_path / "cube.cdb").cells) == 1
+
+
+def test_what_an_archive_says_and_a_study_has_to_say_is_told(tmp_path):
+    path = tmp_path / "cube.cdb"
+    path.write_text(cube() + "\nD,10,UX,0\nD,10,UY,0\nDMPRAT, 0.\nBETAD, 1e-6\nTB,BISO,1\n")
+    lines = path.read_text().splitlines()
+    supports, damping = ansys_passed_over(path)
+    assert (
+        supports
+        == f"2 commands D (from line {lines.index('D,10,UX,0') + 1} on), supports: name sets of nodes that are clamped"
+    )
+    assert damping.startswith("1 commands BETAD (from line ")
+    path.write_text(cube() + "\nTB,ANEL,3\n")
+    with pytest.raises(InputError, match=r"line \d+: gives a material by a table \(TB,ANEL\)"):
+        ansys_passed_over(path)
+    path.write_text(cube())
+    assert ansys_passed_over(path) == ()

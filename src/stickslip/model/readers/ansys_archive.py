@@ -9,11 +9,14 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
+    BEHAVIOUR,
     CONSTRAINTS,
     CUT_SHORT,
+    DAMPING,
     NUMBER,
     OPTIONS,
     ROTATIONS,
+    SUPPORTS,
     TYPE,
     WRITE,
     Blocks,
@@ -42,6 +45,10 @@ WHAT_OPTIONS = {
     (186, 6): "a pressure of its own",
     (187, 6): "a pressure of its own",
 }
+# tables of what a material does beyond small vibration: plasticity, creep, and friction of contacts
+BEYOND_VIBRATION = {
+    "PLAS", "BISO", "BKIN", "MISO", "MKIN", "KINH", "NLIS", "CHAB", "CREE", "RATE", "FRIC", "CZM", "FAIL", "FCLI",
+}  # fmt: skip
 WITHOUT_STIFFNESS = {
     154,
     200,
@@ -140,6 +147,39 @@ def read_ansys_materials(
             check_material(material.density, material.young_modulus, units, place)
         materials[number] = material
     return materials
+
+
+def ansys_passed_over(path: Path | str) -> tuple[str, ...]:
+    """Return what of an archive is not read though a study needs it, or says it otherwise: supports, damping.
+
+    Raises
+    ------
+    InputError
+        If a table of a material (TB) gives it another stiffness, or damping of its own.
+    """
+    found: dict[str, list[str]] = {}
+    for place, (command, *words) in read_blocks(Path(path)).commands:
+        word = command.upper()
+        if word in BEHAVIOUR and words and words[0].upper()[:4] not in BEYOND_VIBRATION:
+            raise input_error(
+                place,
+                f"gives a material by a table (TB,{words[0]}), and only isotropic elastic ones are read",
+                "Let ANSYS write its matrices (read_ansys_full), or delete the table where the model is the same without.",
+            )
+        if word in SUPPORTS or (word in DAMPING and any(map(_nonzero, words))):
+            found.setdefault(word, []).append(place.rpartition(": ")[2])
+    what = {"D": "supports: name sets of nodes that are clamped"}
+    return tuple(
+        f"{len(lines)} commands {word} (from {lines[0]} on), {what.get(word, 'damping: state it in the study')}"
+        for word, lines in found.items()
+    )
+
+
+def _nonzero(word: str) -> bool:
+    try:
+        return float(word or 0) != 0
+    except ValueError:
+        return True
 
 
 def ansys_speed(path: Path, units: Units) -> float:

@@ -26,7 +26,10 @@ WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDW
 ROTATIONS = ("OMEGA", "CMOMEGA", "CGOMGA", "DOMEGA", "CMDOMEGA", "DCGOMG")
 CONSTRAINTS = ("CE", "CP")
 OPTIONS = ("KEYO", "KEYOP", "KEYOPT")  # of an element type; ANSYS takes four letters
-KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS)
+BEHAVIOUR = ("TB",)  # tables of a material, beside its elastic properties
+SUPPORTS = ("D",)
+DAMPING = ("ALPHAD", "BETAD", "DMPRAT", "DMPSTR")
+KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS, *BEHAVIOUR, *SUPPORTS, *DAMPING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Blocks:
         Material number -> property -> value.
     commands
         (place, words) of commands that change the model: rotation, coupled dofs, constraint equations, options of element
-        types, those of ``ET`` as ``KEYOPT`` of their own.
+        types, those of ``ET`` as ``KEYOPT`` of their own, tables of materials, supports, damping.
     """
 
     numbers: IntArray

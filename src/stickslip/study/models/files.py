@@ -17,6 +17,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
 from stickslip.model.readers.ansys_archive import (
     COUPLED,
+    ansys_passed_over,
     ansys_speed,
     read_ansys_archive,
     read_ansys_materials,
@@ -154,9 +155,17 @@ def _from_archive(
     sectors = _sectors(key, table)
     mesh = _cyclic_pairs(key, mesh, sectors, table.axis() or Axis())
     quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
-    speed = ansys_speed(path, _units(table))
     return _solid(
-        key, table, mesh, given, sectors, None, quadrature=quadrature, own_speed=speed, **others
+        key,
+        table,
+        mesh,
+        given,
+        sectors,
+        None,
+        quadrature=quadrature,
+        warnings=tuple(f"{table.file}: passed over {text}" for text in ansys_passed_over(path)),
+        own_speed=ansys_speed(path, _units(table)),
+        **others,
     )
 
 
