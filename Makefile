@@ -22,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections trust lock clean
+.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections trust mutants lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -109,6 +109,9 @@ sections: $(DOCS_INSTALLED)  ## two blades with 1 to 15 sections of contact poin
 trust: $(INSTALLED)  ## hold what a response trusts on random machines against a judge of its own (SEED=1 SYSTEMS=60, ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.trust --seed $(or $(SEED),1) --systems $(or $(SYSTEMS),60) --workers $(WORKERS)
 
+mutants: $(INSTALLED)  ## change the library in one point, N=40 times, and list the changes that no test notices (SEED of the day; half an hour of recording the first time)
+	$(ONE_THREAD) $(BIN)/python -m evidence.mutants --n $(or $(N),40) --seed $(or $(SEED),$(shell date +%Y%m%d))
+
 calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)
 	apt-get update -qq
 	DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends calculix-ccx
@@ -140,5 +143,5 @@ lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, 
 
 clean:  ## remove everything that the other targets made, .venv included
 	rm -rf $(VENV) .venv-rival dist .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
-		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/validation/out examples/*/results
+		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/validation/out evidence/mutants/out examples/*/results
 	find src tests evidence docs examples -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -12,6 +12,7 @@ from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import in_memory
+from stickslip.assembly.waves import _one_of
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.pairing import node_to_segment
@@ -28,7 +29,9 @@ from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.part import BodyPoints, rigid_part, solid_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import join
+from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import travelling_wave
+from stickslip.reduction.truncation import ModesBelow
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
@@ -448,3 +451,28 @@ def test_an_output_on_the_high_face_is_refused_by_name():
     behind = Output(name="behind", on="blade.cyclic_high")
     with pytest.raises(InputError, match=r"output\.points: .* lies on the high cyclic face"):
         replace(model, outputs=(*model.outputs, behind)).assembled(H)
+
+
+@pytest.mark.parametrize(
+    ("ways", "found"),
+    [
+        ([Reduction(5)], Reduction(5)),
+        ([Reduction(5), Reduction(7), Reduction(1)], Reduction(13)),
+        ([Reduction(5, "rubin"), Reduction(7, "rubin")], Reduction(12, "rubin")),
+        ([Reduction(ModesBelow(900.0)), Reduction(ModesBelow(900.0))], Reduction(ModesBelow(900.0))),
+        ([Reduction(5), Reduction(7, "rubin")], "b"),
+        ([Reduction(5), Reduction(ModesBelow(900.0))], "b"),
+        ([Reduction(ModesBelow(900.0)), Reduction(5)], "b"),
+        ([Reduction(ModesBelow(900.0)), Reduction(ModesBelow(900.0)), Reduction(ModesBelow(901.0))], "c"),
+        ([Reduction(ModesBelow(900.0)), Reduction(ModesBelow(900.0), "rubin")], "b"),
+    ],
+)  # fmt: skip
+def test_reductions_of_the_parts_of_a_sector_are_one(ways, found):
+    named = dict(zip("abc", ways, strict=False))
+    if isinstance(found, Reduction):
+        assert _one_of(named) == found
+        return
+    with pytest.raises(
+        InputError, match=rf"part\.{found}\.reduction: differs from that of part\.a.*same frequency"
+    ):
+        _one_of(named)

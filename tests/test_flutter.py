@@ -109,6 +109,10 @@ def test_coefficients_recorded_with_one_moved_blade_give_the_eigenvalues_of_the_
             # coefficients of iω at λ, whose real part is up to 5e-3 of it
             assert float(data["damping"][w, mode]) == pytest.approx(damping, rel=0.01)
             assert float(data["frequency_in_flow_hz"][w, mode]) == pytest.approx(hertz, rel=1e-4)
+            # the blades' own damping adds LOSS φᵀKφ / 2 |λ| to that of the fluid, to first order
+            own = fluid.LOSS * np.pi * float(data["frequency_hz"][w, mode]) ** 2 / hertz
+            of_fluid = float(data["damping_by_eigenvalue"][w, mode])
+            assert damping - of_fluid == pytest.approx(own, rel=0.03, abs=0.01 * abs(damping))
     # the curve goes through the waves
     for w, angle in enumerate(data["phase_angle_deg"].values):
         on_curve = [np.interp(angle, data["curve_angle_deg"], row) for row in data["curve_damping"]]
@@ -137,6 +141,7 @@ def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
     assert f"mode {m + 1} grows" in " ".join(told)
     calm = model(of_blade(influence())).flutter(number=1, required_percent=1.0)
     assert any("less damping than the 1 % required" in str(v) for v in calm.verdicts)
+    assert float(calm.data["flutter"]["required_damping"].values[0]) == pytest.approx(0.01)
     rows = [(-0.2, 1, 0), (-0.1, 2, 0), (0.001, 3, 0)]
     assert others(rows, -0.2) == "; 2 waves grow in all"
     assert others([*rows, (-0.1, 2, 1)], -0.2) == "; 3 modes of 2 waves grow in all"

@@ -272,6 +272,35 @@ def test_csv_and_vtk_hold_the_same_field(tmp_path: Path) -> None:
     np.testing.assert_allclose(one.force, other.force, atol=5e-3 * np.abs(one.force).max())
 
 
+WHOLE = [("real_pa", "imag_pa"), ("amplitude_pa", "phase_deg")]
+
+
+@pytest.mark.parametrize("on", ["points", "cells"])
+@pytest.mark.parametrize("static", [False, True])
+@pytest.mark.parametrize(
+    "names", [("real_pa", "imag_pa"), ("amplitude_pa", "phase_deg"), ("pressure_pa",), ("real_pa", "phase_deg"), ("REAL_PA", "Imag_Pa")]
+)  # fmt: skip
+def test_vtk_holds_a_field_in_each_way(
+    names: tuple[str, ...], static: bool, on: str, tmp_path: Path
+) -> None:
+    """A constant pressure is the same at points and cells, as parts and as amplitude and phase; what is not whole is refused."""
+    surface = plate((3, 2))
+    value = {"real_pa": 300.0, "imag_pa": -400.0, "amplitude_pa": 500.0, "phase_deg": np.degrees(np.arctan2(-4, 3)), "pressure_pa": 250.0}  # fmt: skip
+    count = len(surface.points) if on == "points" else len(surface.facets)
+    data = {name: np.full(count, value[name.lower()]) for name in names}
+    own = {"point_data": data} if on == "points" else {"cell_data": {k: [v] for k, v in data.items()}}  # fmt: skip
+    meshio.write(tmp_path / "field.vtu", meshio.Mesh(surface.points, [("quad", surface.facets)], **own))  # fmt: skip
+    known = tuple(name.lower() for name in names)
+    if known not in ([("pressure_pa",)] if static else WHOLE):
+        needed = "pressure_pa" if static else "real_pa and imag_pa, or amplitude_pa and phase_deg"
+        with pytest.raises(ss.InputError, match=f"has the data {', '.join(known)}.*{needed}"):
+            read_pressure(tmp_path / "field.vtu", "m", static=static)
+        return
+    found = read_pressure(tmp_path / "field.vtu", "m", static=static)
+    np.testing.assert_allclose(found.pressure, 250.0 if static else 300.0 - 400.0j, rtol=1e-12)
+    np.testing.assert_allclose(found.area.sum(axis=0), [0, 0, WIDE * HIGH], atol=1e-15)
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [

@@ -182,6 +182,70 @@ def test_derivatives_are_those_of_the_residual() -> None:
         assert found == pytest.approx((ends[0] - ends[1]) / 2, abs=1e-5 * np.abs(found).max())
 
 
+def three_in_a_row() -> ss.System:
+    """Three masses; a friction spring holds the first to the ground, and the others are condensed."""
+    stiffness = np.array([[3e4, -1e4, 0.0], [-1e4, 4e4, -2e4], [0.0, -2e4, 2.5e4]])
+    structure = replace(lumped(np.diag([1.0, 2.0, 0.5]), stiffness), damping=1e-4 * stiffness + 2.0 * np.eye(3))  # fmt: skip
+    operator = np.zeros((3, 3))
+    operator[0, 0] = 1.0
+    law = ss.Jenkins(k_t=SPRING, limit=1e9)  # it never slips
+    return ss.System(structure, ss.Interface(("joint",), (law,), operator), np.arange(3))
+
+
+def test_loads_on_condensed_coordinates_act_at_their_own_frequencies() -> None:
+    """Without slip each frequency has the answer of the linear structure, its contact stuck; the derivatives are those of the loads."""
+    system, omegas = three_in_a_row(), (140.0, 185.0)
+    forces = np.array([[0.0, 0.0, 10.0], [0.0, 6.0j, 0.0], [0.0, 0.0, 0.0], [4.0, 0.0, 3.0]])
+    static = np.array([0.0, 2.0, 0.0])
+    first = ss.HarmonicLoad(static, {1: forces[0], 2: forces[1]})
+    second = ss.HarmonicLoad(np.zeros(3), {1: forces[3]})
+    problem = two_tones(system, first, second, 2)
+    assert problem.balance.side.n == 1
+    motion = problem.solve(omegas)
+    assert motion.converged
+    structure = system.structure
+    held = structure.stiffness + np.diag([SPRING, 0.0, 0.0])
+    mass, damping = np.diag([1.0, 2.0, 0.5]), structure.damping
+    for index, force in (((0, 0), static), ((1, 0), forces[0]), ((2, 0), forces[1]), ((0, 1), forces[3]), ((0, 2), 0 * static), ((1, 1), 0 * static)):  # fmt: skip
+        omega = index[0] * omegas[0] + index[1] * omegas[1]
+        exact = np.linalg.solve(held - omega**2 * mass + 1j * omega * damping, force)
+        own = motion.coefficients[motion.indices.index(index)]
+        assert own == pytest.approx(exact, abs=1e-9 * np.abs(motion.coefficients).max())
+    side, indices, step = problem.balance.side, problem.balance.indices, 1e-3
+    _, by_first, by_second = side.load(indices, omegas)
+    for found, ends in (
+        (by_first, [side.load(indices, (omegas[0] + s, omegas[1]))[0] for s in (step, -step)]),
+        (by_second, [side.load(indices, (omegas[0], omegas[1] + s))[0] for s in (step, -step)]),
+    ):
+        assert np.abs(found).max() > 0.0
+        assert found == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6 * np.abs(found).max())  # fmt: skip
+
+
+def test_how_far_off_few_frequencies_are_is_a_newton_step_with_more() -> None:
+    """With a second load both frequencies are given; a tone that nothing drives has its own among the unknowns, and its phase stays."""
+    omegas = 140.0, 180.0
+    path = closed_path(omegas[1] / omegas[0], 4, 0.5)
+    more = tuple(i for i in half_plane(4) if i not in half_plane(2))
+    for second in (tone(0.0, 8.0), NONE):
+        problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), second, 2)
+        motion = problem.solve(omegas)
+        moved = np.where([k == 1 for _, k in motion.indices], 1e-4, 0.0)[:, None]
+        motion = replace(motion, x=problem.balance.unknowns(problem.balance.coefficients(motion.x) + moved))  # fmt: skip
+        wider = problem.balance.with_indices((*motion.indices, *more))
+        x = wider.from_other(problem.balance, motion.x)
+        at = wider.linearise(x, omegas, path)
+        jac, right, n = np.asarray(at.jac), at.residual, x.size
+        if second is NONE:
+            own = wider.coefficients(x)
+            along = wider.unknowns(np.array([1j * k * row for (_, k), row in zip(wider.indices, own, strict=True)]))  # fmt: skip
+            jac = np.block([[jac, at.by_second[:, None]], [along[None, :], np.zeros((1, 1))]])
+            right = np.append(right, 0.0)
+        step = wider.coefficients(np.linalg.solve(jac, right)[:n])[1:]
+        size = np.linalg.norm(wider.coefficients(x)[1:], axis=0)
+        expected = np.max(np.linalg.norm(step, axis=0) / np.maximum(size, 0.01 * size.max()))
+        assert off_by(problem, motion, path, more) == pytest.approx(expected, rel=1e-8)
+
+
 def test_the_jacobian_by_its_parts_is_the_array() -> None:
     """Two masses have few coordinates: the parts are asked for, and they and their borders lead to the same motions."""
     omegas = 140.0, 180.0

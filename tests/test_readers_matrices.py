@@ -257,7 +257,15 @@ def test_modal_dofs_need_no_position(tmp_path):
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 nan\n", "'nan' is no finite number"),
         ("%%MatrixMarket matrix coordinate pattern symmetric\n3 3 1\n1 1\n", "no Matrix Market matrix of numbers"),
         ("%%MatrixMarket matrix array real general\n2 2\n1\n0\n0\n1\n", "is of 2 x 2, the model has 3 dofs"),
-        ("%%MatrixMarket matrix coordinate real symmetric", r"line 2: needs 3 counts"),
+        ("%%MatrixMarket matrix coordinate real symmetric", r"line 2: needs 3 counts, got ''"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3\n", r"line 2: needs 3 counts, got '3 3'"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1 1\n", r"line 2: needs 3 counts, got '3 3 1 1'"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 -1\n", r"line 2: needs 3 counts, got '3 3 -1'"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 a\n", r"line 2: needs 3 counts, got '3 3 a'"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 -3 1\n1 1 1.0\n", r"line 2: needs 3 counts, got '3 -3 1'"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 0\n1 1 1.0\n", "has 1 entries, its header says 0"),
+        ("%%MatrixMarket matrix array real general\n3 3 9\n", r"line 2: needs 2 counts, got '3 3 9'"),
+        ("%%MatrixMarket matrix array real general\n3\n", r"line 2: needs 2 counts, got '3'"),
     ],
 )  # fmt: skip
 def test_damaged_matrix_market_files_are_named(tmp_path, text, message):

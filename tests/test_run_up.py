@@ -150,6 +150,8 @@ def test_a_study_follows_engine_orders_over_speed(finished):
     assert data["slipping"].values.max() > 0.5
     assert data["dissipated_w"].values.max() > 0
     assert np.all(data["stuck_hz"].values >= data["open_hz"].values * (1 - 1e-9))
+    drawn = data["line_speed_rpm"].values
+    assert (drawn[0], drawn[-1]) == pytest.approx((8100.0, 9000.0))
     assert float(data["speed_error"].max()) < 1e-12
     said = " ".join(str(v) for v in result.verdicts).lower()
     assert "engine order 3: the largest amplitude is at an end of the range" in said

@@ -11,6 +11,7 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.solid import Material, assemble_solid
+from stickslip.model.mesh import sector_mesh
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
@@ -268,3 +269,23 @@ def test_decks_that_cannot_be_are_refused(tmp_path):
     with pytest.raises(InputError, match="without a speed"):
         CalculixRun(n_modes=0)
     assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (StickslipError("the sector's parts do not hang together"), "the sector's parts do not hang together"),
+        (RuntimeError("invalid boundary mesh"), "gmsh could not mesh the sector: invalid boundary mesh. Change the element sizes slightly"),
+    ],
+)  # fmt: skip
+def test_what_gmsh_cannot_mesh_is_told(
+    error: Exception, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(sector_mesh, "_mesh", fail)
+    with pytest.raises(StickslipError) as caught:
+        mesh_sector(SHROUDED)
+    assert str(caught.value) == said
+    assert (caught.value is error) == isinstance(error, StickslipError)

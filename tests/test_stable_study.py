@@ -275,6 +275,11 @@ def test_a_large_wheel_is_examined_by_hills_method_at_its_peak(
     found = examine(asked, response.accepted[response.peak])
     assert (found.verdict, found.multiplier) == ("unstable", 1.2)
     assert found.sentence.endswith("in wave 9 (3 nodal diameters) near 50 Hz")
+    calm = replace(grown, floquet=Floquet(np.array([0.5 + 0.0j])))
+    monkeypatch.setattr(stable, "hill_stability", lambda *_: HillStability(calm, wave, 0))
+    found = examine(asked, response.accepted[response.peak])
+    assert found.verdict == "stable"
+    assert "in wave" not in found.sentence
     lost = replace(grown, errors=np.array([np.inf]))
     monkeypatch.setattr(stable, "hill_stability", lambda *_: HillStability(lost, None, 2))
     found = examine(asked, response.accepted[response.peak])

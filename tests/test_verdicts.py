@@ -126,6 +126,10 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     ]
     assert in_lines(given, every=True) == [str(v) for v in worst_first(given)]
     assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
+    assert together(["a = 1", "a = 2"]) == "a = 1, 2"
+    assert together(["a = 1", "b = 1"]) == "a = 1, b = 1"
+    assert together(["a = 1", "a = 1, b = 3"]) == "a = 1, a = 1, b = 3"
+    assert together(["a = 1"]) == "a = 1"
 
 
 def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> None:

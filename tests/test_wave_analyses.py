@@ -203,6 +203,7 @@ def test_resonances_are_the_crossings_of_the_campbell_diagram(
     assert abs(float(found.pair_resonance_rpm) / rpm - 1) < 0.1 * abs(frozen / rpm - 1)
     assert float(found.pair_margin) == pytest.approx(1 / 1.04 - 1, abs=2e-4)
     assert int(found.pair_near) == 1
+    assert found.attrs["margin_percent"] == 5.0
 
 
 def test_growth_is_the_slope_of_the_squares_with_coriolis_forces(tmp_path: Path) -> None:
@@ -307,6 +308,8 @@ def test_reference_frequencies_are_compared(joined: Joined, tmp_path: Path) -> N
     outcome = done(study(tmp_path, named_in), "modes")
     title = outcome.summaries["modes"][1].title
     assert "the largest is -9.90e-03 (ND 2, mode 2)" in title
+    known = outcome.tree["modes"].reference_hz.values[0]
+    np.testing.assert_allclose(known, [[hertz[0, 0], np.nan], [np.nan, 1.01 * hertz[1, 1]]])
     off = outcome.tree["modes"].difference.values[0]
     np.testing.assert_allclose(off, [[0, np.nan], [np.nan, 1 / 1.01 - 1]], atol=1e-9)
 
@@ -358,6 +361,9 @@ def test_whole_structure_from_a_deck(tmp_path: Path) -> None:
     # Euler-Bernoulli of a cube-sized stub is no reference; its own mass and symmetry are: two equal bending modes
     assert data.attrs["mass_kg"] == pytest.approx(2 * 7850 * 1e-3, rel=1e-12)
     np.testing.assert_allclose(data.attrs["centre_m"], [0.1, 0.05, 0.05], rtol=1e-12)
+    box = data.attrs["box_low_m"], data.attrs["box_high_m"]
+    np.testing.assert_allclose(box, [[0.0, 0.0, 0.0], [0.2, 0.1, 0.1]], rtol=1e-12)
+    assert list(data.attrs["axis_direction"]) == [0.0, 0.0, 1.0]
     assert float(data.frequency_hz[0, 0]) == pytest.approx(float(data.frequency_hz[0, 1]), rel=1e-9)
     assert data["shape"].dims == ("wave", "mode", "skin_point", "xyz", "part")
     assert done(made, "modes").summaries["modes"][0].rows[0][0] == "whole"

@@ -172,7 +172,7 @@ def nodal_surface(points: FloatArray, dofs: IntArray, n: int, facets: IntArray) 
     return Surface(np.asarray(points, dtype=float), operator, np.asarray(facets))
 
 
-def structure_surface(structure: Structure, facets: IntArray, part: str = "") -> Surface:
+def structure_surface(structure: Structure, facets: IntArray) -> Surface:
     """Return the surface of a structure's own nodes.
 
     Parameters
@@ -181,8 +181,6 @@ def structure_surface(structure: Structure, facets: IntArray, part: str = "") ->
         Holds x, y, z of every node of the surface as coordinates.
     facets
         (m, k) node numbers as in the structure's table of dofs, otherwise as in `Surface`.
-    part
-        Part of a joined structure that the nodes belong to; empty: the structure is one part.
 
     Raises
     ------
@@ -192,11 +190,10 @@ def structure_surface(structure: Structure, facets: IntArray, part: str = "") ->
     table = structure.dofs
     used = np.unique(facets)
     used = used[used >= 0]
-    mine = (np.array(table.part) == part) | (part == "")
     component = np.array(table.component)
     dofs = np.full((len(used), 3), -1, dtype=np.int64)
     for axis, name in enumerate("xyz"):
-        rows = np.flatnonzero(mine & (component == name) & np.isin(table.node, used))
+        rows = np.flatnonzero((component == name) & np.isin(table.node, used))
         dofs[np.searchsorted(used, table.node[rows]), axis] = rows
     missing = used[np.any(dofs < 0, axis=1)]
     if missing.size:
