@@ -9,6 +9,8 @@ from stickslip.errors import SingularError
 from stickslip.model import assemble_deck, normal_modes, read_deck
 from stickslip.model.dense_modes import dense_modes
 from stickslip.model.dofs import Dofs
+from stickslip.model.fe.free_solid import inertia_relief
+from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.mesh.mesh_facets import HEX_EDGES
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.structure import Structure
@@ -52,6 +54,17 @@ def test_a_summary_tells_modes_and_the_singular_mass(tmp_path):
     assert found.rigid_modes == 6
     assert (found.frequencies_hz[6:] > 1000).all()
     assert any("The mass has rank 24 of 60" in text for text in found.remarks)
+
+
+def test_a_free_brick_that_strains_nothing_in_more_ways_is_refused_at_speed(tmp_path):
+    deck = read_deck(bricks(tmp_path / "one.inp", 1))
+    solid = rotating_solid(deck.mesh, deck.material, clamped=(), quadrature=deck.quadrature)
+    with pytest.raises(
+        SingularError, match=r"without strain in more ways than rigidly.*take C3D20"
+    ):
+        inertia_relief(solid)
+    exact = rotating_solid(deck.mesh, deck.material, clamped=())
+    assert inertia_relief(exact) is not None
 
 
 def test_a_long_row_of_such_bricks_is_refused_by_its_mass(tmp_path):

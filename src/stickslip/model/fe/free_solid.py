@@ -4,7 +4,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.model.fe.factorisation import factorise
+from stickslip.errors import SingularError
+from stickslip.model.fe.factorisation import Solve, factorise
 from stickslip.model.fe.rotation import RotatingSolid
 
 RIGID = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it is rounding
@@ -34,6 +35,11 @@ def inertia_relief(
     tuple[FloatArray, FloatArray] | None
         (n,) displacement at 1 rad/s in m s², without rigid motion, and the (n,) load in N s² that contacts have to carry; None where
         the solid is held.
+
+    Raises
+    ------
+    SingularError
+        If it can move without strain in other ways than rigidly.
     """
     free = rigid_motions(solid, tie)
     if not free.shape[1]:
@@ -51,9 +57,21 @@ def inertia_relief(
     _, _, order = scipy.linalg.qr(own.T, mode="economic", pivoting=True)
     rest = np.sort(order[own.shape[1] :])
     moved = np.zeros(own.shape[0])
-    moved[rest] = factorise(scipy.sparse.csr_array(stiffness)[rest][:, rest])(load[rest])
+    moved[rest] = _held(scipy.sparse.csr_array(stiffness)[rest][:, rest])(load[rest])
     moved = moved if tie is None else np.asarray(tie @ moved)
     return moved - free @ np.linalg.solve(square, weighted.T @ moved), carried
+
+
+def _held(stiffness: Matrix) -> Solve:
+    """Factorise the stiffness of a solid whose rigid motions are held; say what it lacks where it can move nevertheless."""
+    try:
+        return factorise(stiffness)
+    except SingularError as error:
+        text = (
+            "a free solid can move without strain in more ways than rigidly, as few bricks with reduced integration can (C3D20R): "
+            f"take C3D20, exact integration, or more bricks ({error})"
+        )
+        raise SingularError(text) from error
 
 
 def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray:
