@@ -91,7 +91,8 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
             elif word in _ACTIONS:
                 _ACTIONS[word](model, block)
         elif word in TOLD:
-            model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
+            if any(block.rows()):  # none where a step takes earlier loads away
+                model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
         elif word not in SILENT:
             raise _refused(block)
     return model
