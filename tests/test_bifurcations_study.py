@@ -53,7 +53,7 @@ def test_terminal_verdicts_and_page_name_them(ran):
     said, _, page = ran
     told = " ".join(said.split())
     assert "Period doubling at 37.57" in told
-    assert "a machine does not stay there: multipliers lie outside the unit circle" in told
+    assert "are unstable: a machine does not stay there" in told
     assert "The branch that leaves there is drawn with the response." in told
     assert "Located on the branch: 1 period doubling. Dotted: 1 that leaves there." in page
     assert "<h3>Bifurcations</h3>" in page

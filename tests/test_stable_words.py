@@ -7,8 +7,8 @@ import xarray as xr
 
 from stickslip.report.sections.residual_tractions import SECTION, Tractions, band, resonances
 from stickslip.response.bifurcations.found import Bifurcations
+from stickslip.response.stability.found import Stability
 from stickslip.response.stability.modulus import modulus_text
-from stickslip.response.stability.multipliers import Stability
 from stickslip.response.time.floquet import Floquet
 from stickslip.study.analyses.forced.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
 

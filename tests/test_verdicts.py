@@ -16,6 +16,7 @@ from stickslip.study.analyses.forced.curve import Curve, branch_length
 from stickslip.study.analyses.forced.verdicts import verdicts, with_levels
 from stickslip.study.analyses.verdict import (
     LEVELS,
+    POINT_LEVELS,
     Verdict,
     conclusion,
     doubt,
@@ -33,7 +34,7 @@ from stickslip.study.analyses.verdict import (
 
 HZ = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
 TOP = 3  # the point of the peak
-NO_STABILITY = "; whether it is stable was not examined"
+NO_STABILITY = ", stability not examined"
 
 
 def response(attrs: dict[str, object] | None = None, **changes: object) -> xr.Dataset:
@@ -69,7 +70,7 @@ def judged(data: xr.Dataset) -> tuple[tuple[Verdict, ...], str, list[str]]:
     return (
         verdicts(data, [""]),
         LEVELS[int(levels["case_verdict"][0])],
-        [LEVELS[int(k)] for k in levels["verdict"]],
+        [POINT_LEVELS[int(k)] for k in levels["verdict"]],
     )
 
 
@@ -138,7 +139,7 @@ def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> 
     assert set(points) == {"trusted"}
     (only,) = found
     assert only == Verdict(
-        "trusted", "", 13.0, f"peak with H = 1, predicted error 1 %{NO_STABILITY}"
+        "trusted", "", 13.0, f"peak with H = 1{NO_STABILITY}, predicted error 1 %"
     )
     assert not only.told
 
@@ -175,7 +176,7 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     ),
     "no audit, as nothing acts on what is left out": (
         {"audit_error_percent": np.full(6, np.nan), "own_error_percent": np.zeros(6)}, "trusted", {},
-        "peak with H = 1, exact, as no force acts on the harmonics left out;",
+        f"peak with H = 1{NO_STABILITY}, exact, as no force acts on the harmonics left out",
     ),
     "no audit, where something acts beside the peak": (
         {"audit_error_percent": np.full(6, np.nan), "own_error_percent": values(0, 1.0, 0.0)}, "trusted", {},
@@ -222,11 +223,11 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     ),
     "unstable": (examined("unstable"), "wrong", {TOP: "wrong"}, "a machine does not stay there: unstable: the multiplier is 1.2"),
     "undecided": (examined("undecided"), "doubtful", {TOP: "doubtful"}, "whether it is stable: undecided: the multiplier"),
-    "stable": (examined("stable"), "trusted", {}, "predicted error 1 %, stable"),
+    "stable": (examined("stable"), "trusted", {}, "peak with H = 1, stable, predicted error 1 %"),
     "stability not examined": (
         examined("not examined"), "trusted", {}, f"{NO_STABILITY[2:]} (the multiplier is 1.2)",
     ),
-    "unstable beside the peak": (examined("unstable", 11.0), "trusted", {1: "wrong"}, "a machine does not stay there"),
+    "unstable beside the peak": (examined("unstable", 11.0), "trusted", {1: "unstable"}, "a machine does not stay there"),
     "left": (checked(motion="left"), "wrong", {TOP: "wrong"}, "leaves it for another motion"),
     "not periodic": (checked(motion="not periodic"), "wrong", {TOP: "wrong"}, "is not periodic"),
     "wanders a little": (checked(motion="not periodic", scatter=0.006), "doubtful", {TOP: "doubtful"}, "it wanders by 0.6 %"),

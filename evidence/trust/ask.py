@@ -80,10 +80,14 @@ def asked(machine: Machine, **keys: Any) -> Told:
 
 
 def _stability(data: Any) -> tuple[str, ...]:
-    if "point_stability" in data:
-        return tuple(str(w) for w in data.point_stability.values)
-    words = dict.fromkeys(np.round(data.frequency_hz.values, 9).tolist(), "not examined")
+    if "motion_stability_basis" in data:
+        words = str(data.motion_stability.attrs["flag_meanings"]).replace("_", " ")
+        names = ["stable", "unstable", "undecided", "not examined", "neutral"]
+        assert words == " ".join(names)
+        own = zip(data.motion_stability.values, data.motion_stability_basis.values, strict=True)
+        return tuple("carried" if names[w] == "stable" and b == 2 else names[w] for w, b in own)
+    told = dict.fromkeys(np.round(data.frequency_hz.values, 9).tolist(), "not examined")
     if "stability_verdict" in data:
         for hz, word in zip(data.stability_frequency_hz.values, data.stability_verdict.values, strict=True):  # fmt: skip
-            words[round(float(hz), 9)] = str(word)
-    return tuple(words[round(float(hz), 9)] for hz in data.frequency_hz.values)
+            told[round(float(hz), 9)] = str(word)
+    return tuple(told[round(float(hz), 9)] for hz in data.frequency_hz.values)

@@ -23,6 +23,8 @@ from stickslip.study.analyses.forced.curve import (
     of_largest_blade,
     peak_output,
 )
+from stickslip.study.analyses.forced.quantities import MOTION
+from stickslip.study.analyses.forced.stable_words import said_of
 from stickslip.study.analyses.forced.summary import MEASURED
 from stickslip.study.analyses.verdict import LEVELS
 
@@ -150,6 +152,17 @@ class Response(Node):
         if self.has("verdict"):
             return self.integers("verdict")
         return np.where(self.converged, 0, 2)
+
+    @cached_property
+    def unstable(self) -> npt.NDArray[np.bool_]:
+        """(point,) whether the motion of a point is known to be unstable."""
+        if not self.has("motion_stability"):
+            return np.zeros(self.hz.size, dtype=bool)
+        return np.asarray(self.integers("motion_stability") == MOTION["unstable"])
+
+    def peak_is(self, case: ShownCase) -> str:
+        """Return what is known of the stability of the peak of a case, in a word or two."""
+        return said_of(Curve(self.data, case.index).peak_stability)
 
     def level(self, case: ShownCase) -> str:
         """Level of the verdict on a case; empty where the result tells none."""

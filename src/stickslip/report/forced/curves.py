@@ -18,7 +18,7 @@ from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_tick
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced.summary import amplitude_name
-from stickslip.study.analyses.verdict import LEVELS
+from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
 _FEWEST = 3  # cases of an optimisation curve
@@ -58,7 +58,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     reasons = _reasons(response)[at]
     about = "predicted error" if response.is_error else "indicator"
     return go.Scatter(
-        x=x[at], y=response.accepted[at] * scale.factor, mode="lines+markers",
+        x=x[at], y=response.accepted[at] * scale.factor, mode="markers" if response.unstable[at].any() else "lines+markers",
         name=case.short if len(response.cases) > 1 else "response",
         legendgroup="cases", legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
         line={"color": case.colour, "width": 1.6},
@@ -74,6 +74,27 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     )  # fmt: skip
 
 
+def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
+    """Return the line of a curve in two parts, dashed beside unstable points; none where there are no such points."""
+    at, x = response.points(case), abscissa(response)[0]
+    off, y = response.unstable[at], response.accepted[at] * response.scale.factor
+    if not off.any():
+        return []
+    dashed = off[1:] | off[:-1]
+    drawn = []
+    for chosen, dash in ((~dashed, "solid"), (dashed, "dash")):
+        steps = np.flatnonzero(chosen)
+        gap = np.full(steps.size, np.nan)
+        rows = [np.column_stack([own[steps], own[steps + 1], gap]).ravel() for own in (x[at], y)]
+        line = {"color": case.colour, "width": 1.6, "dash": dash}
+        drawn.append(
+            go.Scatter(
+                x=rows[0], y=rows[1], mode="lines", line=line, showlegend=False, hoverinfo="skip", legendgroup="cases",
+            )
+        )  # fmt: skip
+    return drawn
+
+
 def _symbols(response: Response) -> np.ndarray:
     """(point,) circles for the harmonics of the first passage, diamonds for others; open where doubtful, crosses where wrong."""
     shape = np.where(response.more, "diamond", "circle").astype(object)
@@ -85,7 +106,7 @@ def _reasons(response: Response) -> np.ndarray:
     if not response.has("verdict_reason"):
         return np.full(response.hz.size, "", dtype=object)
     reasons = zip(response.levels, response.labels_of("verdict_reason"), strict=True)
-    said = [f"<br>{LEVELS[k]}: {_wrapped(why)}" if why else "" for k, why in reasons]
+    said = [f"<br>{POINT_LEVELS[k]}: {_wrapped(why)}" if why else "" for k, why in reasons]
     return np.array(said, dtype=object)
 
 
@@ -149,6 +170,9 @@ def _caption(response: Response) -> str:
         told = [f"{counted(doubtful, 'doubtful point')} (open symbols)"] * bool(doubtful)
         told += [f"{wrong} wrong (crosses)"] * bool(wrong)
         text += f" Not trusted: {', '.join(told)}."
+    if response.unstable.any():
+        n = counted(int(response.unstable.sum()), "point")
+        text += f" Dashed: {n} whose motion is unstable, so that a machine does not stay there."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
         text += f" {n} did not converge (crosses); the curve is left open there."
@@ -163,6 +187,7 @@ def frequency_response(response: Response) -> Plot | None:
     figure = go.Figure()
     banded = draw_bands(figure, response)
     figure.add_traces([_curve(response, case) for case in response.cases])
+    figure.add_traces([line for case in response.cases for line in _lines(response, case)])
     if response.decides:
         low, more = response.low_name, response.more_name
         figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))

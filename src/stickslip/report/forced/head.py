@@ -13,7 +13,7 @@ from stickslip.report.quantities import (
 )
 from stickslip.report.response import Response
 from stickslip.report.section import Card
-from stickslip.study.analyses.verdict import LEVELS
+from stickslip.study.analyses.verdict import LEVELS, POINT_LEVELS
 
 
 def _peak_card(response: Response) -> Card:
@@ -31,7 +31,7 @@ def _peak_card(response: Response) -> Card:
     if len(cases) == 1:
         whole = quantity(float(peaks[0]) * cases[0].excitation, response.length)
         more = f", {whole}" if response.per_force else ""
-        at = f"at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
+        at = f"{response.peak_is(cases[0])}, at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
         return Card(
             size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}"
         )
@@ -42,7 +42,7 @@ def _peak_card(response: Response) -> Card:
     kind = counted(int(counts.sum()), "case")
     if not counts.all():
         kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
-    note = f"{response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    note = f"{response.peak_is(within[best])}, {response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if within[best] in (response.cases[0], response.cases[-1]):
         note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
     lower = int(np.argmin(peaks))
@@ -148,7 +148,7 @@ def _verdict_card(response: Response) -> Card | None:
     levels = [response.level(c) for c in response.cases]
     if not levels[0]:
         return None
-    points = {level: int(np.sum(response.levels == k)) for k, level in enumerate(LEVELS) if k}
+    points = {level: int(np.sum(response.levels == k)) for k, level in enumerate(POINT_LEVELS) if k}
     off = [f"{n} {level}" for level, n in points.items() if n]
     note = f"of {counted(response.levels.size, 'point')} {', '.join(off) or 'none is doubtful'}"
     if len(levels) == 1:

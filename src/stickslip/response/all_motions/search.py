@@ -37,7 +37,7 @@ from stickslip.response.forced.problem import (
 )
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.stability.missing_harmonics import corrected
-from stickslip.response.stability.multipliers import stability
+from stickslip.response.stability.settled import stability
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point

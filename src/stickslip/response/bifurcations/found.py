@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from stickslip.response.forced.problem import ForcedPoint
-from stickslip.response.stability.multipliers import Stability
+from stickslip.response.stability.found import Stability
 from stickslip.units import HZ
 
 BifurcationKind = Literal[

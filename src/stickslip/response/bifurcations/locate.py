@@ -19,7 +19,8 @@ from stickslip.response.bifurcations.spectra import (
 )
 from stickslip.response.bifurcations.stretch import Stretch, stretch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.multipliers import Stability, stability
+from stickslip.response.stability.found import Stability
+from stickslip.response.stability.settled import stability
 from stickslip.solve.branch import Point
 
 TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.multipliers import Stability
+from stickslip.response.stability.found import Stability
 from stickslip.response.time.floquet import UNIT_TOLERANCE
 
 Examine = Callable[[ForcedProblem, ForcedPoint], Stability]

@@ -9,7 +9,8 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
-from stickslip.response.stability.multipliers import Stability, stability_in_time
+from stickslip.response.stability.found import Stability
+from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.stability.waves import (
     WaveDisturbance,
     growing_wave,
@@ -58,7 +59,7 @@ def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
         errors[:size] = _changes(found.floquet, other.floquet)[:size]
         errors[size:] = 0.0
     errors = np.maximum(errors + found.errors, abs(along - 1.0))
-    found = replace(found, errors=errors)
+    found = replace(found, errors=errors, moduli=None)
     if not isinstance(problem.system.structure, TunedWheel):
         return CycleStability(found, along, None)
     every = wave_disturbances(problem.system, _gaps(problem, cycle.unknowns), cycle.omega)
@@ -75,7 +76,8 @@ def _of(problem: SelfExcited, unknowns: FloatArray) -> tuple[Stability, complex]
         return found, complex(np.nan)
     at = int(np.argmin(np.abs(values - 1.0)))
     rest = Floquet(np.delete(values, at))
-    return replace(found, floquet=rest, errors=np.delete(found.errors, at)), complex(values[at])
+    errors = np.delete(found.errors, at)
+    return replace(found, floquet=rest, errors=errors, moduli=None), complex(values[at])
 
 
 def _gaps(problem: SelfExcited, unknowns: FloatArray) -> ComplexArray:

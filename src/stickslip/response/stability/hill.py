@@ -16,11 +16,11 @@ from stickslip.response.stability.contact_states import (
     located_states,
 )
 from stickslip.response.stability.contact_tangent import contact_tangents
+from stickslip.response.stability.found import Stability
 from stickslip.response.stability.hill_modes import HillSide
 from stickslip.response.stability.hill_segment import Hill
 from stickslip.response.stability.hill_spectrum import Exponents, exponents, segments_of
 from stickslip.response.stability.missing_harmonics import corrected
-from stickslip.response.stability.multipliers import Stability
 from stickslip.response.stability.waves import WaveDisturbance
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet

@@ -1,6 +1,6 @@
 """What the harmonics that a motion lacks change in it: a Newton step with more of them, or as many as it takes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,14 @@ FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harm
 LEAST = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """A point with more harmonics, and the floating point operations that it took."""
+
+    point: ForcedPoint
+    work: float
+
+
 def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, float] | None:
     """Return a point after a Newton step with more harmonics, and how many times the change by it an error is.
 
@@ -25,6 +33,17 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
     with up to `MOST` harmonics, whose change counts `FARTHER` times. The point itself comes back where no force acts on the missing
     ones, and None where nothing is found.
     """
+    step = corrected_by_step(problem, point)
+    if step is not None:
+        return step.point, 1.0
+    fed = judging_set_of(with_stiffness(problem.balance(point.support)))
+    order = max(LEAST, FACTOR * point.order + MORE, fed[-1])
+    more = None if order > MOST else solved_with(problem, point, order)
+    return None if more is None else (more.point, FARTHER)
+
+
+def corrected_by_step(problem: ForcedProblem, point: ForcedPoint) -> Corrected | None:
+    """Return a point after a Newton step with more harmonics; itself where no force acts on these; None where the step leaves a larger residual."""
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
     fed = {*judging_set_of(low), *harmonics_of(max(LEAST, FACTOR * low.order + MORE))}
@@ -32,17 +51,31 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
     x, padded = low.unknowns(point.coefficients), high.unknowns(point.coefficients)
     period = high.forces(padded, omega, problem.step(low, x, omega).events)
     if silent(low, high, period):
-        return point, 1.0
+        return Corrected(point, 0.0)
     before = high.linearise(padded, omega, period)
     change = problem.alert_solve(before.jac, -before.residual)
-    if change is not None and np.all(np.isfinite(change)):
-        after = high.linearise(padded + change, omega)
-        if np.linalg.norm(after.residual) < np.linalg.norm(before.residual):
-            return _point(point, high, padded + change), 1.0
-    if high.order > MOST:
+    if change is None or not np.all(np.isfinite(change)):
         return None
-    found = newton(lambda x: high.linearise(x, omega), padded, problem.sweep.newton)
-    return (_point(point, high, found.x), FARTHER) if found.status.converged else None
+    after = high.linearise(padded + change, omega)
+    if not np.linalg.norm(after.residual) < np.linalg.norm(before.residual):
+        return None
+    return Corrected(_point(point, high, padded + change), factorisation(padded.size))
+
+
+def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corrected | None:
+    """Return the motion of a point solved with harmonics up to an order; None where Newton's method finds none."""
+    high = _more(problem, harmonics_of(order))
+    start = high.unknowns(point.coefficients)
+    found = newton(lambda x: high.linearise(x, point.omega), start, problem.sweep.newton)
+    if not found.status.converged:
+        return None
+    work = max(found.iterations, 1) * factorisation(start.size)
+    return Corrected(_point(point, high, found.x), work)
+
+
+def factorisation(rows: int) -> float:
+    """Return the floating point operations of an LU factorisation."""
+    return 2.0 / 3.0 * float(rows) ** 3
 
 
 def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPoint:

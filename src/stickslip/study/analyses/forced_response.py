@@ -27,6 +27,11 @@ from stickslip.study.analyses.forced.blades import of_blades
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
+from stickslip.study.analyses.forced.examining import (
+    examined_points,
+    neighbours_of,
+    with_stable_peak,
+)
 from stickslip.study.analyses.forced.in_time import check_in_time, chosen
 from stickslip.study.analyses.forced.known import (
     inside,
@@ -58,11 +63,10 @@ from stickslip.study.analyses.forced.stable import (
     Examined,
     cost_line,
     examine,
-    to_examine,
     to_integrate,
     with_motion,
 )
-from stickslip.study.analyses.forced.stable_words import FEW, Point, runs_line
+from stickslip.study.analyses.forced.stable_words import peak_word, point_of, stability_log
 from stickslip.study.analyses.forced.summary import tables
 from stickslip.study.analyses.forced.values import (
     Values,
@@ -79,6 +83,7 @@ from stickslip.units import HZ
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
+MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
 BLADES = "blades"  # of a wheel whose sectors differ
 BIFURCATIONS = "bifurcations"
 NOT_PERIODIC = "not_periodic"
@@ -131,14 +136,16 @@ class ForcedResponseAnalysis:
                 yield points[-1]
         notes.put("finished", {"points": len(points)})
         response = collect(inputs.problem, points, inputs.model.peak_output)
-        _put_down(inputs, response, notes)
+        examined = _examined(inputs, response, notes)
+        response = with_stable_peak(response, examined)
+        _put_down(inputs, response, examined, notes)
         if inputs.model.blades is not None and notes.get(BLADES) is None:
             notes.put(BLADES, of_blades(inputs, response))
         if failure is not None and response.top is None:
             raise failure  # nothing to judge
-        _judge(inputs, response, notes)
+        told = _judge(inputs, response, examined, notes)
         if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
-            notes.put(BIFURCATIONS, _bifurcations(inputs, response, notes))
+            notes.put(BIFURCATIONS, _bifurcations(inputs, response, told, notes))
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
         if notes.get(PHYSICS) is None:
@@ -215,7 +222,9 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
         advance(*progress(point, question.sweep))
 
 
-def _put_down(question: Question, response: Response, notes: Notes) -> None:
+def _put_down(
+    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
+) -> None:
     """Put down all that the dataset needs, once."""
     if notes.get("response") is not None:
         return
@@ -223,7 +232,8 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     notes.put("model", of_model(question, response.output))
     told = {"known_verdicts": to_json(known(question, response, shift))}
     notes.put("response", of_response(question, response, shift) | told)
-    peak = f"peak {1e3 * response.peak_amplitude:.4g} mm at {response.peak_hz:.3f} Hz, {len(response.accepted)} points"
+    size = f"peak {1e3 * response.peak_amplitude:.4g} mm at {response.peak_hz:.3f} Hz"
+    peak = f"{size}, {peak_word(response, examined)}, {len(response.accepted)} points"
     if response.top is None:
         peak = f"no peak, {len(response.accepted)} points"
     lost = f"{response.failed} not converged"
@@ -231,22 +241,27 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     sum_up(f"{peak}, {lost}" if response.failed else peak, line)
 
 
-def _judge(question: Question, response: Response, notes: Notes) -> None:
-    """Examine the stability, and integrate in time what was asked for and what the multipliers leave undecided at the peak."""
-    examined = _examined(question, response, notes)
+def _judge(
+    question: Question, response: Response, examined: list[Examined], notes: Notes
+) -> list[Examined]:
+    """Integrate in time what was asked for, and return what is known of the stability then."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
-    if not chosen_points and response.top and to_integrate(question, response, examined):
-        chosen_points = [response.top]
     checks = {a.point.omega: _checked(question, response, a, examined, notes) for a in chosen_points}  # fmt: skip
-    if checks:
-        notes.put(IN_TIME, of_checks(list(checks.values())))
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
-    points = [Point(o.omega / HZ, o.verdict, o.multiplier, o.error, o.sentence) for o in told]
-    for line in [p.sentence for p in points] if len(points) <= FEW else [runs_line(points)]:
+    for one in told:
+        known = notes.get(f"{IN_TIME}.{one.omega!r}")
+        if known and one.motion:
+            checks.setdefault(one.omega, Check(**known))
+    if checks:
+        notes.put(IN_TIME, of_checks([checks[omega] for omega in sorted(checks)]))
+    attained = [omega for omega, check in checks.items() if check.motion == "attained"]
+    told = neighbours_of(question, response, told, attained)
+    for line in stability_log([p for p in map(point_of, told) if p.basis == "examined"]):
         LOG.info(f"stability: {question.said(line)}")
-    notes.put(STABLE, of_examined(told))
+    notes.put(STABLE, of_examined(told, len(response.accepted)))
     if question.not_periodic_s > 0.0:
         _answer_in_time(question, response, told, notes)
+    return told
 
 
 def _answer_in_time(
@@ -265,7 +280,9 @@ def _answer_in_time(
         notes.put(NOT_PERIODIC, of_answers(answers))
 
 
-def _bifurcations(question: Question, response: Response, notes: Notes) -> Values:
+def _bifurcations(
+    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
+) -> Values:
     """Locate the bifurcations of the response, and follow what leaves there."""
     found = located(question, response, notes)
     for line in found.sentences:
@@ -273,18 +290,31 @@ def _bifurcations(question: Question, response: Response, notes: Notes) -> Value
     sides = followed(question, found)
     for begin, side in sides:
         LOG.info(f"from {begin.omega / HZ:.6g} Hz: {question.said(side.sentence)}")
-    return of_bifurcations(question, response, found, sides)
+    return of_bifurcations(question, response, found, sides, examined)
 
 
 def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:
-    """Examine the stability; what an interrupted run has examined is not done again."""
-    found = []
-    for position in to_examine(question, response):
-        name = f"{STABLE}.{position}"
+    """Examine the stability; what an interrupted run has examined is not done again.
+
+    Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
+    """
+    count = 0
+
+    def look(accepted: Accepted) -> Examined:
+        nonlocal count
+        name, count = f"{STABLE}.{count}", count + 1
         known = notes.get(name)
-        one = Examined(**known) if known else examine(question, response.accepted[position])
+        one = Examined(**known) if known else examine(question, accepted)
         notes.put(name, asdict(one))
-        found.append(one)
+        return one
+
+    found = examined_points(question, response, look)
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, found)
+        if not to_integrate(question, peak, found) or peak.top is None:
+            break
+        check = _checked(question, peak, peak.top, found, notes)
+        found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
     return found
 
 

@@ -11,6 +11,8 @@ import xarray as xr
 
 Level = Literal["trusted", "doubtful", "wrong"]
 LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a dataset is its place
+UNSTABLE = "unstable"  # of a point: an answer, which a machine does not stay at
+POINT_LEVELS = (*LEVELS, UNSTABLE)  # numbers of the verdict on a point
 ATTRIBUTE = "verdicts"  # of the dataset of an analysis
 ALIKE = 20  # characters that two verdicts of one kind share before their first number, at least
 _NUMBER = re.compile(r"\d")
@@ -208,7 +210,7 @@ def conclusion(tree: xr.DataTree) -> str:
     head = f"{warnings} warning{'s' * (warnings > 1)}, see the verdicts. " if warnings else ""
     found = [node["verdict"].values for node in tree.children.values() if "verdict" in node]
     every = np.concatenate([np.zeros(0, dtype=np.int64), *found])
-    counts = {LEVELS[k]: int(np.sum(every == k)) for k in (2, 1)}
+    counts = {POINT_LEVELS[k]: int(np.sum(every == k)) for k in (2, 1, 3)}
     off = ", ".join(f"{n} {level}" for level, n in counts.items() if n)
     if not off:
         return f"{head}Every answer is trusted."

@@ -22,8 +22,10 @@ from stickslip.study.analyses.forced.examination import (
     hill_work,
 )
 from stickslip.study.analyses.forced.points import Response
+from stickslip.study.analyses.forced.quantities import MOTION
 from stickslip.study.analyses.forced.question import Question
-from stickslip.study.analyses.forced.stable import why_not
+from stickslip.study.analyses.forced.stable import Examined, why_not
+from stickslip.study.analyses.forced.stable_words import BASES
 from stickslip.study.analyses.forced.values import Values, texts
 from stickslip.units import HZ
 
@@ -35,8 +37,6 @@ HILL_SECONDS = 1800.0  # and in how long, by its estimate, it looks at more
 NOT_FOLLOWED = (
     "what leaves there is not followed: every sector of so large a wheel would count for itself"
 )
-BY_VERDICT = {"stable": 0, "unstable": 1, "undecided": 2}
-NOT_EXAMINED = 3
 
 
 @dataclass(eq=False)
@@ -60,11 +60,15 @@ class Remembered:
                 "re": values.real,
                 "im": values.imag,
                 "errors": found.errors,
+                "moduli": found.errors if found.moduli is None else found.moduli,
             }
             self.notes.put(name, known | {word: getattr(found, word) for word in COUNTS})
             return found
         floquet = Floquet(np.asarray(known["re"]) + 1j * np.asarray(known["im"]))
-        return Stability(floquet, np.asarray(known["errors"]), *(int(known[w]) for w in COUNTS))
+        moduli = np.asarray(known.get("moduli", known["errors"]))
+        resting, grazing, transitions = (int(known[w]) for w in COUNTS)
+        errors = np.asarray(known["errors"])
+        return Stability(floquet, errors, resting, grazing, transitions, moduli)
 
 
 def located(question: Question, response: Response, notes: Notes) -> Bifurcations:
@@ -119,8 +123,9 @@ def of_bifurcations(
     response: Response,
     found: Bifurcations,
     sides: Sequence[tuple[Bifurcation, SideBranch]],
+    examined: Sequence[Examined] = (),
 ) -> Values:
-    """Return bifurcations and the branches that leave there as values of the dataset."""
+    """Return bifurcations and the branches that leave there as values of the dataset, and what is known of the stability of points by them or before."""
     own, problem = found.found, question.problem
     points = [(n, side, p) for n, (_, side) in enumerate(sides) for p in side.points]
     output = response.output
@@ -138,7 +143,7 @@ def of_bifurcations(
         "bifurcation_outside": np.array([b.after for b in own], dtype=np.int64),
         "bifurcation_sentence": texts(b.sentence for b in own),
         "bifurcations_limits": "; ".join(limits(question, found)),
-        "motion_stability": np.array([_of_point(s) for s in known], dtype=np.int64),
+        **_of_motions(known, examined),
         "side_branch_frequency_hz": np.array([b.omega / HZ for b, _ in sides]),
         "side_branch_periods": np.array([s.periods for _, s in sides], dtype=np.int64),
         "side_branch_sentence": texts(f"from the {b.kind} at {b.omega / HZ:.6g} Hz: {s.sentence}" for b, s in sides),
@@ -185,5 +190,14 @@ def bifurcations_line(question: Question) -> tuple[str, ...]:
     )
 
 
-def _of_point(found: Stability | None) -> int:
-    return NOT_EXAMINED if found is None else BY_VERDICT[found.verdict]
+def _of_motions(known: Sequence[Stability | None], examined: Sequence[Examined]) -> Values:
+    """Return what is known of the stability of each point: by an examination, by multipliers along the branch, by what follows from others."""
+    word = np.full(len(known), MOTION["not examined"], dtype=np.int64)
+    basis = np.zeros(len(known), dtype=np.int64)
+    own = {e.position: e for e in examined}
+    for i, found in enumerate(known):
+        if found is not None:
+            word[i], basis[i] = MOTION[found.verdict], BASES.index("examined")
+        if i in own and (found is None or own[i].motion or own[i].basis == "examined"):
+            word[i], basis[i] = MOTION[own[i].verdict], BASES.index(own[i].basis)
+    return {"motion_stability": word, "motion_stability_basis": basis}

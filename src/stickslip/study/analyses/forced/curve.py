@@ -12,11 +12,14 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.harmonic.support import named
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.study.analyses.forced.jumps import stored_energy
+from stickslip.study.analyses.forced.quantities import MOTION
 from stickslip.study.analyses.forced.question import RIGID
 
 DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
 ATTAINED = 1.0  # percent between a settled time integration and the balance
 HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
+UNSTABLE = MOTION["unstable"]
+CARRIED = 2  # the number of motion_stability_basis
 SAME = 1e-9  # relative difference of frequencies that are one
 
 
@@ -229,6 +232,28 @@ class Curve:
     def reference(self) -> FloatArray:
         """(n,) change that the judging set of the most harmonics is predicted to make, a fraction; NaN where it was not asked for."""
         return self.floats("reference_error_percent") / 100
+
+    @cached_property
+    def unstable(self) -> IntArray:
+        """Positions of points whose motion is known to be unstable."""
+        off = self.floats("motion_stability") == UNSTABLE
+        for point, row in self.examined("stability_verdict"):
+            off[point] |= str(row["stability_verdict"]) == "unstable"
+        return np.flatnonzero(off)
+
+    @cached_property
+    def known(self) -> frozenset[int]:
+        """Positions of points whose stability follows from others, whatever their own multipliers leave open."""
+        carried = self.floats("motion_stability_basis") == CARRIED
+        return frozenset(np.flatnonzero(carried).tolist())
+
+    @property
+    def peak_stability(self) -> str:
+        """What is known of the stability of the peak, in a word; of files that hold rows of examined points alone what its row says."""
+        rows = [row for point, row in self.examined("stability_verdict") if point == self.peak]
+        known = [str(row["stability_verdict"]) for row in rows]
+        word = self.floats("motion_stability")[self.peak] if self.peak >= 0 else np.nan
+        return next(iter(known), next((name for name, k in MOTION.items() if k == word), ""))
 
     @property
     def rigid(self) -> bool:

@@ -108,7 +108,7 @@ def without_periodic(
         if not a.point.converged
     }
     for one in examined:
-        if one.verdict == "unstable":
+        if one.verdict == "unstable" and _alone(response, examined, one):
             found[one.omega] = "the periodic motion is unstable", one.multiplier
         elif one.verdict == "undecided" and not one.motion and not np.isfinite(one.error):
             found[one.omega] = (
@@ -118,6 +118,20 @@ def without_periodic(
     middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega  # fmt: skip
     nearest = sorted(found, key=lambda omega: abs(omega - middle))
     return [(omega, *found[omega]) for omega in nearest[: question.not_periodic_points]]
+
+
+def _alone(response: Response, examined: Sequence[Examined], one: Examined) -> bool:
+    """Whether an unstable motion is the largest one, or no stable motion of the response stands at its frequency."""
+    if one.position == response.unstable_peak:
+        return True
+    known = {e.position: e.verdict == "stable" for e in examined}
+    omega = [a.point.omega for a in response.accepted]
+    between = (
+        min(omega[i], omega[i + 1]) <= one.omega <= max(omega[i], omega[i + 1])
+        for i in range(len(omega) - 1)
+        if known.get(i) and known.get(i + 1)
+    )
+    return not any(between)
 
 
 def in_time_instead(

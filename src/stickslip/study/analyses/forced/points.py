@@ -92,11 +92,13 @@ class Response:
     accepted
         One entry a frequency, along the branch, peak refinements last.
     peak
-        Position of the largest amplitude of the report output in `accepted`, -1 if nothing converged.
+        Position in `accepted` of the largest amplitude of the report output that is not known to be unstable, -1 if nothing converged.
     output
         Position of the output whose peak counts.
     low_harmonics
         Harmonics of the first passage.
+    unstable_peak
+        Position of a larger amplitude whose motion is unstable, so that it is not the peak; -1 where there is none.
     """
 
     solved: tuple[ForcedPoint, ...]
@@ -104,6 +106,7 @@ class Response:
     peak: int
     output: int
     low_harmonics: Harmonics
+    unstable_peak: int = -1
 
     @property
     def top(self) -> Accepted | None:

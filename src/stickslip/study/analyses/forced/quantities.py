@@ -13,9 +13,16 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.response.forced.choices import Stage
 from stickslip.solve.status import Status
-from stickslip.study.analyses.verdict import LEVELS
+from stickslip.study.analyses.verdict import LEVELS, POINT_LEVELS
 
 STAGES = get_args(Stage)
+MOTION = {
+    "stable": 0,
+    "unstable": 1,
+    "undecided": 2,
+    "not examined": 3,
+    "neutral": 4,
+}  # numbers of motion_stability
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,8 @@ _OF = {
         "peak_amplitude": ("m", "largest amplitude of the report output"),
         "peak_frequency_hz": ("Hz", "frequency of the peak"),
         "peak_point": ("1", "index of the peak into point, -1 if none"),
+        "unstable_peak_amplitude": ("m", "a larger amplitude whose motion is unstable, so that it is not the peak; NaN where there is none"),
+        "unstable_peak_frequency_hz": ("Hz", "its frequency"),
         "peak_damping": ("1", "equivalent damping ratio at the peak: work of the load in a cycle over 4π times the largest energy stored by structure and contacts; half the inverse of the quality factor"),
         "points": ("1", "accepted points"),
         "points_low": ("1", "accepted points with the harmonics of the first passage"),
@@ -78,7 +87,8 @@ _OF = {
         "newton_iterations": ("1", "Newton iterations"),
         "seconds": ("s", "time of the point"),
         "refinement": ("1", "1 if the point was added to resolve the peak"),
-        "motion_stability": ("1", "whether disturbances of the point's motion die, by its multipliers, where bifurcations were located"),
+        "motion_stability": ("1", "whether disturbances of the point's motion die"),
+        "motion_stability_basis": ("1", "what that rests on: an examination of the point, of its neighbours, or the sign of the determinant of the Jacobian"),
         "marched_sentence": ("1", "what the motion in time from rest did where the point was not found otherwise, empty elsewhere"),
         "verdict": ("1", "whether the point is to be trusted"),
         "verdict_reason": ("1", "why not, empty where it is"),
@@ -172,7 +182,7 @@ _OF = {
     "examined": {
         "stability_case": ("1", "case of a point whose stability was examined"),
         "stability_frequency_hz": ("Hz", "its frequency"),
-        "stability_verdict": ("1", "stable, unstable, undecided or not examined"),
+        "stability_verdict": ("1", "stable, unstable, neutral, undecided or not examined"),
         "stability_multiplier": ("1", "modulus of the multiplier that decides, the largest as a rule; NaN where none is known"),
         "stability_multiplier_error": ("1", "how far it may be from that of the motion with all harmonics"),
         "stability_sentence": ("1", "what was found and why, in words"),
@@ -271,8 +281,9 @@ def flags(name: str) -> dict[str, IntArray | str]:
         "attempt_status": {s.name.lower(): int(s) for s in Status},
         "attempt_stage": {stage: i for i, stage in enumerate(STAGES)},
         "peak_state": {"stick": 0, "slip": 1, "open": 2},
-        "motion_stability": {"stable": 0, "unstable": 1, "undecided": 2, "not_examined": 3},
-        "verdict": {level: i for i, level in enumerate(LEVELS)},
+        "motion_stability": {word.replace(" ", "_"): i for word, i in MOTION.items()},
+        "motion_stability_basis": {"not_examined": 0, "examined": 1, "carried": 2, "by_sign": 3},
+        "verdict": {level: i for i, level in enumerate(POINT_LEVELS)},
         "case_verdict": {level: i for i, level in enumerate(LEVELS)},
     }.get(name)
     if meanings is None:

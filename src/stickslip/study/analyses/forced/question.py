@@ -64,7 +64,7 @@ class Question:
     first
         Whether it is the first case, which says what all have in common.
     examine
-        Of which points the stability is examined: ``peak``, ``all`` or ``off``.
+        Of which points the stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
     bifurcations
         Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
     not_periodic_s
@@ -83,7 +83,7 @@ class Question:
     key: str = "frequency_hz"
     checks: frozenset[str] = frozenset()
     first: bool = True
-    examine: Literal["peak", "off", "all"] = "peak"
+    examine: Literal["auto", "peak", "off", "all"] = "auto"
     bifurcations: Literal["off", "folds", "all", "branches"] = "off"
     not_periodic_s: float = 0.0
     not_periodic_points: int = 2

@@ -1,7 +1,6 @@
 """What makes a forced response doubtful or wrong: one function a rule, each made from the variables of the finished dataset."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -12,55 +11,24 @@ from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
-from stickslip.study.analyses.forced.jumps import jumps
-from stickslip.study.analyses.forced.question import (
-    ALONE,
-    MORE_THAN_LOW,
-    MOST_IN_TIME,
-    TOO_MANY,
+from stickslip.study.analyses.forced.finding import (
+    Finding,
+    Rule,
+    in_time_there,
+    without_place,
 )
-from stickslip.study.analyses.verdict import Level, from_json
+from stickslip.study.analyses.forced.jumps import jumps
+from stickslip.study.analyses.forced.question import MORE_THAN_LOW
+from stickslip.study.analyses.forced.stable_rules import (
+    bifurcated,
+    fewer,
+    stability,
+    unstable_stretches,
+)
+from stickslip.study.analyses.verdict import from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
-UNSTABLE, UNDECIDED = 1, 2  # flags of motion_stability
-LEAVING = dict.fromkeys(
-    ("period doubling", "branch point"),
-    'forced_response.bifurcations = "branches" follows what leaves there.',
-)
-FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
-OPEN = "No more time helps, and no fewer modes: it stays open. More harmonics make the errors of multipliers smaller."
-IN_TIME = "--verify integrates in time at the peak"
-IN_TIME_TELLS = (
-    "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
-)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What a rule finds.
-
-    Parameters
-    ----------
-    level, why, remedy
-        As of a `Verdict`; ``trusted`` is told without doubt.
-    points
-        Positions of its points within the case; none: the case as a whole.
-    size
-        Of several findings of a rule the largest stands for all.
-    value
-        Its size as text, where a sentence about several points tells the largest.
-    """
-
-    level: Level
-    why: str
-    remedy: str
-    points: tuple[int, ...] = ()
-    size: float = 0.0
-    value: str = ""
-
-
-Rule = Callable[[Curve], Iterator[Finding]]
 
 
 def unsolved(case: Curve) -> Iterator[Finding]:
@@ -93,18 +61,11 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             continue  # what was solved or integrated tells more than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
-            remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
+            remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(own), error_text(own))
         elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
-
-
-def _in_time(case: Curve, point: int) -> str:
-    """Say how a point is integrated in time: of a sweep it is the peak that is."""
-    if point == case.peak or case.range_key == "speed_rpm":
-        return IN_TIME
-    return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
 
 
 def _more(case: Curve, point: int) -> str:
@@ -143,7 +104,7 @@ def audited(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
-            remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
+            remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
             told = error_text(case.audit[i])
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]), told)
 
@@ -206,6 +167,7 @@ def folds(case: Curve) -> Iterator[Finding]:
         return
     low, high = min(b for b, _ in back), max(a for _, a in back)
     inside = low <= case.peak_hz <= high
+    doubted = inside and case.peak_stability not in ("stable", "neutral")
     digits = next((d for d in range(2, 6) if round(low, d) != round(high, d)), 6)
     why = (
         f"the response folds between {low:.{digits}f} and {high:.{digits}f} Hz: more than one periodic motion was found there, as a rule one "
@@ -214,57 +176,7 @@ def folds(case: Curve) -> Iterator[Finding]:
     remedy = "Points outside the asked range belong to the fold."
     if inside:
         remedy = 'Which motion a machine takes depends on its history: sweep both ways (direction = "down"), and see --verify.'
-    yield Finding("doubtful" if inside else "trusted", why, remedy)
-
-
-def stability(case: Curve) -> Iterator[Finding]:
-    """Judge by the multipliers of the motion."""
-    for point, said in case.examined("stability_verdict"):
-        why = without_place(said["stability_sentence"]).removesuffix(IN_TIME_TELLS)
-        if said["stability_verdict"] == "unstable":
-            why = f"a machine does not stay there: {why}"
-            remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."
-            yield Finding("wrong", why, remedy, (point,))
-        elif said["stability_verdict"] == "undecided" and not case.attained[point]:
-            why = f"whether it is stable: {why}"
-            told = [why, *(str(s["not_periodic_sentence"]) for s in case.rows("not_periodic"))]
-            known = next(filter(None, map(fewer, told)), "")
-            remedy = known or f"{_in_time(case, point)}, and sees whether the motion stays."
-            yield Finding("doubtful", why, remedy, (point,))
-
-
-def bifurcated(case: Curve) -> Iterator[Finding]:
-    """Tell where the branch loses its stability, and take no motion for one that a machine keeps whose multipliers show that a disturbance grows."""
-    told = {point for point, _ in case.examined("stability_verdict")}
-    for i in np.flatnonzero(case.floats("motion_stability") == UNSTABLE):
-        if int(i) not in told and case.converged[i]:
-            why = "a machine does not stay there: multipliers lie outside the unit circle"
-            remedy = 'See the table of bifurcations: bifurcations = "branches" follows what leaves the response.'
-            yield Finding("wrong", why, remedy, (int(i),), float(case.amplitude[i]))
-    unjudged = case.floats("motion_stability") == UNDECIDED
-    if unjudged.any():
-        judged = np.isin(case.floats("motion_stability"), (0, UNSTABLE, UNDECIDED))
-        hz = case.hz[unjudged]
-        why = (
-            f"bifurcations may be missed: {hz.size} of {judged.sum()} motions along the branch could not be judged, between "
-            f"{hz.min():.2f} and {hz.max():.2f} Hz"
-        )
-        remedy = "More harmonics make the errors of multipliers smaller; --verify integrates in time at the peak."
-        yield Finding("trusted", why, remedy)
-    left = {float(said["side_branch_frequency_hz"]) for said in case.rows("side_branch")}
-    for said in case.rows("bifurcation"):
-        if said["bifurcation_kind"] == "fold":  # the rule of folds tells of these
-            continue
-        remedy = LEAVING.get(str(said["bifurcation_kind"]), "")
-        if float(said["bifurcation_frequency_hz"]) in left:
-            remedy = "The branch that leaves there is drawn with the response."
-        yield Finding("trusted", str(said["bifurcation_sentence"]), remedy)
-
-
-def without_place(sentence: str) -> str:
-    """Return the sentence of a check without the frequency at its head, which a verdict names itself, and without its full stop."""
-    head, found, rest = sentence.partition(" Hz: ")
-    return (rest if found and head.replace(".", "").isdigit() else sentence).removesuffix(".")
+    yield Finding("doubtful" if doubted else "trusted", why, remedy)
 
 
 def in_time(case: Curve) -> Iterator[Finding]:
@@ -275,6 +187,8 @@ def in_time(case: Curve) -> Iterator[Finding]:
         if motion == "not periodic" and max(wanders, abs(off)) <= ATTAINED:
             why = f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
             yield Finding("doubtful", why, "Believe the amplitude to as much.", (point,))
+        elif point in case.unstable and point != case.peak:
+            continue  # an answer: `unstable_stretches` tells of it
         elif motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
             why = f"the motion in time, started from it, {what}: {without_place(said['verify_sentence'])}"
@@ -323,13 +237,6 @@ def not_periodic(case: Curve) -> Iterator[Finding]:
         elif large := fewer(sentence):
             remedy = large
         yield Finding("trusted" if settled else "doubtful", why, remedy, (point,))
-
-
-def fewer(sentence: str) -> str:
-    """Return what to do where a model has too many coordinates to be integrated in time, which no more time helps; empty where it has not."""
-    if f"coordinates {TOO_MANY} {MOST_IN_TIME}" not in sentence:
-        return ""
-    return OPEN if ALONE in sentence else FEWER
 
 
 def at_the_end(case: Curve) -> Iterator[Finding]:
@@ -381,6 +288,7 @@ RULES: tuple[Rule, ...] = (
     unsolved,
     in_time,
     stability,
+    unstable_stretches,
     bifurcated,
     not_periodic,
     audited,

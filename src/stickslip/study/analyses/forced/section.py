@@ -48,10 +48,11 @@ class ForcedResponse(Section):
         description="number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with "
         "more points where it turns (a single passage then steps through as many as points says)",
     )
-    stability: Literal["peak", "off", "all"] = Field(
-        "peak",
-        description="whether a disturbance dies, by Floquet multipliers. peak: at the peak of each case and at up to four doubtful "
-        "points, the nearest to it; all: at every point; off: nowhere",
+    stability: Literal["auto", "peak", "off", "all"] = Field(
+        "auto",
+        description="whether a disturbance dies, by Floquet multipliers. auto: at the peak, the ends, beside folds, where the list of "
+        "transitions in the cycle changes, and between these, at all points where matrices have at most 500 rows, else as far as the "
+        "work of the solutions goes; peak: at the peak alone; all: at every point; off: nowhere",
     )
     bifurcations: Literal["off", "folds", "all", "branches"] = Field(
         "off",

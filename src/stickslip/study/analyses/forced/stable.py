@@ -1,4 +1,4 @@
-"""Whether the motions of a response are stable: the multipliers at its peak and at points that are doubtful, and what a motion in time adds."""
+"""Whether a motion of a response is stable: what its multipliers say, and what a motion in time adds."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -8,13 +8,13 @@ import numpy as np
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability import Stability, hill_stability, stability
+from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.stability.waves import (
     WaveDisturbance,
     growing_wave,
     point_disturbances,
 )
 from stickslip.study.analyses.forced.comparison import Check
-from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import (
     FLOPS,
     by_hill,
@@ -23,13 +23,12 @@ from stickslip.study.analyses.forced.examination import (
     too_long,
 )
 from stickslip.study.analyses.forced.in_time import seconds_in_time
-from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question, too_large
 from stickslip.units import HZ
 
-Word = Literal["stable", "unstable", "undecided", "not examined"]
-DOUBTFUL = 4  # points beside the peak, the nearest to it
+Word = Literal["stable", "unstable", "neutral", "undecided", "not examined"]
+Basis = Literal["not examined", "examined", "carried", "by sign"]
 MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
 FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
 ONE_SECTOR = (
@@ -56,6 +55,13 @@ class Examined:
         What the motion in time did where the multipliers left the verdict undecided; empty where it was not asked.
     large
         Why the model is not integrated in time; empty where it can be.
+    basis
+        Whether the point itself was examined, or its verdict follows from others: carried along between two of them, or by the sign of the
+        determinant of the balance's Jacobian.
+    position
+        Of the point in the response.
+    work
+        Floating point operations that the examination took.
     """
 
     omega: float
@@ -65,11 +71,21 @@ class Examined:
     reason: str
     motion: str = ""
     large: str = ""
+    basis: Basis = "examined"
+    position: int = -1
+    work: float = 0.0
 
     @property
     def doubted(self) -> bool:
         """Whether the multipliers were looked at and do not show that disturbances die."""
         return self.verdict in ("unstable", "undecided")
+
+    def linear(self, size: float) -> str:
+        """Return why another point is stable whose contacts rest in the states of this one, its largest multiplier having a modulus."""
+        return (
+            f"no contact changes its state, as at {self.omega / HZ:.3f} Hz, so that the exponents are the same: the largest multiplier has the "
+            f"modulus {modulus_text(size)}"
+        )
 
     @property
     def sentence(self) -> str:
@@ -84,44 +100,22 @@ class Examined:
         return f"{told}, the motion in time being {self.motion}; by the multipliers undecided: {self.reason}"
 
 
-def to_examine(question: Question, response: Response) -> list[int]:
-    """Return positions of the points that are examined: the peak, and doubtful ones as near to it as possible; or all.
-
-    A point is doubtful where its own predicted error or its audit is above the threshold, or a jump lies beside it. Where nothing can be
-    examined the peak stands for all.
-    """
-    if question.examine == "off" or response.top is None:
-        return []
-    if why_not(question) or by_hill(question.model.system):
-        return [response.peak]
-    known = [i for i, a in enumerate(response.accepted) if a.point.converged]
-    if question.examine == "all":
-        return known
-    peak, beside = response.top.point.omega, _beside_jumps(response)
-    doubtful = [
-        i
-        for i in known
-        if i != response.peak and (i in beside or _off(question, response.accepted[i]))
-    ]
-    nearest = sorted(doubtful, key=lambda i: abs(response.accepted[i].point.omega - peak))
-    return sorted([response.peak, *nearest[:DOUBTFUL]])
-
-
 def examine(question: Question, accepted: Accepted) -> Examined:
     """Return what the multipliers say of a point, or why they say nothing."""
     omega = accepted.point.omega
     why, hill = why_not(question), by_hill(question.model.system)
     if why:
-        return Examined(omega, "not examined", np.nan, np.nan, why)
+        return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
     try:
         if hill:
             return _by_hill(question, accepted)
         found = stability(question.problem, accepted.point)
         wave = _of_wave(question, accepted, found)
     except InputError as error:
-        return Examined(omega, "not examined", np.nan, np.nan, error.problem)
+        return Examined(omega, "not examined", np.nan, np.nan, error.problem, basis="not examined")
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
-        return Examined(omega, "not examined", np.nan, np.nan, f"no multipliers ({error})")
+        why = f"no multipliers ({error})"
+        return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
     return _seen(question, accepted, found, f"{found.reason}{wave}")
 
 
@@ -143,6 +137,7 @@ def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -
         found.multiplier_error,
         said,
         large=too_large(question),
+        work=hill_work(question.model.system) if by_hill(question.model.system) else found.work,
     )
 
 
@@ -181,7 +176,10 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
     return (
         top is not None
         and question.model.system.structure.of_harmonic(1).loss is None
-        and any(e.omega == top.point.omega and e.verdict == "undecided" for e in examined)
+        and any(
+            e.position == response.peak and e.verdict == "undecided" and not e.motion
+            for e in examined
+        )
         and seconds_in_time(question.model.system) < MOST_IN_TIME
     )
 
@@ -219,11 +217,11 @@ def cost_line(question: Question) -> str:
         waves = " against every wave, one sector at a time" if wheel else ""
         most = max(1.0, hill_work(system) / FLOPS)
         return f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s"
-    points = (
-        "every point"
-        if question.examine == "all"
-        else f"the peak and at most {DOUBTFUL} doubtful points"
-    )
+    points = {
+        "all": "every point",
+        "peak": "the peak",
+        "auto": "the peak, and other points as far as the work of the solutions goes, all of them where matrices are small,",
+    }[question.examine]
     seconds = seconds_in_time(question.model.system)
     motion = (
         f"up to {seconds:.1f} s of integration in time"
@@ -231,22 +229,3 @@ def cost_line(question: Question) -> str:
         else f"it stays undecided without --verify (about {seconds:.0f} s)"
     )
     return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where the peak is undecided, {motion}"
-
-
-def _off(question: Question, accepted: Accepted) -> bool:
-    """Whether the own error of a point, or its difference from its audit, is above the threshold."""
-    return bool(accepted.own_error > question.limit or accepted.audit_error > question.limit)
-
-
-def _beside_jumps(response: Response) -> set[int]:
-    """Return positions of the points on either side of a jump."""
-    every = response.accepted
-    along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
-    branch = [i for i, a in enumerate(every[:along]) if a.fields is not None]
-    shown = [f for f in (every[i].fields for i in branch) if f is not None]
-    amplitude = np.array([response.amplitude(every[i]) for i in branch])
-    few = np.array([every[i].point.support == response.low_harmonics for i in branch], dtype=bool)
-    loss = np.array([f.energy.sum() for f in shown])
-    elastic = max((stored_energy(f.gaps[None, 1:], f.forces[None, 1:]) for f in shown), default=0.0)
-    found = jumps(amplitude, loss, few, elastic)
-    return {i for jump in found for i in branch[jump.step : jump.step + 2]}

@@ -8,9 +8,18 @@ import numpy as np
 import xarray as xr
 
 from stickslip.response.stability.modulus import modulus_text
+from stickslip.study.analyses.forced.points import Response
+from stickslip.study.analyses.forced.stable import Examined
 from stickslip.study.analyses.verdict import said
+from stickslip.units import HZ
 
 FEW = 6  # points of a case that are told one by one
+BASES = (
+    "not examined",
+    "examined",
+    "carried",
+    "by sign",
+)  # in the order of their numbers in the dataset
 MOST_RUNS = 12
 MOST_SENTENCES = 10
 
@@ -29,6 +38,8 @@ class Point:
         Modulus of the multiplier that decides and its error; NaN where none is known.
     sentence
         What was found and why.
+    basis
+        Whether it was examined itself, or follows from others.
     """
 
     hz: float
@@ -36,6 +47,28 @@ class Point:
     multiplier: float
     error: float
     sentence: str
+    basis: str = "examined"
+
+
+def point_of(examined: Examined) -> Point:
+    """Return what is told of a point."""
+    e = examined
+    return Point(e.omega / HZ, e.verdict, e.multiplier, e.error, e.sentence, e.basis)
+
+
+def peak_word(response: Response, examined: Sequence[Examined]) -> str:
+    """Return in a word or two what is known of the stability of the peak."""
+    return next((said_of(e.verdict) for e in examined if e.position == response.peak), said_of(""))
+
+
+def said_of(verdict: str) -> str:
+    """Return a verdict on the stability as it stands beside a peak."""
+    return {"undecided": "stability undecided"}.get(verdict, verdict) if verdict not in ("", "not examined") else "stability not examined"  # fmt: skip
+
+
+def stability_log(points: Sequence[Point]) -> list[str]:
+    """Return what the log says of the points of a case: a sentence for each of few, of many their runs."""
+    return [p.sentence for p in points] if len(points) <= FEW else [runs_line(points)]
 
 
 def stability_lines(points: Sequence[Point], peak_hz: float) -> tuple[str, ...]:
@@ -73,12 +106,28 @@ def of_case(data: xr.Dataset, case: int) -> list[Point]:
     ]
 
 
+def counts_line(data: xr.Dataset, case: int) -> str:
+    """Say of how many points of a case the stability is known, and from what; empty where the dataset does not say, or every point was examined."""
+    if "motion_stability_basis" not in data:
+        return ""
+    own = data["motion_stability_basis"].values[data["point_case"].values == case]
+    counts = {word: int(np.sum(own == k)) for k, word in enumerate(BASES)}
+    if counts["examined"] == own.size or not own.size:
+        return ""
+    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n and word != "not examined")
+    none = counts["not examined"]
+    return f"Of {own.size} points {told or 'none examined'}" + f"; {none} not examined" * bool(none)
+
+
 def all_lines(data: xr.Dataset, labels: Sequence[str]) -> tuple[str, ...]:
     """Return what is told of all cases, each line with the label of its case."""
     return tuple(
         said(label, line)
         for i, label in enumerate(labels)
-        for line in stability_lines(of_case(data, i), float(data["peak_frequency_hz"].values[i]))
+        for line in (
+            *filter(None, [counts_line(data, i)]),
+            *stability_lines(of_case(data, i), float(data["peak_frequency_hz"].values[i])),
+        )
     )
 
 

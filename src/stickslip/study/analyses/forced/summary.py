@@ -6,7 +6,8 @@ import xarray as xr
 from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.forced.bounds import BOUND
-from stickslip.study.analyses.forced.stable_words import all_lines
+from stickslip.study.analyses.forced.curve import Curve
+from stickslip.study.analyses.forced.stable_words import all_lines, said_of
 from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 from stickslip.study.analyses.verdict import LEVELS, said
 
@@ -31,6 +32,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         "case",
         *HEAD,
         "verdict",
+        "peak is",
         "points",
         f"H = {first}",
         more,
@@ -40,7 +42,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         "seconds",
     )
     name = amplitude_name(data)
-    rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
+    rows = tuple(_row(data, i, label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
         _of_orders(data, labels),
@@ -168,12 +170,14 @@ def _always_high(data: xr.Dataset) -> bool:
     return bool(data.attrs["selection"] == "always_high")
 
 
-def _row(case: xr.Dataset, label: str) -> tuple[str, ...]:
+def _row(data: xr.Dataset, i: int, label: str) -> tuple[str, ...]:
+    case = data.isel(case=i)
     return (
         label,
         _millimetres(1e3 * float(case["peak_amplitude"])),
         f"{float(case['peak_frequency_hz']):.3f}",
         LEVELS[int(case["case_verdict"])],
+        said_of(Curve(data, i).peak_stability),
         *(str(int(case[name])) for name in COUNTS),
         f"{sum(float(case[name]) for name in SECONDS):.2f}",
     )

@@ -14,9 +14,10 @@ from stickslip.response.recovery import equivalent_damping, signals
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
 from stickslip.study.analyses.forced.points import Response
-from stickslip.study.analyses.forced.quantities import STAGES
+from stickslip.study.analyses.forced.quantities import MOTION, STAGES
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.stable import Examined
+from stickslip.study.analyses.forced.stable_words import BASES
 from stickslip.units import HZ, RPM
 
 Values = dict[str, Any]
@@ -109,14 +110,21 @@ def of_checks(checks: Sequence[Check]) -> Values:
     }
 
 
-def of_examined(examined: Sequence[Examined]) -> Values:
-    """Return what was found of the stability of points."""
+def of_examined(examined: Sequence[Examined], count: int) -> Values:
+    """Return what is known of the stability: of points that were looked at row by row, and of each of `count` points of the response."""
+    rows = [e for e in examined if e.basis == "examined" or e.position < 0 or len(examined) == 1]
+    word = np.full(count, MOTION["not examined"], dtype=np.int64)
+    basis = np.zeros(count, dtype=np.int64)
+    for e in examined:
+        word[e.position], basis[e.position] = MOTION[e.verdict], BASES.index(e.basis)
     return {
-        "stability_frequency_hz": np.array([e.omega / HZ for e in examined]),
-        "stability_verdict": texts(e.verdict for e in examined),
-        "stability_multiplier": np.array([e.multiplier for e in examined]),
-        "stability_multiplier_error": np.array([e.error for e in examined]),
-        "stability_sentence": texts(e.sentence for e in examined),
+        "stability_frequency_hz": np.array([e.omega / HZ for e in rows]),
+        "stability_verdict": texts(e.verdict for e in rows),
+        "stability_multiplier": np.array([e.multiplier for e in rows]),
+        "stability_multiplier_error": np.array([e.error for e in rows]),
+        "stability_sentence": texts(e.sentence for e in rows),
+        "motion_stability": word,
+        "motion_stability_basis": basis,
     }
 
 
@@ -141,6 +149,7 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
         "peak_frequency_hz": response.peak_hz,
         "peak_point": response.peak,
         "peak_damping": _damping(question, response),
+        **_of_unstable(response),
         "points": len(response.accepted),
         "points_low": response.points_low,
         "points_high": len(response.accepted) - response.points_low,
@@ -154,6 +163,15 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
         "retention_peak_shift": shift[0],
         "retention_frequency_shift_hz": shift[1],
     }
+
+
+def _of_unstable(response: Response) -> Values:
+    """Return the largest motion where it is unstable, so that it is not the peak."""
+    if response.unstable_peak < 0:
+        return {"unstable_peak_amplitude": np.nan, "unstable_peak_frequency_hz": np.nan}
+    own = response.accepted[response.unstable_peak]
+    size, hz = response.amplitude(own), own.point.omega / HZ
+    return {"unstable_peak_amplitude": size, "unstable_peak_frequency_hz": hz}
 
 
 def _damping(question: Question, response: Response) -> float:

@@ -10,8 +10,19 @@ from stickslip.arrays import IntArray
 from stickslip.harmonic.judging import REACH
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import Curve
-from stickslip.study.analyses.forced.rules import RULES, Finding, without_place
-from stickslip.study.analyses.verdict import LEVELS, Level, Verdict, of_all_cases, worst
+from stickslip.study.analyses.forced.finding import Finding, without_place
+from stickslip.study.analyses.forced.rules import RULES
+from stickslip.study.analyses.forced.stable_rules import LEFT
+from stickslip.study.analyses.forced.stable_words import said_of
+from stickslip.study.analyses.verdict import (
+    LEVELS,
+    POINT_LEVELS,
+    UNSTABLE,
+    Level,
+    Verdict,
+    of_all_cases,
+    worst,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +41,16 @@ class Judged:
 
     @property
     def of_points(self) -> tuple[IntArray, list[str]]:
-        """(n,) number of the level of each point, and why, empty where it is trusted."""
+        """(n,) number of the level of each point among `POINT_LEVELS`, and why, empty where it is trusted."""
         levels = np.zeros(self.case.at.size, dtype=np.int64)
         reasons: list[list[str]] = [[] for _ in levels]
         for found, i in ((f, i) for own in self.findings for f in own for i in f.points):
             levels[i] = max(levels[i], LEVELS.index(found.level))
             reasons[i].append(found.why)
+        for i in self.case.unstable:
+            if levels[i] < LEVELS.index("wrong"):
+                levels[i] = POINT_LEVELS.index(UNSTABLE)
+                reasons[i].insert(0, LEFT)
         return levels, ["; ".join(own) for own in reasons]
 
     @property
@@ -76,10 +91,16 @@ class Judged:
 
 
 def _examined(case: Curve) -> str:
-    """Say what was examined at the peak, and what was not."""
+    """Say what was examined at the peak, its stability first, and what was not."""
     if case.peak < 0:
         return "nothing to judge"
-    peak, said = case.peak, [f"peak with H = {case.kept[case.peak]}"]
+    peak = case.peak
+    because = [
+        f" ({without_place(str(row['stability_sentence'])).removeprefix('not examined: ')})"
+        for point, row in case.examined("stability_verdict")
+        if point == peak and row["stability_verdict"] == "not examined"
+    ]
+    said = [f"peak with H = {case.kept[peak]}, {said_of(case.peak_stability)}{''.join(because)}"]
     said += ["exact, as no force acts on the harmonics left out"] * bool(case.exact[peak])
     for value, about in (
         (np.nan if case.exact[peak] else case.own_error[peak], "predicted error"),
@@ -88,16 +109,7 @@ def _examined(case: Curve) -> str:
     ):
         said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
     said += ["attained in time integration"] * bool(case.attained[peak])
-    told = [row for point, row in case.examined("stability_verdict") if point == peak]
-    known = [str(row["stability_verdict"]) for row in told]
-    if "stable" in known:
-        return ", ".join([*said, "stable"])
-    because = [
-        f" ({without_place(str(row['stability_sentence'])).removeprefix('not examined: ')})"
-        for row in told
-        if row["stability_verdict"] == "not examined"
-    ]
-    return f"{', '.join(said)}; whether it is stable was not examined{''.join(because)}"
+    return ", ".join(said)
 
 
 def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:

@@ -1,0 +1,150 @@
+"""The points of a response in the order of the branch, and what tells at no cost, or little, where their stability may change."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability.cycle import cycle_of
+from stickslip.solve.linear import factors_of
+
+MOST_ROWS = 500  # of a Jacobian that is factorised for its sign alone
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The converged points of a response along its branch.
+
+    Parameters
+    ----------
+    order
+        Their positions in the response.
+    sign
+        (n,) sign of the determinant of the balance's Jacobian: the parity of the number of real multipliers above 1, up to one sign for
+        the whole branch; NaN where it is not known.
+    cycle
+        The transitions of each, see `cycle_of`.
+    fold
+        (n - 1,) whether the branch turns back between neighbours, or beside one of them.
+    cut
+        (n - 1,) whether the branch is not known to run on between them: a point was not found, or the response jumps.
+    """
+
+    order: tuple[int, ...]
+    sign: FloatArray
+    cycle: tuple[bytes | None, ...]
+    fold: BoolArray
+    cut: BoolArray
+
+    def like(self, a: int, b: int) -> bool:
+        """Whether the same is known of all points from a to b, so that what holds at both ends holds between: no fold, one sign, one list of transitions."""
+        a, b = min(a, b), max(a, b)
+        signs, cycles = self.sign[a : b + 1], set(self.cycle[a : b + 1])
+        one = bool(np.all(signs == signs[0])) and len(cycles) == 1 and None not in cycles
+        return one and not np.any(self.fold[a:b] | self.cut[a:b])
+
+    @property
+    def changes(self) -> BoolArray:
+        """(n - 1,) whether the list of transitions changes between neighbours."""
+        return np.array([a != b or a is None for a, b in pairwise(self.cycle)], dtype=bool)
+
+    @property
+    def turns(self) -> BoolArray:
+        """(n - 1,) whether the sign of the determinant changes between neighbours."""
+        return np.asarray(self.sign[1:] * self.sign[:-1] < 0.0)
+
+    def runs(self) -> Iterator[range]:
+        """Yield the places between which the branch runs on."""
+        ends = [0, *(np.flatnonzero(self.cut) + 1).tolist(), len(self.order)]
+        yield from (range(a, b) for a, b in pairwise(ends) if a < b)
+
+
+def course_of(
+    problem: ForcedProblem, points: Sequence[ForcedPoint], along: int, jumps: Sequence[int]
+) -> Course:
+    """Return the course of a response.
+
+    Parameters
+    ----------
+    problem
+        What was solved.
+    points
+        The accepted points; those from `along` on resolve the peak, and find their place on the branch by their distance from it.
+    along
+        Number of points in the order of the branch.
+    jumps
+        Positions of points behind which the response jumps.
+    """
+    branch = [i for i in range(along) if points[i].converged]
+    others = [i for i in range(along, len(points)) if points[i].converged]
+    if not branch:
+        branch, others = sorted(others, key=lambda i: points[i].omega), []
+    steps = np.diff([points[i].omega for i in branch])
+    back = steps[1:] * steps[:-1] < 0.0
+    turned = np.zeros(max(len(branch) - 1, 0), dtype=bool)
+    turned[1:] |= back
+    turned[:-1] |= back
+    lost = [b > a + 1 or a in jumps for a, b in pairwise(branch)]
+    order, fold, cut = [branch[0]] if branch else [], [], []
+    inside = _inserted(points, branch, others)
+    for k, following in enumerate(branch[1:]):
+        own = [*inside.get(k, []), following]
+        order += own
+        fold += [bool(turned[k])] * len(own)
+        cut += [bool(lost[k])] * len(own)
+    chosen = [points[i] for i in order]
+    sign = np.array([sign_of(problem, p) for p in chosen], dtype=float)
+    folds = np.array(fold, dtype=bool) | (sign[1:] * sign[:-1] < 0.0)
+    return Course(
+        tuple(order), sign, tuple(cycle_of(problem, p) for p in chosen), folds, np.array(cut, dtype=bool)
+    )  # fmt: skip
+
+
+def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
+    """Return the sign of the determinant of the balance's Jacobian at a solution; NaN where it is not known.
+
+    Along a branch it follows from the tangent and the sign of the bordered determinant, which the follower has found (Cramer's rule). Else a
+    small Jacobian is factorised.
+    """
+    if point.tangent.size and point.orientation:
+        return float(np.sign(point.tangent[-1]) * point.orientation) or np.nan
+    balance = problem.local(point.support, point.by_dof)
+    if isinstance(balance, HarmonicBalance) and point.unknowns <= MOST_ROWS:
+        jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).jac
+        factors = factors_of(jac)
+        return np.nan if factors is None else float(factors.sign)
+    return np.nan
+
+
+def _inserted(
+    points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]
+) -> dict[int, list[int]]:
+    """Return the points that lie within each step of a branch: where they make its way the least longer."""
+    if len(branch) < 2 or not others:
+        return {}
+    rows = _scaled([points[i] for i in (*branch, *others)])
+    own, rest = rows[: len(branch)], rows[len(branch) :]
+    lengths = np.linalg.norm(np.diff(own, axis=0), axis=1)
+    found: dict[int, list[tuple[float, int]]] = {}
+    for i, row in zip(others, rest, strict=True):
+        apart = np.linalg.norm(own - row, axis=1)
+        k = int(np.argmin(apart[:-1] + apart[1:] - lengths))
+        found.setdefault(k, []).append((float(apart[k]), i))
+    return {k: [i for _, i in sorted(pairs)] for k, pairs in found.items()}
+
+
+def _scaled(points: Sequence[ForcedPoint]) -> FloatArray:
+    """Return frequency and motion of points as rows of numbers without units."""
+    order = max(len(p.coefficients) for p in points)
+    motions = np.zeros((len(points), order, points[0].coefficients.shape[1]), dtype=complex)
+    for row, p in zip(motions, points, strict=True):
+        row[: len(p.coefficients)] = p.coefficients
+    flat = motions.reshape(len(points), -1)
+    size = max(float(np.abs(flat).max()), np.finfo(float).tiny)
+    omega = np.array([p.omega for p in points])
+    wide = max(float(np.ptp(omega)), np.finfo(float).tiny)
+    return np.hstack([(omega / wide)[:, None], flat.real / size, flat.imag / size])

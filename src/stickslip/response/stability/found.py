@@ -1,0 +1,187 @@
+"""Growth or decay of small disturbances of a periodic motion: multipliers, how far each may be off, and the verdict on them."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray
+from stickslip.response.stability.modulus import modulus_text
+from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
+
+ROUGH = 0.5  # error of a multiplier, relative to it, beyond which it shows no growth
+NEUTRAL = (
+    1e-3  # change of a disturbance in a period, relative to it, that is neither growth nor decay
+)
+TURNED = 0.1  # part of a multiplier's change along its circle that counts for its modulus
+CLEAR = 2.0  # times that change, from the real axis: a pair that is nearer may meet there and part
+
+Verdict = Literal["stable", "unstable", "neutral", "undecided"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Growth or decay of small disturbances of a periodic motion.
+
+    Parameters
+    ----------
+    floquet
+        Multipliers of the structure's states and of the sliders that move; those of `resting` sliders, which are 1, are left out.
+    errors
+        (n_states,) how far each multiplier may be from that of the motion with all harmonics: what more harmonics change in it, and
+        its change when the step was halved, where laws are known by sampled tangents. Not finite where nothing is known.
+        The part of the step is too small where friction stops a light mass within a step, by up to twenty times in cases measured,
+        and where planar contacts close into stick, by up to ten.
+    resting
+        Number of tangential springs, those of planar contacts among them, whose sliders rest for the whole period: each is a parameter of the motion, not a state.
+    grazing
+        Number of these that have reached their limit before and rest since: the multipliers are those of the side on which they rest.
+    transitions
+        Number of changes of state that were located over the period.
+    moduli
+        (n_states,) the same errors of the moduli, which damping fixes far better than the places on the circle; None: those of the multipliers.
+    work
+        Floating point operations that the examination took, by the rows of its matrices.
+    """
+
+    floquet: Floquet
+    errors: FloatArray
+    resting: int
+    grazing: int
+    transitions: int
+    moduli: FloatArray | None = None
+    work: float = 0.0
+
+    @property
+    def error(self) -> float:
+        """Largest error of a multiplier."""
+        return float(np.max(self.errors, initial=0.0))
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether disturbances die, one grows, or none does either; undecided where the error of a modulus reaches the unit circle.
+
+        A multiplier above 1 whose error is more than half of itself does not show that a disturbance grows: so much is no estimate.
+        Multipliers of 1 are not judged while their errors are of rounding: they belong to families of motions. Any other that stays on
+        the unit circle within `NEUTRAL`, its error included, is neutral: a vibration that nothing damps, or the drift of a slider.
+        """
+        size, errors = self._judged
+        if np.any(self._outside):
+            return "unstable"
+        on = self._reaching
+        if not np.any(on):
+            return "stable"
+        flat = np.abs(size[on] - 1.0) + errors[on] <= NEUTRAL
+        return "neutral" if np.all(flat) else "undecided"
+
+    @property
+    def settled(self) -> bool:
+        """Whether more harmonics would tell nothing else."""
+        verdict = self.verdict
+        return verdict in ("stable", "unstable") or (
+            verdict == "neutral" and bool(np.all(self._judged[1][self._reaching] <= 0.1 * NEUTRAL))
+        )
+
+    @property
+    def multiplier(self) -> float:
+        """Modulus of the multiplier that decides, see `reason`; 0 where all belong to families, NaN where none is known."""
+        return self._decisive[0]
+
+    @property
+    def multiplier_error(self) -> float:
+        """How far that modulus may be from that of the motion with all harmonics."""
+        return self._decisive[1]
+
+    @property
+    def reason(self) -> str:
+        """What the verdict rests on: which multiplier and its error, or what was not known."""
+        size, error = self._decisive
+        if np.isnan(size):
+            return (
+                "no multiplier is known: rounding makes more transitions than gaps of these harmonics can have, or a law gave "
+                "tangents that are not finite"
+            )
+        if not np.isfinite(error):
+            return (
+                f"as it was solved the motion has a largest multiplier of modulus {size:.4g}; what more harmonics would change in it "
+                "is not known, no motion with more was found nearby"
+            )
+        said = modulus_text(size, error)
+        return {
+            "unstable": f"a multiplier of modulus {said} lies outside the unit circle: a disturbance grows by as much in a period",
+            "stable": f"the largest multiplier that is not neutral has the modulus {said}: disturbances die",
+            "neutral": f"a multiplier of modulus {said} lies on the unit circle: a disturbance neither grows nor dies",
+            "undecided": f"a multiplier of modulus {said} may lie on either side of the unit circle",
+        }[self.verdict]
+
+    @property
+    def _judged(self) -> tuple[FloatArray, FloatArray]:
+        """Moduli of the multipliers that are judged, and their errors."""
+        off = np.abs(self.floquet.multipliers - 1.0) > UNIT_TOLERANCE
+        judged = off | ~(self.errors <= UNIT_TOLERANCE)
+        errors = self.errors if self.moduli is None else self.moduli
+        return np.abs(self.floquet.multipliers[judged]), errors[judged]
+
+    @property
+    def _outside(self) -> BoolArray:
+        """Which of these show that a disturbance grows."""
+        size, errors = self._judged
+        return (size - errors > 1.0 + UNIT_TOLERANCE) & (errors <= ROUGH * size)
+
+    @property
+    def _reaching(self) -> BoolArray:
+        """Which of these may lie on the unit circle or outside."""
+        size, errors = self._judged
+        return ~(size + errors < 1.0 - UNIT_TOLERANCE)
+
+    @property
+    def _decisive(self) -> tuple[float, float]:
+        """Modulus and error of the largest multiplier among those that make the verdict what it is."""
+        size, errors = self._judged
+        of_verdict = next(
+            (own for own in (self._outside, self._reaching) if np.any(own)), size >= 0.0
+        )
+        if not np.any(of_verdict):
+            unknown = np.any(np.isnan(size))
+            return (np.nan, np.inf) if unknown else (0.0, 0.0)
+        at = np.flatnonzero(of_verdict)[np.argmax(size[of_verdict])]
+        return float(size[at]), float(errors[at])
+
+    @property
+    def unknown(self) -> bool:
+        """Whether no multiplier is known."""
+        return bool(np.any(np.isnan(self.floquet.multipliers)))
+
+    @property
+    def stable(self) -> bool:
+        """Whether it is known that every small disturbance dies."""
+        return self.verdict == "stable"
+
+
+def partners(coarse: ComplexArray, fine: ComplexArray) -> ComplexArray:
+    """Return the coarse multipliers in the order of the fine ones."""
+    left, out = coarse.copy(), np.empty_like(fine)
+    for i, value in enumerate(fine):
+        nearest = int(np.nanargmin(np.abs(left - value))) if np.any(~np.isnan(left)) else 0
+        out[i] = left[nearest]
+        left[nearest] = np.nan
+    return out
+
+
+def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far multipliers are from those of a worse motion, and how far their moduli may be off for that.
+
+    The modulus of a pair is that of its damping, whatever the frequency, until the pair meets on the real axis. What moves along the circle
+    counts with a share `TURNED`, twice the change of the modulus counts, and all of the change where the pair may meet.
+
+    Parameters
+    ----------
+    found, other
+        (n,) and (m,) multipliers; where there are fewer others, they are zero.
+    """
+    rest = np.zeros(max(0, found.size - other.size))
+    theirs = partners(np.append(other, rest), found)
+    distance = np.abs(found - theirs)
+    moduli = np.maximum(2.0 * np.abs(np.abs(found) - np.abs(theirs)), TURNED * distance)
+    may_meet = np.abs(found.imag) <= CLEAR * distance
+    return distance, np.where(may_meet, distance, np.minimum(moduli, distance))

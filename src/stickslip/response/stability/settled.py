@@ -1,0 +1,122 @@
+"""The stability of a solved point, asked with more harmonics until it is known on which side of the unit circle its multipliers lie."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.errors import input_error
+from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability.found import Stability, changes
+from stickslip.response.stability.missing_harmonics import (
+    FACTOR,
+    LEAST,
+    MORE,
+    Corrected,
+    corrected_by_step,
+    solved_with,
+)
+from stickslip.response.stability.multipliers import stability_in_time
+from stickslip.response.time.sectors import all_in_time
+
+MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
+MOST_ROWS = 4000  # and of its unknowns
+SOLUTIONS = 10  # of a point, at most
+ROUGHLY = 3.0  # times the change by one Newton step that a multiplier may be off
+FIRST = 2.0  # times the change from the motion as it was solved
+OTHER = 2.0  # times more where the numbers of transitions differ
+
+
+@dataclass(frozen=True, eq=False)
+class _Rung:
+    """A motion on the way to one with all harmonics."""
+
+    point: ForcedPoint
+    stability: Stability
+
+
+@by_one_thread
+def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+    """Return the stability of a solved point of a forced response.
+
+    The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them, times `ROUGHLY`, is
+    their error. Where that leaves the verdict open the motion is solved, with about twice the harmonics each time, and the change from one
+    solution to the next is the error: few harmonics give the times of transitions less well than amplitudes.
+
+    Parameters
+    ----------
+    problem
+        The forced response that the point belongs to.
+    point
+        A converged one.
+
+    Raises
+    ------
+    InputError
+        If the point did not converge, a contact is rigid, or what vibrates is one sector of a tuned wheel without all its waves.
+    """
+    if not point.converged:
+        raise input_error(
+            "stability: point",
+            f"did not converge at {point.omega:g} rad/s ({point.status.advice})",
+            "Ask for the stability of solutions only.",
+        )
+    first = _Rung(point, of_point(problem, point))
+    step = corrected_by_step(problem, point)
+    if step is not None and step.point is point:
+        return first.stability
+    work = first.stability.work
+    best = replace(
+        first.stability, errors=np.full_like(first.stability.errors, np.inf), moduli=None
+    )
+    if step is not None:
+        found = of_point(problem, step.point)
+        work += found.work + step.work
+        if not found.unknown:
+            best = _compared(found, first, ROUGHLY)
+    last, times = first, FIRST
+    for more in _solutions(problem, point):
+        if best.settled:
+            break
+        found = of_point(problem, more.point)
+        work += found.work + more.work
+        if found.unknown:
+            continue
+        best = _compared(found, last, times)
+        last, times = _Rung(more.point, found), 1.0
+    return replace(best, work=work)
+
+
+def _solutions(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
+    """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
+    reached, order = point, max(FACTOR * point.order + MORE, LEAST)
+    for _ in range(SOLUTIONS):
+        order = min(order, MOST_HARMONICS)
+        if order <= reached.order or problem.system.retained.size * (2 * order + 1) > MOST_ROWS:
+            return
+        more = solved_with(problem, reached, order)
+        if more is None:
+            order = (reached.order + order) // 2
+            continue
+        if more.point.order <= reached.order:
+            return  # a wheel has no more waves
+        yield more
+        reached, order = more.point, FACTOR * order + MORE
+
+
+def of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+    """Return the stability of the motion of a point as it was solved; of a wheel that of all its sectors, each moving on its own."""
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    return stability_in_time(all_in_time(problem.system, gaps), point.omega)
+
+
+def _compared(found: Stability, other: _Rung, times: float) -> Stability:
+    """Return the stability of a motion with so many `times` its change from a worse one as errors."""
+    worse = other.stability
+    if worse.unknown:
+        return replace(found, errors=np.full_like(found.errors, np.inf), moduli=None)
+    times *= 1.0 if worse.transitions == found.transitions else OTHER
+    distance, modulus = changes(found.floquet.multipliers, worse.floquet.multipliers)
+    own = found.errors if found.moduli is None else found.moduli
+    return replace(found, errors=found.errors + times * distance, moduli=own + times * modulus)
