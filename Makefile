@@ -22,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections trust mutants lock clean
+.PHONY: help install run test test-kernels coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate validate-tests validate-faults validate-kernels validate-literature validate-in-time validate-mutants baseline strategies alarms sections trust mutants lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -47,6 +47,9 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 
 test: $(INSTALLED)  ## run the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20
+
+test-kernels: $(INSTALLED)  ## run the tests marked `kernel` with the processor's own LAPACK kernels and with those of Haswell
+	$(ONE_THREAD) $(BIN)/python -m evidence.kernels --marked --workers $(WORKERS)
 
 coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
@@ -116,12 +119,29 @@ calculix:  ## install CalculiX with apt, for the comparisons of `make validate` 
 	apt-get update -qq
 	DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends calculix-ccx
 
-validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
-	@tests=pass; list=holds; \
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) -m validation || tests="DO NOT ALL PASS, see above"; \
-	$(ONE_THREAD) $(BIN)/python -m evidence.validation || list="DOES NOT HOLD WHOLE, see above"; \
-	echo "The tests marked validation $$tests; the list of comparisons $$list."; \
-	test "$$tests $$list" = "pass holds"
+validate: $(INSTALLED)  ## compare with closed forms, other codes, the literature and time integration; damage, kill and repeat: all parts
+	$(ONE_THREAD) $(BIN)/python -m evidence.validation.parts --workers $(WORKERS)
+
+# each part ends within half an hour on two quiet cores; a name here is one in evidence/validation/parts.py
+PART = $(ONE_THREAD) $(BIN)/python -m evidence.validation.parts $(@:validate-%=%) --workers $(WORKERS)
+
+validate-tests: $(INSTALLED)  ## a part of `make validate`: the slow tests
+	$(PART)
+
+validate-faults: $(INSTALLED)  ## a part of `make validate`: damaged files, kills, full disks, little memory
+	$(PART)
+
+validate-kernels: $(INSTALLED)  ## a part of `make validate`: numeric tests on every LAPACK kernel
+	$(PART)
+
+validate-literature: $(INSTALLED)  ## a part of `make validate`: closed forms, other programs, the literature
+	$(PART)
+
+validate-in-time: $(INSTALLED)  ## a part of `make validate`: time integration and many harmonics
+	$(PART)
+
+validate-mutants: $(INSTALLED)  ## a part of `make validate`: one-point changes that a test has to notice
+	$(PART)
 
 baseline: $(INSTALLED)  ## compare the examples with the results of the commit that the moves began from (some minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.baseline

@@ -32,6 +32,11 @@ PAGES_OF_KEYS = {
     ),
     "settings": ("Harmonics, solver, limits", ("harmonics", "solver", "retention", "limits")),
 }  # fmt: skip
+FIVE = "Two blades and a damper, five harmonics"  # a case of the validation with a table of its own
+STATED = (
+    "Where contacts slip much, five harmonics are not enough. A row holds if the error against time integration is the one that more harmonics "
+    "state, and if the run does not trust the case where that error is above the tolerance."
+)
 RESULTS = HERE.parent / "evidence" / "validation" / "out" / "results.json"
 
 MADE = "Made from the code by `python docs/generate.py`."
@@ -281,9 +286,17 @@ def validation() -> str:
         return "*This build has no results: run `make validate`, then `make docs`.*\n"
     records = json.loads(RESULTS.read_text(encoding="utf-8"))
     holding = sum(record["holds"] is True for record in records)
+    stated = [record for record in records if record["case"] == FIVE]
+    others = [record for record in records if record["case"] != FIVE]
+    lines = [f"{holding} of {len(records)} comparisons hold.", "", *_comparisons(others)]
+    if stated:
+        lines += ["", "### Five harmonics, as in the paper", "", STATED, "", *_comparisons(stated)]
+    return "\n".join(lines) + "\n"
+
+
+def _comparisons(records: list[dict[str, Any]]) -> list[str]:
+    """Return the lines of a table of comparisons."""
     lines = [
-        f"{holding} of {len(records)} comparisons hold.",
-        "",
         "| case | quantity | ours | reference | tolerance | holds | source |",
         "|---|---|---|---|---|---|---|",
     ]
@@ -296,7 +309,7 @@ def validation() -> str:
             _escaped(record["source"]),
         ]
         lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _number(value: object) -> str:

@@ -29,8 +29,8 @@ from stickslip.front.study import Study
 from stickslip.study.file.example import example_text
 from stickslip.study.keep import folder as keep
 
+FORCES = (5.0, 8.0)  # N, of the cases
 CHANGES = {
-    "vary.load.shaker.force_n": "[5.0, 8.0]",
     "modes.number": "2",
     "forced_response.points": "4",
     "forced_response.peak_points": "0",
@@ -39,6 +39,8 @@ CHANGES = {
 }
 AT_WORK = "another run is at work"
 PATIENCE = 60.0  # s, for one command
+LATEST = 1.3  # of the time that a command takes, at which it is killed
+LEAST_SHARE = 20  # kills, between which at least one run ends by itself and is compared
 
 
 @dataclass(frozen=True)
@@ -111,29 +113,40 @@ class Trial:
 
     def __init__(self, folder: Path, seed: int) -> None:
         self.folder, self.rng = folder, np.random.default_rng(seed)
-        self.study = write_four_masses(folder / "study", CHANGES)
+        self.study = _study(folder / "study", FORCES)
         self.results = self.study.parent / "results"
         self.wrong: list[str] = []
-        # everything is loaded and compiled before the first fork
-        right = Study.from_file(write_four_masses(folder / "right", CHANGES))
-        plain = right.run().data
-        self.right = right.run(verify_harmonics=True).data
-        # a verification settles doubts: what is said of the points has two right answers
-        self.said = (plain, self.right)
-        Result(self.right).report(folder / "right.html")
+        # everything is loaded and compiled before the first fork; a verification settles doubts, and so there are two right answers
+        self.right: dict[tuple[str, ...], tuple[xr.DataTree, xr.DataTree]] = {}
+        for forces in ((FORCES[0],), (FORCES[1],), FORCES):
+            right = Study.from_file(_study(folder / "right" / str(len(self.right)), forces))
+            plain, verified = right.run().data, right.run(verify_harmonics=True).data
+            self.right[_labels(verified["forced_response"])] = plain, verified
+        self.every = _labels(verified["forced_response"])
+        Result(verified).report(folder / "right.html")
 
     def fail(self, what: str) -> None:
         self.wrong.append(what)
         print(what, flush=True)
 
-    def same(self, what: str) -> None:
-        """Compare the result, which must be complete, with the right one, to the last bit."""
+    def same(self, what: str, asked: tuple[str, ...] = ("forced_response", "modes")) -> None:
+        """Compare the result, which must be complete, with the right one, to the last bit.
+
+        It has all cases of the analyses that were `asked` for, and of the others those that earlier commands finished.
+        """
         found = Result.open(self.results).data
         if found.attrs["complete"] != 1:
             self.fail(f"{what}: the result is not complete")
-        for name in found.children:
+        for name in {*asked, *found.children}:
+            if name not in found.children:
+                self.fail(f"{what}: {name} is missing")
+                continue
+            labels = _labels(found[name])
+            if name in asked and labels != self.every:
+                self.fail(f"{what}: {name} has the cases {labels} of {self.every}")
+            plain, verified = self.right[labels]
             for key in found[name].data_vars:
-                right = self.said if "verdict" in str(key) else (self.right,)
+                right = (plain, verified) if "verdict" in str(key) else (verified,)
                 if not any(same_bits(found[name][key], one[name][key]) for one in right):
                     self.fail(f"{what}: {name}.{key} differs")
 
@@ -157,6 +170,15 @@ class Trial:
                 self.fail(f"{what}: {ended.said[-1500:]}")
         if ended.code and not ended.said.strip():
             self.fail(f"{what}: ended with {ended.code} and no word")
+
+
+def _study(folder: Path, forces: tuple[float, ...]) -> Path:
+    """Write the study with a case for each force of the shaker, N."""
+    return write_four_masses(folder, {**CHANGES, "vary.load.shaker.force_n": str(list(forces))})
+
+
+def _labels(node: xr.DataTree) -> tuple[str, ...]:
+    return tuple(map(str, node["case_label"].values))
 
 
 def same_bits(a: xr.DataArray, b: xr.DataArray) -> bool:
@@ -188,16 +210,13 @@ def kills(trial: Trial, count: int) -> None:
         if fresh:
             words = ["new", str(trial.folder / f"new{turn}"), "--kind", "masses"]
         name = " ".join(w for w in words if "/" not in w)
-        usual = long.setdefault(name, 12.0 if "--workers" in words else 2.0)
-        ended = command(
-            words,
-            after=float(trial.rng.uniform(0, 1.1 * usual)),
-            group=bool(trial.rng.random() < 0.7),
-        )
+        # the first of each kind goes to its end and tells how long this machine takes
+        after = float(trial.rng.uniform(0, LATEST * long[name])) if name in long else PATIENCE
+        ended = command(words, after=after, group=bool(trial.rng.random() < 0.7))
         if ended.code is None:
             counted[name] += 1
         elif ended.code == 0:
-            long[name] = ended.seconds
+            long[name] = max(long.get(name, 0.0), ended.seconds)
         trial.spoken(name, ended)
         trial.whole(name)
         made = trial.folder / f"new{turn}" / "study.toml"
@@ -205,12 +224,15 @@ def kills(trial: Trial, count: int) -> None:
             trial.fail("new: the study is not whole")
         if words[0] == "run" and ended.code == 0:
             ended_well += 1
-            trial.same(name)
+            only = "--only" in words
+            trial.same(name, ("modes",) if only else ("forced_response", "modes"))
         elif words[0] == "run" and ended.code and AT_WORK not in ended.said:
             trial.fail(f"{name}: {ended.said[-500:]}")
     last = _patient(trial, ["run", study])
     trial.spoken("the last run", last)
     trial.same("the last run")
+    if ended_well < count // LEAST_SHARE:
+        trial.fail(f"{ended_well} runs ended between {count} kills: too few were compared")
     print(dict(counted), f"runs that ended between: {ended_well}")
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from newton_bounds import allowed, answer_at
 
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
@@ -27,7 +28,6 @@ from stickslip.model.structure import join
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
-from stickslip.response.recovery import fields
 from stickslip.response.system import System
 
 COARSE = {"airfoil_size": 0.012, "platform_size": 0.012, "foot_size": 0.016}
@@ -50,7 +50,7 @@ def answered(system, load, hertz, order, **settings):
     problem = forced_problem(system, load, sweep)
     points = list(forced_response(system, load, sweep))
     assert all(point.converged for point in points)
-    return [fields(problem, point) for point in points]
+    return [answer_at(problem, point) for point in points]
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_two_blades_and_a_damper_are_those_of_the_lower_layers(blades):
     for one, other in zip(mine, answered(system, load, hertz, 1), strict=True):
         for name in ("outputs", "gaps", "forces"):
             a, b = getattr(one, name), getattr(other, name)
-            assert np.abs(a - b).max() <= 1e-10 * np.abs(b).max()
+            assert np.abs(a - b).max() <= allowed(name, one, other)
 
 
 def masses():
@@ -156,6 +156,7 @@ def four_masses():
     )
 
 
+@pytest.mark.kernel
 def test_four_masses_with_two_friction_elements_and_a_gap_are_those_of_hand_made_matrices():
     found = four_masses().assembled(5)
     gaps = np.zeros((9, 4))
@@ -177,7 +178,7 @@ def test_four_masses_with_two_friction_elements_and_a_gap_are_those_of_hand_made
     for one, other in zip(mine, answered(system, load, hertz, 5), strict=True):
         for name in ("outputs", "gaps", "forces"):
             a, b = getattr(one, name), getattr(other, name)
-            assert np.abs(a - b).max() <= 1e-10 * np.abs(b).max()
+            assert np.abs(a - b).max() <= allowed(name, one, other)
 
 
 def test_models_and_what_they_are_assembled_to_survive_pickling():

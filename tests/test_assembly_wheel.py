@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse
+from newton_bounds import allowed, answer_at
 
 from stickslip.assembly.build import linear_side
 from stickslip.assembly.contact import Contact, Join
@@ -34,7 +35,6 @@ from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.truncation import ModesBelow
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
-from stickslip.response.recovery import fields
 from stickslip.response.system import System
 
 SECTORS, ORDER, H = 5, 2, 3
@@ -120,7 +120,7 @@ def answered(system, load, hertz):
     problem = forced_problem(system, load, sweep)
     points = list(forced_response(system, load, sweep))
     assert all(point.converged for point in points)
-    return [fields(problem, point) for point in points]
+    return [answer_at(problem, point) for point in points]
 
 
 def sector_model(mesh, **changes):
@@ -199,14 +199,15 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all(touched):
     mine, theirs = answered(found.system, found.load, hertz), answered(system, load, hertz)
     for one, every in zip(mine, theirs, strict=True):
         assert one.energy.max() > 1e-4  # else nothing slips
-        assert np.abs(one.outputs - every.outputs).max() < 1e-8 * np.abs(every.outputs).max()
+        assert np.abs(one.outputs - every.outputs).max() <= allowed("outputs", one, every)
         for h in range(H + 1):
             phase = np.exp(2j * math.pi * h * ORDER * np.repeat(np.arange(SECTORS), 6) / SECTORS)
             own = np.tile(one.gaps[h].reshape(6, 3), (SECTORS, 1))
             there = every.gaps[h].reshape(-1, 3)
-            assert np.abs(there - phase[:, None] * own).max() < 1e-8 * np.abs(every.gaps).max()
+            assert np.abs(there - phase[:, None] * own).max() <= allowed("gaps", one, every)
 
 
+@pytest.mark.kernel
 def test_waves_of_unsymmetric_parts_are_not_each_others_mirror():
     """Matrices of an aerodynamic kind tell the two directions apart: wave 4 of five is no conjugate of wave 1."""
     model = sector_model(shrouded_sector())
@@ -382,7 +383,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
     theirs = answered(system, HarmonicLoad(static, {1: force}), hertz)
     for one, every in zip(mine, theirs, strict=True):
         assert one.energy.max() > 1e-4
-        assert np.abs(one.outputs - every.outputs).max() < 1e-8 * np.abs(every.outputs).max()
+        assert np.abs(one.outputs - every.outputs).max() <= allowed("outputs", one, every)
 
 
 def test_shrouds_joined_from_sector_to_sector_are_one_ring():

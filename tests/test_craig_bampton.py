@@ -17,6 +17,8 @@ from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.fixed_interface import craig_bampton
 
+pytestmark = pytest.mark.kernel
+
 COARSE = {"airfoil_size": 0.012, "platform_size": 0.012, "foot_size": 0.02}
 
 

@@ -19,6 +19,8 @@ from stickslip.model.modes import Modes, lowest_modes, natural_frequencies, norm
 from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure, join
 
+pytestmark = pytest.mark.kernel
+
 RNG = np.random.default_rng(11)
 
 

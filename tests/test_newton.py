@@ -10,6 +10,8 @@ from stickslip.solve.linear import solve_dense
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
+pytestmark = pytest.mark.kernel
+
 
 @dataclass(frozen=True, eq=False)
 class At:

@@ -20,6 +20,8 @@ from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.free_interface import rubin
 from stickslip.reduction.truncation import FrequencyError, ModesBelow, frequency_errors
 
+pytestmark = pytest.mark.kernel
+
 
 def dense(matrix):
     return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix

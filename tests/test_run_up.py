@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from newton_bounds import allowed, answer_at
 from test_assembly_wheel import H, sector_model, shrouded_sector
 
 import stickslip as ss
@@ -13,7 +14,6 @@ from stickslip.assembly.over_speed import over_speed, with_engine_order
 from stickslip.errors import InputError
 from stickslip.reduction.choice import Reduction
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
-from stickslip.response.recovery import fields
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.run_up import RUN_UP as RUN_UP_ANALYSIS
 from stickslip.study.analyses.running.question import question_of
@@ -44,17 +44,17 @@ def test_each_point_is_that_of_a_study_at_its_speed(modes, coriolis):
     sweep = along((300.0, 340.0), frequencies=3, peak_points=0)
     problem = forced_problem(found.assembled.system, found.assembled.load, sweep)
     point = list(forced_response(problem.system, found.assembled.load, sweep))[1]
-    mine = fields(problem, point)
+    mine = answer_at(problem, point)
     assert mine.energy.max() > 1e-5
 
     alone = replace(model, speed=point.omega / ORDER).assembled(H)
     one = along((319.0, 321.0), at=(point.omega,), peak_points=0)
     problem = forced_problem(alone.system, alone.load, one)
     (expected,) = forced_response(problem.system, alone.load, one)
-    theirs = fields(problem, expected)
+    theirs = answer_at(problem, expected)
     for name in ("outputs", "forces", "gaps"):
         own, other = getattr(mine, name), getattr(theirs, name)
-        assert np.abs(own - other).max() < 1e-8 * np.abs(other).max()
+        assert np.abs(own - other).max() <= allowed(name, mine, theirs)
     # the preload is that of the speed: at others it is another
     assert np.ptp(np.abs(found.static_force).sum(axis=(1, 2))) > 1.0
 

@@ -87,6 +87,7 @@ def test_soft_contacts_are_none():
     assert abs(b.coefficients(found.x)[1, 0]) == pytest.approx(exact, rel=2e-5)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e8])
 def test_units_change_nothing(factor):
     # metres and newtons, millimetres and kilonewtons, and units of no sense

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse
+from newton_bounds import allowed, answer_at
 from test_reduced_wheel import TILTED, shrouded
 
 import stickslip as ss
@@ -82,7 +83,7 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
         problem = ss.response.forced_problem(system, load, sweep)
         point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
         assert point.converged
-        return ss.response.fields(problem, point)
+        return answer_at(problem, point)
 
     gaps = ss.contact.neighbour_gaps(sector.structure, sectors, **place)
     wheel, operator = ss.reduction.tuned_wheel(
@@ -99,9 +100,10 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
     all_sectors = solved(whole.structure, pairs, load)
     for h in range(order + 1):
         phases = np.exp(2j * math.pi * h * engine_order * np.arange(sectors) / sectors)
-        for theirs, mine in ((all_sectors.gaps, one.gaps), (all_sectors.forces, one.forces)):
-            scale = np.abs(mine).max()
-            assert np.abs(theirs[h] - phases[:, None] * mine[h]).max() < 1e-7 * scale
+        for name in ("gaps", "forces"):
+            theirs, mine = getattr(all_sectors, name), getattr(one, name)
+            apart = np.abs(theirs[h] - phases[:, None] * mine[h]).max()
+            assert apart <= allowed(name, all_sectors, one)
         moved = wheel.expand(one.outputs[h], h)
         own = whole.expand(all_sectors.outputs[h])[0]
         assert np.abs(own - moved).max() < 1e-7 * np.abs(moved).max()

@@ -9,6 +9,7 @@ import scipy.optimize
 import scipy.sparse
 import scipy.special
 from cyclic_models import unlike_wedge
+from newton_bounds import allowed
 from test_assembly_wheel import answered
 
 from evidence.models.annulus import annular_sector
@@ -175,7 +176,7 @@ def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
     mine, theirs = answered(found.system, found.load, hertz), answered(system, load, hertz)
     for one, every in zip(mine, theirs, strict=True):
         assert one.energy.max() > 1e-4  # else nothing slips
-        assert np.abs(one.outputs - every.outputs).max() < 1e-8 * np.abs(every.outputs).max()
+        assert np.abs(one.outputs - every.outputs).max() <= allowed("outputs", one, every)
 
     few = replace(model, parts={"ring": replace(damped, reduction=Reduction(12))}).assembled(3)
     for one, every in zip(answered(few.system, few.load, hertz), mine, strict=True):

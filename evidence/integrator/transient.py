@@ -1,4 +1,6 @@
-"""Direct time integration: the judge of the harmonic balance and of the library's own integrator, with which it shares no code.
+"""Direct time integration: the judge of the harmonic balance, and of law and step of the library's own integrator.
+
+It shares the method of propagation and the rule of settling with that integrator, as copies, and neither law nor step (``docs/judges.md``).
 
 It reads the parameters of the library's laws, their matrices and loads, and nothing else.
 

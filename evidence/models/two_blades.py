@@ -13,8 +13,13 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
+from stickslip.study.analyses.analysis import Case, Job, Solved
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question, question_of
+from stickslip.study.analyses.forced_response import FORCED_RESPONSE
+from stickslip.study.analyses.verdict import LEVELS, Level
+from stickslip.study.jobs import solve_job
+from stickslip.study.keep.journal import JobJournal
 from stickslip.study.models.study import read_study
 
 STUDY = Path(__file__).with_suffix(".toml")
@@ -34,10 +39,13 @@ class TwoBlades:
         The forced response of the study's first ratio.
     ratios
         F_CL / F_HE of all its cases.
+    cases
+        Of the study, in the order of the ratios.
     """
 
     question: Question
     ratios: tuple[float, ...]
+    cases: tuple[Case, ...]
 
     @property
     def system(self) -> System:
@@ -67,6 +75,17 @@ class TwoBlades:
         question = self.at(ratio)
         points = list(forced_response(self.system, question.model.load, self.sweep))
         return collect(question.problem, points, question.model.peak_output)
+
+    def judged(self, ratio: float) -> tuple[Response, Level]:
+        """Answer a ratio as a run does, stability and all; return the response, and the level of the verdict on the case."""
+        question = self.at(ratio)
+        with JobJournal(Path(":memory:"), FORCED_RESPONSE.record) as journal:
+            solve_job(FORCED_RESPONSE, Job(question.label, question), journal, frozenset())
+            case = self.cases[self.ratios.index(ratio)]
+            solved = Solved(case, journal.records(), journal.notes())
+        verdict = FORCED_RESPONSE.dataset([solved])["case_verdict"].values[0]
+        response = collect(question.problem, solved.records, question.model.peak_output)
+        return response, LEVELS[int(verdict)]
 
     def stepped(
         self, ratio: float, hertz: tuple[float, float], selection: str, frequencies: int = 20
@@ -125,4 +144,4 @@ def two_blades(coarser: float = 1.0, path: Path = STUDY, **values: Any) -> TwoBl
     study = study.replace(changed)
     cases = study.cases()
     ratios = tuple(float(case.values[RATIO]) for case in cases)
-    return TwoBlades(question_of(cases[0], cases[0].build()), ratios)
+    return TwoBlades(question_of(cases[0], cases[0].build()), ratios, tuple(cases))

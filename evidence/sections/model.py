@@ -130,4 +130,4 @@ def blades_with(
         changed["part.damper.flat_distances_m"] = list(lines)
     cases = example()[0].replace(changed).cases()
     ratios = tuple(float(case.values[RATIO]) for case in cases)
-    return TwoBlades(question_of(cases[0], cases[0].build()), ratios)
+    return TwoBlades(question_of(cases[0], cases[0].build()), ratios, tuple(cases))
