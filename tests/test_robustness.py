@@ -1,15 +1,16 @@
 """The cascade on systems drawn at random: everything converges, and what it took is counted."""
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from evidence.models.random_machines import draw
+from stickslip.operators import times
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
-from stickslip.response.homotopies import growing_load, homotopies, with_friction
+from stickslip.response.homotopies import growing_load, homotopies
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status
@@ -66,20 +67,50 @@ def test_the_load_grows_to_the_whole_through_folds(number):
     assert residual_norm(balance, solution.x, omega) <= problem.sweep.newton.tolerance
 
 
-def test_friction_comes_down_to_what_it_is():
+def test_the_higher_harmonics_join_a_balance_of_the_driven_ones():
     problem, omega, static = prepared(33)
     balance = problem.high
-    ways = list(homotopies(balance, omega, static))
-    assert len(ways) == 2
-    assert len(ways[1].legs) == 2
+    (way,) = homotopies(balance, omega, static)
+    growing, joining = way.legs
+    rng = np.random.default_rng(1)
     x = balance.unknowns(static[None].astype(complex))
-    sticky = with_friction(balance, 30.0)
-    assert np.allclose(
-        ways[1].legs[1].linearise(x, 0.0).residual, sticky.linearise(x, omega).residual
+    x = x + np.max(np.abs(x)) * rng.normal(size=x.size)
+    # where the load is whole the harmonics begin to join, and in the end all of them have
+    np.testing.assert_allclose(
+        growing.linearise(x, 1.0).residual, joining.linearise(x, 0.0).residual, rtol=1e-12
     )
-    assert np.allclose(
-        ways[1].legs[1].linearise(x, 1.0).residual, balance.linearise(x, omega).residual
+    np.testing.assert_allclose(
+        joining.linearise(x, 1.0).residual, balance.linearise(x, omega).residual, rtol=1e-12
     )
+    # linear in the share, and its derivative by the unknowns is that of the residual
+    at, step = joining.linearise(x, 0.3), 1e-6 * np.max(np.abs(x)) * rng.normal(size=x.size)
+    change = joining.linearise(x, 1.0).residual - joining.linearise(x, 0.0).residual
+    np.testing.assert_allclose(at.jac_p, change, rtol=0, atol=1e-10 * np.max(np.abs(change)))
+    moved = [joining.linearise(x + s * step, 0.3).residual for s in (1.0, -1.0)]
+    slope = 0.5 * (moved[0] - moved[1])
+    np.testing.assert_allclose(
+        times(at.jac, step), slope, rtol=0, atol=1e-4 * np.max(np.abs(slope))
+    )
+
+
+def test_a_point_without_a_solution_ends_within_its_budget():
+    # a residual that no unknowns make zero: x² + 1, in as many equations as a point of 60 unknowns has
+    counted = Counter()
+
+    @dataclass(frozen=True)
+    class At:
+        residual: np.ndarray
+        jac: np.ndarray
+        seconds_contact: float = 0.0
+
+    def rootless(x):
+        counted["evaluations"] += 1
+        return At(x**2 + 1.0, np.diag(2.0 * x))
+
+    solution = solve_robustly(rootless, [np.linspace(0.5, 1.5, 60)], Newton())
+    assert not solution.status.converged
+    assert 0 < solution.iterations <= 300
+    assert counted["evaluations"] < 10_000
 
 
 def test_the_whole_load_is_the_balance_and_none_is_rest():

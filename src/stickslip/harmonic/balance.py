@@ -204,6 +204,10 @@ class HarmonicBalance:
             self.rows.add_forces(contacts, rows)
         return rows.reshape(-1) / self.force_scale
 
+    def scaled_forces(self, contacts: FloatArray) -> FloatArray:
+        """Return the (size,) scaled equations' share of contact forces with the coefficients (m, 3 n_contacts), N."""
+        return self._with_forces(np.zeros((self.n_rows, self.linear.n)), contacts)
+
     def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
         """Return the (size,) scaled residual from contacts whose `period` is known: without condensed matrices, if it can be."""
         direct = known_by_vectors(self.linear)

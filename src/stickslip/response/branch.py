@@ -97,8 +97,8 @@ class Curve(Protocol):
         """Return how its branch is followed."""
         ...
 
-    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
-        """Solve where no branch leads; `most`: by all that may help."""
+    def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
+        """Solve where no branch leads, by all that may help with a share `effort` of the Newton steps of `steps_at_most`; 0: by the corrector alone."""
         ...
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
@@ -142,7 +142,7 @@ class Curve(Protocol):
         return 0.0
 
 
-Begin = Callable[[float, Sequence[FloatArray], bool], Solution]
+Begin = Callable[[float, Sequence[FloatArray], float], Solution]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class OneLevel(Curve):
     way
         How its branch is followed.
     begin
-        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: by all that may help.
+        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: effort, as for `stickslip.response.ladder.without_branch`.
     """
 
     equation: Problem
@@ -171,9 +171,9 @@ class OneLevel(Curve):
         """Return how its branch is followed."""
         return self.way
 
-    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+    def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
         """Solve where no branch leads."""
-        return self.begin(p, [n.point.x for n in near], most)
+        return self.begin(p, [n.point.x for n in near], effort)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,6 +215,13 @@ class Route:
     def farthest(self, values: Sequence[float]) -> float:
         """Return which of some values lies farthest along the way."""
         return max(values, key=lambda p: self.forward * p)
+
+    def onward(self, values: Sequence[float]) -> float:
+        """Return the value at which a branch through some values is taken up where it was lost."""
+        if self.listed:
+            return self.listed[len(values)]
+        ahead = self.farthest(values) + self.gap
+        return ahead if self.before(ahead, self.last) else self.last
 
     def idle(self, values: Sequence[float]) -> bool:
         """Whether a branch left the range backwards, or gained less than a step in its last points.

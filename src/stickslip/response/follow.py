@@ -16,6 +16,7 @@ for once more, when their neighbours are known.
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 
 from stickslip.response.branch import Curve, Followed, Route
@@ -28,15 +29,18 @@ from stickslip.response.steps import (
     levels_left,
     lost,
     onward,
+    passed_maximum,
     retraced,
     without_more,
 )
+from stickslip.solve.rescue import steps_at_most
 
 AUDITED = 10  # points at most from one audit to the next
 CALM = 3  # quiet points with many harmonics before fewer are tried
 LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
 LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
 MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
+LATER = 0.2  # share of the effort at a value for when its neighbours are known, and for its motion in time
 LONGEST_CALM = 48  # the same after trials that failed
 MOST = 40  # multiples of the smallest number of points at which any branch ends
 
@@ -90,6 +94,7 @@ class _Walk:
     looked: int = 0  # index of the last audit
     anew_from: int = 0  # index from which solutions without a branch are looked for again
     taken: int = 0
+    tried: dict[tuple[float, int], float] = field(default_factory=dict)  # effort at a value, level
     spent: float = 0.0  # work, in the unit of `Curve.cost`
 
     def run(self) -> Iterator[Followed]:
@@ -99,7 +104,7 @@ class _Walk:
         while not self._over():
             here = self.branch[-1]
             if not here.ahead.converged or self._idle():
-                yield from self._begun(self._further())
+                yield from self._begun(self.route.onward([s.point.p for s in self.branch]))
                 continue
             yield from self._cheaper(here)
             made = yield from self._take(lambda at=here: self._onward(at))  # type: ignore[misc]
@@ -115,7 +120,7 @@ class _Walk:
                     self.patient_until = len(self.branch) + self.patience
                 yield from self._kept(anew or made)
             else:
-                yield from self._begun(self._further())
+                yield from self._begun(self.route.onward([s.point.p for s in self.branch]))
         if not listed and self.branch[-1].point.p != self.route.last:
             yield from self._begun(self.route.last)
         yield from self._looked_for()
@@ -132,7 +137,10 @@ class _Walk:
             known = made.taking(perf_counter() - began)
             yield known
             known = self.curve.stored(known)
-        self.spent += known.point.solution.iterations * self.curve.cost(known.level)
+        steps, place = known.point.solution.iterations, (known.p, known.level)
+        before = 0.0 if known.kind == "found" else self.tried.get(place, 0.0)  # that is in its own
+        self.tried[place] = before + steps / steps_at_most(known.point.x.size)
+        self.spent += steps * self.curve.cost(known.level)
         return known
 
     def _onward(self, here: _Stop) -> Followed:
@@ -153,7 +161,7 @@ class _Walk:
             self.quiet_for += 1
         if self._due():
             yield from self._audited(len(self.branch) - 1)
-        elif self._passed_maximum():
+        elif passed_maximum(self.curve, [s.point for s in self.branch[-3:]]):
             yield from self._audited(len(self.branch) - 2)
         if self.branch and self.branch[-1].point is made:
             yield from self._lowered()
@@ -293,14 +301,6 @@ class _Walk:
         ends = last == 0 or self.branch[-1].point.p == self.route.last
         return ends or not (recent or self.looked > last - AUDITED)
 
-    def _passed_maximum(self) -> bool:
-        """Whether the point before the last is higher than its neighbours."""
-        last = [stop.point for stop in self.branch[-3:]]
-        if len(last) < 3 or not all(p.converged for p in last):
-            return False
-        before, top, after = map(self.curve.height, last)
-        return before < top > after
-
     # --- the way ------------------------------------------------------------------------------
 
     def _target(self) -> float | None:
@@ -314,19 +314,8 @@ class _Walk:
         reached = self.branch[-1].point.p == self.route.last
         return reached or self.taken > MOST * self.route.points
 
-    def _farthest(self) -> float:
-        return self.route.farthest([stop.point.p for stop in self.branch])
-
     def _idle(self) -> bool:
         return not self.route.listed and self.route.idle([s.point.p for s in self.branch])
-
-    def _further(self) -> float:
-        """Return the value at which a lost branch is taken up."""
-        listed, route = self.route.listed, self.route
-        if listed:
-            return listed[len(self.branch)]
-        ahead = self._farthest() + route.gap
-        return ahead if route.before(ahead, route.last) else route.last
 
     def _begun(self, p: float) -> Iterator[Followed]:
         """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
@@ -335,13 +324,14 @@ class _Walk:
         made: Followed | None = None
         for share in LEAPS if near and not self.route.listed else ():
             ahead = p + (share - 1.0) * self.route.gap
-            if not self.route.before(self._farthest(), ahead):
+            if not self.route.before(self.route.farthest([s.point.p for s in self.branch]), ahead):
                 break
-            made = yield from self._fresh(index, here, ahead, near, most=False)
+            made = yield from self._fresh(index, here, ahead, near, 0)
             if made.converged:
                 break
         if made is None or not made.converged:
-            made = yield from self._fresh(index, min(here, LADDER), p, near, most=True)
+            level = min(here, LADDER)
+            made = yield from self._fresh(index, level, p, near, self._left(p, level, LATER))
         while made.converged and not self.curve.quiet(made.level, made.judged):
             more = yield from self._in_place(made)
             if more is None:
@@ -366,19 +356,21 @@ class _Walk:
         if level >= self._levels() or index < self.anew_from or self._spent_up():
             return None
         self.anew_from = index + AUDITED
-        found = yield from self._fresh(index, level, made.p, [made], most=level <= LADDER)
+        effort = self._left(made.p, level, LATER) if level <= LADDER else 0.0
+        found = yield from self._fresh(index, level, made.p, [made], effort)
         if found.converged:
             return found
         return (yield from self._take(lambda: made))
 
     def _fresh(
-        self, index: int, level: int, p: float, near: Sequence[Followed], *, most: bool
+        self, index: int, level: int, p: float, near: Sequence[Followed], effort: float
     ) -> Taken:
-        return (
-            yield from self._take(
-                lambda: fresh(self.curve, self.route, index, level, p, near, most=most)
-            )
-        )
+        make = partial(fresh, self.curve, self.route, index, level, p, near, effort)
+        return (yield from self._take(make))
+
+    def _left(self, p: float, level: int, reserved: float = 0.0) -> float:
+        """Return the share of the effort that is left at a value, but for what is `reserved`."""
+        return max(1.0 - reserved - self.tried.get((p, level), 0.0), 0.0)
 
     def _last(self) -> list[Followed]:
         """Return the last solution, if there is one."""
@@ -389,12 +381,20 @@ class _Walk:
         for index in reversed(range(len(self.branch))):
             if self.branch[index].point.converged:
                 continue
-            sides = [i for i in (index + 1, index - 1) if 0 <= i < len(self.branch)]
-            near = [self.branch[i].point for i in sides if self.branch[i].point.converged]
-            if not near:
+            sides = [
+                s.point
+                for s in (
+                    *self.branch[index + 1 : index + 2],
+                    *self.branch[max(index - 1, 0) : index],
+                )
+            ]
+            near = [p for p in sides if p.converged]
+            missing = self.branch[index].point
+            effort = self._left(missing.p, missing.level)
+            if not near or not effort:
                 continue
             found = yield from self._take(
-                lambda n=near, i=index: beside(self.curve, n, self.branch[i].point)  # type: ignore[misc]
+                lambda n=near, m=missing, e=effort: beside(self.curve, n, m, e)  # type: ignore[misc]
             )
             if found.converged:
                 self.branch[index] = _Stop(found, found)

@@ -1,34 +1,92 @@
-"""The physics of what is tried where a frequency does not converge: homotopies in the excitation and in the friction."""
+"""The physics of what is tried where a frequency does not converge: the excitation grows, then the higher harmonics join."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+
+import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.law import ContactLaw
+from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.local import AnyBalance
-from stickslip.solve.rescue import ByDifference, Evaluate, Homotopy
+from stickslip.solve.rescue import Homotopy
 
 # shares of the excitation at which contacts hardly change: the problem is linear there
-FAINT = (1e-3, 1e-5)
+FAINT = (1e-2, 1e-3, 1e-5)
 BACK = 1e-3  # share of the faintest load at which a path has come back to rest
-STICKY = 30.0  # factor of the friction coefficients at which little slips
 
 
 @dataclass(frozen=True, eq=False)
 class GrowingLoad:
-    """The balance at one frequency under a share p of its excitation; the static load is always whole."""
+    """The balance at one frequency under a share p of its excitation; the static load is always whole.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    excitation
+        (size,) scaled load without its static part.
+    joined
+        (m,) share of the contact forces in the equations of each row of coefficients; None: all of them.
+    """
 
     balance: HarmonicBalance
     omega: float
-    excitation: FloatArray  # (size,) scaled
+    excitation: FloatArray
+    joined: FloatArray | None = None
 
     def linearise(self, x: FloatArray, p: float) -> Linearisation:
         """Return residual and derivatives at the scaled unknowns `x` and the share `p`."""
-        at = self.balance.linearise(x, self.omega)
+        period = None
+        if self.joined is not None:
+            period = _weighted(self.balance.forces(x, self.omega), self.joined)
+        at = self.balance.linearise(x, self.omega, period)
         left = (1.0 - p) * self.excitation
         return replace(at, residual=at.residual + left, by_omega=-self.excitation)
+
+
+@dataclass(frozen=True, eq=False)
+class JoiningHarmonics:
+    """The balance at one frequency with a share p of the contact forces in the equations of its higher harmonics.
+
+    At p = 0 these are linear, and the others are solved with little more than their own harmonics.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    higher
+        (m,) one for each row of coefficients that joins, else zero.
+    """
+
+    balance: HarmonicBalance
+    omega: float
+    higher: FloatArray
+
+    def linearise(self, x: FloatArray, p: float) -> Linearisation:
+        """Return residual and derivatives at the scaled unknowns `x` and the share `p`."""
+        balance = self.balance
+        period = balance.forces(x, self.omega)
+        joined = _weighted(period, 1.0 - (1.0 - p) * self.higher)
+        at = balance.linearise(x, self.omega, joined)
+        return replace(
+            at, by_omega=balance.scaled_forces(self.higher[:, None] * period.coefficients)
+        )
+
+
+def _weighted(period: ContactPeriod, share: FloatArray) -> ContactPeriod:
+    """Return contact forces of which a `share` (m,) acts in the equations of each row of coefficients."""
+    return replace(
+        period,
+        coefficients=share[:, None] * period.coefficients,
+        blocks=share[:, None] * period.blocks,
+        by_omega=None if period.by_omega is None else share[:, None] * period.by_omega,
+        events=None,
+    )
 
 
 def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
@@ -38,30 +96,14 @@ def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
     return GrowingLoad(balance, omega, load.reshape(-1) / balance.force_scale)
 
 
-def with_friction(balance: HarmonicBalance, factor: float) -> HarmonicBalance:
-    """Return the same problem with all friction coefficients times `factor`; laws without one stay as they are."""
-    interface = balance.interface
-    laws = tuple(_with_friction(law, factor) for law in interface.laws)
-    changed = replace(interface, laws=laws)
-    compiled = changed.compiled(balance.compiled.evaluator)
-    return replace(balance, interface=changed, compiled=compiled)
-
-
-def _with_friction(law: ContactLaw, factor: float) -> ContactLaw:
-    if not hasattr(law, "mu"):
-        return law
-    with_mu: Any = law  # the protocol of laws knows no friction coefficient
-    changed: ContactLaw = replace(with_mu, mu=factor * with_mu.mu)
-    return changed
-
-
 def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
     """Yield ways from an easy problem to the balance at one frequency.
 
     First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
     motion under every share of the excitation, the path that begins there comes to the whole of it, through folds if need be (degree
-    theory; Allgower & Georg 1990). Where several motions stand beside each other it may find another one than the neighbours in
-    frequency. Then the same with much friction, which is let down afterwards.
+    theory; Allgower & Georg 1990). Contacts act on the harmonics up to the highest that is driven alone: each one more folds the path more
+    often, and with all of them it takes ten times as many steps. Then the contact forces of the higher harmonics join. Where several
+    motions stand beside each other it may find another one than the neighbours in frequency.
 
     Parameters
     ----------
@@ -77,13 +119,19 @@ def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterato
     ):  # of rigid contacts not linear in the excitation, or not all of the equations
         return
     at_rest = balance.unknowns(static[None].astype(complex))
-    yield Homotopy((growing_load(balance, omega),), at_rest, FAINT, BACK * FAINT[-1])
-    if not any(hasattr(law, "mu") for law in balance.interface.laws):
+    growing = growing_load(balance, omega)
+    h = np.array(balance.harmonics)
+    rows = np.concatenate([h[:1], np.repeat(h[1:], 2)])
+    higher = (rows > lowest_harmonics(balance)[-1]).astype(float)
+    if not np.any(higher):
+        yield Homotopy((growing,), at_rest, FAINT, BACK * FAINT[-1])
         return
+    few = replace(growing, joined=1.0 - higher)
+    legs = (few, JoiningHarmonics(balance, omega, higher))
+    yield Homotopy(legs, at_rest, FAINT, BACK * FAINT[-1])
 
-    def sliding(s: float) -> Evaluate:
-        now = with_friction(balance, STICKY ** (1.0 - s))
-        return lambda x: now.linearise(x, omega)
 
-    sticky = growing_load(with_friction(balance, STICKY), omega)
-    yield Homotopy((sticky, ByDifference(sliding)), at_rest, FAINT, BACK * FAINT[-1])
+def lowest_harmonics(balance: AnyBalance) -> tuple[int, ...]:
+    """Return the harmonics up to the highest that is driven, the first at least."""
+    driven = max(balance.linear.load.harmonics, default=balance.order)
+    return tuple(h for h in balance.harmonics if h <= max(driven, 1))

@@ -18,10 +18,10 @@ from stickslip.response.branch import (
 )
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.follow import follow
-from stickslip.response.homotopies import homotopies
+from stickslip.response.homotopies import homotopies, lowest_harmonics
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
-from stickslip.solve.rescue import Homotopy, solve_robustly
+from stickslip.solve.rescue import Homotopy, solve_robustly, steps_at_most
 
 
 def without_branch(
@@ -30,7 +30,7 @@ def without_branch(
     options: Newton,
     omega: float,
     near: Sequence[FloatArray] = (),
-    most: bool = True,
+    effort: float = 1.0,
 ) -> Solution:
     """Solve a frequency from motions nearby, from the static equilibrium with the bonded vibration, from few harmonics, then by all that `solve_robustly` knows.
 
@@ -46,17 +46,18 @@ def without_branch(
         Frequency, rad/s.
     near
         (size,) unknowns of motions that may be near.
-    most
-        Whether other globalisations and homotopies are tried as well.
+    effort
+        Share of the Newton steps of `steps_at_most` for all attempts, homotopies and other globalisations among them; 0: the corrector alone.
     """
     starts = _starts(system, balance, options, omega, near)
-    if most:
+    if effort:
         return solve_robustly(
             lambda x: balance.linearise(x, omega),
             starts,
             options,
             _ways(system, balance, omega),
             vibration_weights(balance),
+            steps=steps_at_most(balance.size, effort),
         )
     return first_converged(
         newton(lambda x: balance.linearise(x, omega), start, options) for start in starts
@@ -112,8 +113,7 @@ def _starts(
     guess = balance.coefficients(bonded_start(balance, omega, system))
     guess[:1] = _at_rest(system, balance, omega)
     yield balance.unknowns(guess)
-    driven = max(balance.linear.load.harmonics, default=balance.order)
-    few = balance.with_harmonics(tuple(h for h in balance.harmonics if h <= max(driven, 1)))
+    few = balance.with_harmonics(lowest_harmonics(balance))
     if few.order < balance.order:
         solution = newton(lambda x: few.linearise(x, omega), few.unknowns(guess), options)
         if solution.status.converged:

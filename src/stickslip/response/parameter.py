@@ -170,9 +170,9 @@ def branch_in_parameter(
     )
     way = following_vibration(family(first), steps_through(abs(last - first), points), how.newton)
 
-    def begin(value: float, near: Sequence[FloatArray], most: bool) -> Solution:
+    def begin(value: float, near: Sequence[FloatArray], effort: float) -> Solution:
         changed = system_at(system, parameter, value, family(value))
-        return without_branch(changed, family(value), how.newton, omega, near, most)
+        return without_branch(changed, family(value), how.newton, omega, near, effort)
 
     curve = OneLevel(AtFrequency(family, omega), way, begin)
     route = Route(first=first, last=last, points=points, leaves=False)

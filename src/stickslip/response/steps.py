@@ -12,6 +12,7 @@ from stickslip.solve.branch import Latest, upward
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
+from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Status
 
 PATIENT = 16  # iterations from a solution with other harmonics
@@ -83,11 +84,10 @@ def fresh(
     level: int,
     p: float,
     near: Sequence[Followed],
-    *,
-    most: bool,
+    effort: float,
 ) -> Followed:
-    """Solve where no branch leads; `most`: by all that may help."""
-    solution = curve.fresh(level, p, near, most)
+    """Solve where no branch leads, by all that may help with a share `effort` of the Newton steps of `steps_at_most`; 0: by the corrector alone."""
+    solution = curve.fresh(level, p, near, effort)
     latest = Latest(curve.problem(level))
     following = curve.following(level)
     growing = upward(solution.x.size + 1)
@@ -99,13 +99,16 @@ def fresh(
     return _made(curve, "point", index, level, point, latest)
 
 
-def beside(curve: Curve, near: Sequence[Followed], missing: Followed) -> Followed:
-    """Solve a value that was not found from the branches of its neighbours."""
+def beside(curve: Curve, near: Sequence[Followed], missing: Followed, effort: float) -> Followed:
+    """Solve a value that was not found from the branches of its neighbours, with a share `effort` of the Newton steps of `steps_at_most`."""
     spent: list[Solution] = [missing.point.solution]
     for end in near:
+        left = steps_at_most(missing.point.x.size, effort) - sum(s.iterations for s in spent[1:])
+        if left <= 0:
+            break
         latest = Latest(curve.problem(end.level))
         start = end.point if end.point.tangent[-1] > 0.0 else reversed_point(end.point)
-        point = step_to(latest, start, missing.p, curve.following(end.level))
+        point = step_to(latest, start, missing.p, curve.following(end.level), left)
         spent.append(point.solution)
         if point.solution.status.converged:
             point = replace(point, solution=charged(point.solution, spent))
@@ -137,6 +140,14 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
             if _length(weights, made.point.x - there) < BACK * step:
                 return True
     return False
+
+
+def passed_maximum(curve: Curve, last: Sequence[Followed]) -> bool:
+    """Whether the point before the last of three is higher than its neighbours."""
+    if len(last) < 3 or not all(p.converged for p in last):
+        return False
+    before, top, after = map(curve.height, last)
+    return before < top > after
 
 
 def _length(weights: FloatArray, x: FloatArray) -> float:

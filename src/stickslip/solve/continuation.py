@@ -29,6 +29,7 @@ from stickslip.solve.steps import SHARP_TURN, next_step, no_step, round_corner, 
 
 __all__ = [
     "FOLD",
+    "STEPS_BETWEEN",
     "Following",
     "Mark",
     "Measure",
@@ -45,6 +46,9 @@ __all__ = [
     "step_to",
     "trace",
 ]
+
+
+STEPS_BETWEEN = 150  # Newton steps on the way from one value of the parameter to another
 
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
@@ -143,8 +147,12 @@ def _with_cost(point: Point, spent: list[Solution], rung: Rung = Rung.FULL_STEPS
     return replace(point, solution=replace(solution, rung=max(solution.rung, rung)))
 
 
-def step_to(problem: Problem, point: Point, p: float, following: Following) -> Point:
+def step_to(
+    problem: Problem, point: Point, p: float, following: Following, steps: int = STEPS_BETWEEN
+) -> Point:
     """Go from `point`, whose tangent shows growing p, to the value `p`: one predicted step, or the branch between.
+
+    The branch is left after so many Newton `steps`, and where it leads away.
 
     Returns
     -------
@@ -165,7 +173,7 @@ def step_to(problem: Problem, point: Point, p: float, following: Following) -> P
     for last in trace(problem, onward, p, following):
         spent.append(last.solution)
         # beyond a fold the branch leads away, and what it would reach in the end is another state
-        if abs(last.p - p) > abs(point.p - p):
+        if abs(last.p - p) > abs(point.p - p) or sum(s.iterations for s in spent) > steps:
             break
     if last.p != p or not last.solution.status.converged:
         return _with_cost(direct, spent)

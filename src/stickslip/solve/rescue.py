@@ -16,14 +16,15 @@ from stickslip.solve.status import Rung, Status
 Evaluate = Callable[[FloatArray], Evaluation]
 EvaluateAt = Callable[[float], Evaluate]
 
-PATIENCE = 30  # iterations of a corrector that has no neighbour to start from
+STEPS_A_POINT = 300  # Newton steps at one value of the parameter, whatever is tried there,
+SMALL = 60  # with so many unknowns; with more in proportion,
+MOST_TIMES = 5.0  # up to so many times as many
+PATIENCE = 15  # iterations of a corrector that has no neighbour to start from
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
 ITERATIONS = (
-    10  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
+    6  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
 )
-MOST_STEPS = (
-    1500  # Newton steps along the legs of one homotopy: those that came through took 770 to 1200
-)
+ROUGH = 1e-5  # scaled residual along a homotopy, whose points are no solutions of anything wanted
 ROOTLESS = 200  # points of the homotopy that needs no physics and may lead nowhere
 DIFFERENCE = 1e-6  # change of s for the derivative of a family by s
 BEYOND = 1e-9  # how far outside 0..1 rounding may carry s
@@ -54,6 +55,11 @@ class Homotopy:
     max_points: int = 600
 
 
+def steps_at_most(unknowns: int, share: float = 1.0) -> int:
+    """Return the Newton steps that a value of the parameter may take, whatever is tried there: a `share` of 300 up to 60 unknowns, of more above."""
+    return int(share * STEPS_A_POINT * min(max(unknowns / SMALL, 1.0), MOST_TIMES))
+
+
 def solve_robustly(
     evaluate: Evaluate,
     starts: Iterable[FloatArray],
@@ -61,11 +67,12 @@ def solve_robustly(
     homotopies: Iterable[Homotopy] = (),
     weights: FloatArray | None = None,
     patience: int = PATIENCE,
+    steps: int = 0,
 ) -> Solution:
     """Solve ``residual(x) = 0`` at a fixed parameter, trying harder as long as it does not converge.
 
-    First the corrector of `options` from each start; then the other globalisations, from that start whose residual is least; then each
-    of `homotopies` in turn; last the homotopy that needs no physics, ``residual(x) - (1 - s) residual(x_start) = 0``. Shorter
+    First the corrector of `options` from each start; then each of `homotopies` in turn; then the other globalisations, from that start
+    whose residual is least; last the homotopy that needs no physics, ``residual(x) - (1 - s) residual(x_start) = 0``. Shorter
     continuation steps come between the first two and are the business of `stickslip.solve.continuation.advance`.
 
     Parameters
@@ -82,6 +89,8 @@ def solve_robustly(
         (n,) share of each unknown in the length of a step of a homotopy; default: equal.
     patience
         Most iterations of the other globalisations.
+    steps
+        Newton steps of all attempts together, beyond which none is begun or goes on; 0: those of `steps_at_most`.
 
     Returns
     -------
@@ -98,7 +107,7 @@ def solve_robustly(
         solve_robustly(lambda v: balance.linearise(v, omega), [guess], Newton(), [Homotopy((growing,), at_rest)])
     """
     spent: list[Solution] = []
-    for attempt in _attempts(evaluate, starts, options, homotopies, weights, patience):
+    for attempt in _attempts(evaluate, starts, options, homotopies, weights, patience, steps):
         spent.append(attempt)
         if attempt.status.converged:
             return charged(attempt, spent)
@@ -112,24 +121,47 @@ def _attempts(
     homotopies: Iterable[Homotopy],
     weights: FloatArray | None,
     patience: int,
+    steps: int,
 ) -> Iterator[Solution]:
     tried: list[FloatArray] = []
+    left = _Left(steps)
     for start in starts:
+        left.steps = left.steps or steps_at_most(start.size) * (not tried)
+        if not left.steps:
+            return
         tried.append(start)
-        yield newton(evaluate, start, options)
+        yield left.after(newton(evaluate, start, left.at_most(options)))
     x = min(tried, key=lambda v: _finite(float(np.max(np.abs(evaluate(v).residual)))))
-    for name in GLOBALISATIONS:
-        if name != options.globalisation:
-            patient = replace(options, globalisation=name, max_iterations=patience)
-            yield replace(newton(evaluate, x, patient), rung=Rung.OTHER_GLOBALISATION)
-    quick = replace(options, max_iterations=min(options.max_iterations, ITERATIONS))
     weights = np.ones(x.size) if weights is None else weights
-    following = Following(newton=quick, control=STEPS, weights=weights)
     for homotopy in homotopies:
-        yield _followed(homotopy, evaluate, following)
-    relaxed = (_Relaxed(evaluate, evaluate(x).residual),)
-    wandering = Homotopy(relaxed, x, least=-np.inf, max_points=ROOTLESS)
-    yield _followed(wandering, evaluate, following)
+        if left.steps:
+            yield left.after(_followed(homotopy, evaluate, options, weights, left.steps))
+    patient = replace(options, max_iterations=patience)
+    for name in GLOBALISATIONS:
+        if name != options.globalisation and left.steps:
+            other = replace(left.at_most(patient), globalisation=name)
+            found = replace(newton(evaluate, x, other), rung=Rung.OTHER_GLOBALISATION)
+            yield left.after(found)
+    if left.steps:
+        relaxed = (_Relaxed(evaluate, evaluate(x).residual),)
+        wandering = Homotopy(relaxed, x, least=-np.inf, max_points=ROOTLESS)
+        yield left.after(_followed(wandering, evaluate, options, weights, left.steps))
+
+
+@dataclass(eq=False)
+class _Left:
+    """Newton steps that are left of a budget."""
+
+    steps: int
+
+    def after(self, attempt: Solution) -> Solution:
+        """Return an attempt, and count its steps."""
+        self.steps = max(self.steps - attempt.iterations, 0)
+        return attempt
+
+    def at_most(self, options: Newton) -> Newton:
+        """Return the corrector with no more steps than are left."""
+        return replace(options, max_iterations=max(min(options.max_iterations, self.steps), 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,20 +207,36 @@ class _Relaxed:
         return _At(at.residual - (1.0 - p) * self.start, at.jac, self.start, at.seconds_contact)
 
 
-def _followed(homotopy: Homotopy, evaluate: Evaluate, following: Following) -> Solution:
-    """Follow a homotopy to the end of its last leg."""
-    control = replace(following.control, max_points=homotopy.max_points)
-    following = replace(following, control=control)
+def _followed(
+    homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: FloatArray, steps: int
+) -> Solution:
+    """Follow a homotopy roughly to the end of its last leg, and solve there, within so many Newton steps."""
+    rough = replace(
+        options,
+        max_iterations=min(options.max_iterations, ITERATIONS),
+        tolerance=max(options.tolerance, ROUGH),
+    )
+    control = replace(STEPS, max_points=homotopy.max_points)
+    following = Following(
+        newton=rough,
+        control=control,
+        weights=weights,
+        predictor="parabola",
+        corrector="kept_factors",
+    )
     spent: list[Solution] = []
     x, begins = homotopy.start, homotopy.begins
     for leg in homotopy.legs:
         first = _begun(leg, x, begins, following, spent)
-        point = _to_the_end(leg, first, homotopy.least, following, spent)
+        point = _to_the_end(leg, first, homotopy.least, following, spent, steps)
         x, begins = point.x, (0.0,)
         if point.p != 1.0 or not point.solution.status.converged:
             break
     solution = point.solution
-    if solution.status.converged and (point.p != 1.0 or leg is not homotopy.legs[-1]):
+    if solution.status.converged and point.p == 1.0 and leg is homotopy.legs[-1]:
+        solution = newton(evaluate, x, options)
+        spent.append(solution)
+    elif solution.status.converged:
         solution = replace(solution, status=Status.TOO_MANY_ITERATIONS)
     if not solution.status.converged:
         # what a failed step left is no measure of how near s = 1 is
@@ -214,15 +262,20 @@ def _begun(
 
 
 def _to_the_end(
-    leg: Problem, start: Point, least: float, following: Following, spent: list[Solution]
+    leg: Problem,
+    start: Point,
+    least: float,
+    following: Following,
+    spent: list[Solution],
+    steps: int,
 ) -> Point:
-    """Follow a leg from `start` until p = 1, p < `least`, no step converges, or `MOST_STEPS` are spent."""
+    """Follow a leg from `start` until p = 1, p < `least`, no step converges, or so many Newton `steps` are spent."""
     point = start
     if not start.solution.status.converged:
         return start
     for point in trace(leg, start, 1.0, following):
         spent.append(point.solution)
-        if point.p < least or sum(s.iterations for s in spent) > MOST_STEPS:
+        if point.p < least or sum(s.iterations for s in spent) > steps - 2 * ITERATIONS:
             break
     return point
 

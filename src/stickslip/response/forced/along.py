@@ -91,12 +91,12 @@ class ForcedCurve:
             own.insert(0, self.problem(to).unknowns(known.judged.start))
         return own
 
-    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+    def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
         """Solve at a frequency to which no branch leads."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
             forced.system, self.problem(level), forced.sweep.newton, p, known,
-            most and forced.sweep.rescue == "all",
+            effort if forced.sweep.rescue == "all" else 0,
         )  # fmt: skip
 
     def cost(self, level: int) -> float:

@@ -16,6 +16,7 @@ from stickslip.response.time.repeating import Repetition, repetition
 from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Rung, Status
 
 MOST_COORDINATES = 600  # half a second a period, or more
@@ -166,6 +167,8 @@ def _solved(
     if seen.verdict == "not periodic" or not seen.finite:
         return []
     spent: list[tuple[Balance, Solution]] = []
+    size = problem.balance(lost.support).size
+    left = max(steps_at_most(size) - lost.iterations, PATIENCE)
     patient = problem.sweep.newton
     patient = replace(patient, max_iterations=max(PATIENCE, patient.max_iterations))
     orders = _orders(problem, lost)
@@ -175,6 +178,8 @@ def _solved(
         start = balance.unknowns(seen.motion[: order + 1, balance.linear.retained])
         evaluate = partial(_at, balance, lost.omega)
         for level in (NaturalLevel(), None):
+            if sum(s.iterations for _, s in spent) >= left:
+                return spent
             spent.append((balance, newton(evaluate, start, patient, level)))
             if spent[-1][1].status.converged:
                 return spent

@@ -30,7 +30,7 @@ from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.ill_posed import refuse_ill_posed
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, Point, start_point, step_to
+from stickslip.solve.continuation import STEPS_BETWEEN, Following, Point, start_point, step_to
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
@@ -218,24 +218,24 @@ class ForcedProblem:
         if balance in self.ways:
             return self.ways[balance]
         # along a branch a shorter step is cheaper than a long correction
-        few = replace(
-            self.sweep.newton,
-            max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
-        )
+        most = min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations)
+        few = replace(self.sweep.newton, max_iterations=most)
         way = following_vibration(balance, self.sweep.control, few)
         if not isinstance(balance, LocalBalance):
             self.ways[balance] = way
         return way
 
-    def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance) -> Point:
-        """Go from a solution to another frequency on the branch with the harmonics of `balance`."""
+    def along_branch(
+        self, point: ForcedPoint, omega: float, balance: AnyBalance, steps: int = STEPS_BETWEEN
+    ) -> Point:
+        """Go from a solution to another frequency on the branch with the harmonics of `balance`, within so many Newton `steps`."""
         following = self.following(balance)
         most = min(DETOUR, following.control.max_points)
         following = replace(following, control=replace(following.control, max_points=most))
         start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
         if not start.solution.status.converged:
             return start
-        return step_to(balance, start, omega, following)
+        return step_to(balance, start, omega, following, steps)
 
     def alerted(self, point: ForcedPoint) -> bool:
         """Whether the alert asks for more harmonics at a point of the first passage."""

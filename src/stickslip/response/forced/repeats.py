@@ -15,7 +15,7 @@ from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
-from stickslip.solve.rescue import solve_robustly
+from stickslip.solve.rescue import solve_robustly, steps_at_most
 from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start
@@ -56,6 +56,7 @@ def repeat(
     near = _neighbours(point.index, others)
     q = balance.unknowns(point.coefficients)
     spent: list[Solution] = []
+    most = steps_at_most(balance.size)
 
     def found() -> bool:
         return bool(spent) and spent[-1].status.converged
@@ -64,7 +65,7 @@ def repeat(
         for end in ends:
             if found():
                 return
-            detour = problem.along_branch(end, omega, balance).solution
+            detour = problem.along_branch(end, omega, balance, most // 4).solution
             spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
 
     # between two points of the branch a solution is near: a dozen evaluations where other starts take a hundred
@@ -85,17 +86,39 @@ def repeat(
             if found():
                 break
     detours(beside)
-    if not found() and static is not None:
-        solution = solve_robustly(
-            lambda v: balance.linearise(v, omega),
-            [nearest[1]],
-            problem.sweep.newton,
-            homotopies(balance, omega, static()),
-            problem.following(balance).weights,
+    if not found():
+        spent += _by_all(
+            problem,
+            balance,
+            omega,
+            nearest[1],
+            static,
+            max(most - charged(spent[-1], spent).iterations, 1),
         )
-        spent.append(solution)
     solution = charged(spent[-1], spent)
     return forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
+
+
+def _by_all(
+    problem: ForcedProblem,
+    balance: Balance,
+    omega: float,
+    start: FloatArray,
+    static: Callable[[], FloatArray] | None,
+    steps: int,
+) -> list[Solution]:
+    """Solve by all that may help, within so many Newton `steps`; not at all without a static equilibrium."""
+    if static is None:
+        return []
+    solution = solve_robustly(
+        lambda v: balance.linearise(v, omega),
+        [start],
+        problem.sweep.newton,
+        homotopies(balance, omega, static()),
+        problem.following(balance).weights,
+        steps=steps,
+    )
+    return [solution]
 
 
 def _leading(

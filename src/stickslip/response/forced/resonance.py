@@ -15,6 +15,7 @@ from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
+from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
@@ -197,9 +198,10 @@ class _Search:
         curve = self._curve(most)
         level = curve.supports.index(most)
         balance = curve.problem(level)
+        third = steps_at_most(balance.size) // 3
         spent: list[Solution] = []
         for end in sides:
-            found = self.problem.along_branch(end, omega, balance).solution
+            found = self.problem.along_branch(end, omega, balance, third).solution
             rung = max(found.rung, Rung.SHORTER_STEP) if spent else found.rung
             spent.append(replace(found, rung=rung))
             if found.status.converged:
@@ -207,9 +209,8 @@ class _Search:
         if not spent[-1].status.converged:
             near = [balance.unknowns(end.coefficients) for end in sides]
             options = self.problem.sweep.newton
-            spent.append(
-                without_branch(self.problem.system, balance, options, omega, near, most=False)
-            )
+            effort = 1 / 3 if self.problem.sweep.rescue == "all" else 0.0
+            spent.append(without_branch(self.problem.system, balance, options, omega, near, effort))
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:

@@ -19,6 +19,7 @@ from stickslip.response.forced.problem import (
 )
 from stickslip.response.ladder import without_branch
 from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.rescue import steps_at_most
 
 
 def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
@@ -109,21 +110,26 @@ def _solution(
     guesses = [] if start is None else [balance.unknowns(start)]
     guesses += [balance.unknowns(p.coefficients) for p in near]
     spent: list[Solution] = []
+
+    def taken() -> int:
+        return sum(s.iterations for s in spent)
+
     if guesses:
         # the smallest residual decides: contact states may have changed since, or with the harmonics
         sizes = [float(np.linalg.norm(balance.linearise(x, omega).residual)) for x in guesses]
         x = guesses[int(np.argmin(sizes))]
         spent.append(newton(lambda v: balance.linearise(v, omega), x, quick))
     for point in near:
-        if spent[-1].status.converged:
+        if spent[-1].status.converged or taken() > steps_at_most(balance.size) // 2:
             break
         if point.omega != omega:
             spent.append(problem.along_branch(point, omega, balance).solution)
     if not (spent and spent[-1].status.converged):
         found = [balance.unknowns(p.coefficients) for p in tried if p.converged][-1:]
-        most = problem.sweep.rescue == "all"
+        left = 1.0 - taken() / steps_at_most(balance.size)
+        effort = max(left, 0.0) if problem.sweep.rescue == "all" else 0.0
         spent.append(
-            without_branch(problem.system, balance, problem.sweep.newton, omega, found, most)
+            without_branch(problem.system, balance, problem.sweep.newton, omega, found, effort)
         )
     return charged(spent[-1], spent)
 

@@ -135,7 +135,7 @@ class ModeCurve(Curve):
             corrector="kept_factors",
         )
 
-    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+    def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
         """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
         own, equation = self.problems[level], self.problem(level)
         starts = [self.lifted(n.point.x, n.level, level) for n in near]
@@ -143,7 +143,7 @@ class ModeCurve(Curve):
         options = own.how.newton, replace(PATIENT, linear=own.how.newton.linear)
         attempts = (
             newton(lambda y: equation.linearise(y, p), start, one)
-            for one in options[: 2 if most else 1]
+            for one in options[: 2 if effort else 1]
             for start in starts
         )
         return first_converged(attempts)

@@ -111,7 +111,7 @@ class _Setup:
     def reference(self, omega: float, near: Sequence[FloatArray]) -> TractionState:
         """Solve from the model's own start."""
         solution = without_branch(
-            self.system, self.given, self.problem.newton, omega, near, most=not near
+            self.system, self.given, self.problem.newton, omega, near, 0.0 if near else 1.0
         )
         if not solution.status.converged:
             raise SingularError(

@@ -75,7 +75,7 @@ def peak_curve(
     newton = replace(search.how.newton, globalisation="dogleg", max_iterations=FEW)
     way = Following(newton=newton, control=control, weights=weights)
 
-    def begin(value: float, near: Sequence[FloatArray], _most: bool) -> Solution:
+    def begin(value: float, near: Sequence[FloatArray], _effort: float) -> Solution:
         if near:
             tracker.known = [(value, near[-1])]
         return tracker.reached(value)

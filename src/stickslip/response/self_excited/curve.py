@@ -261,7 +261,7 @@ def _followed(
     control = replace(steps_through(abs(last - first), points), largest=LARGEST)
     way = Following(newton=problem.how.newton, control=control, weights=_weights(problem))
 
-    def begin(p: float, near: Sequence[FloatArray], _most: bool) -> Solution:
+    def begin(p: float, near: Sequence[FloatArray], _effort: float) -> Solution:
         own = [] if start is None else [start]
         return _solved(problem, equation, p, [*near, *own])
 
