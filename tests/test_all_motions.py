@@ -306,13 +306,37 @@ def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
     assert min(at.basins.count(at.motions.index(m)) for m in stable) > 0
 
 
+# ---- subharmonic isola -----------------------------------------------------------------------------------------------------
+
+
+def test_the_third_order_subharmonic_isola_of_a_duffing_oscillator_is_found():
+    # q'' + 4 q' + 1e4 q + 1e8 q³ = 100 cos Ωt: from 341.9 to 424.5 rad/s
+    one, gap = np.ones((1, 1)), np.array([[1.0], [0.0], [0.0]])
+    structure = Structure(one, 4.0 * one, 1e4 * one, table(("q",)))
+    contact = Interface(("c",), (CubicSpring(cubic_t=1e8),), gap)
+    system, load = System(structure, contact, np.array([0])), HarmonicLoad(np.zeros(1), {1: np.array([100.0 + 0j])})  # fmt: skip
+    search = MotionSearch(
+        omega_range=(300.0, 500.0), at=(400.0,), periods=3, harmonics=3, samples=128, points=20, tries=1, starts=0
+    )  # fmt: skip
+    found = all_motions(system, load, search)
+    (isola,) = (b for b in found.branches if b.isola)
+    assert isola.origin == "deflation"
+    # the limits are known to their last digit, of the frequency of the load
+    assert isola.extent == pytest.approx((341.9, 424.5), abs=0.1)
+    # two motions of the isola beside the three of the load's period
+    assert len(found.at[0].motions) == 5
+    # its third harmonics alone: 3/4 κ a² = (Ω/3)² - k without damping and load
+    free = np.sqrt(((400.0 / 3) ** 2 - 1e4) / (0.75 * 1e8))
+    assert min(abs(m.amplitude / free - 1.0) for m in found.at[0].motions) < 0.05
+
+
 # ---- budget, resumption, bad input -----------------------------------------------------------------------------------------
 
 
 def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
     system, load = duffing()
     result = all_motions(
-        system, load, MotionSearch(omega_range=(0.6, 1.7), harmonics=1, points=20, seconds=1e-9)
+        system, load, MotionSearch(omega_range=(0.6, 1.7), harmonics=1, points=20, solves=1)
     )
     assert result.spent
     assert result.tries == result.starts == 0

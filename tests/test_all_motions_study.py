@@ -90,7 +90,8 @@ def test_python_gives_the_motions_of_a_study(folder):
     [
         ("at_hz = [0.5]", "all_motions.at_hz"),
         ("steps = 4", "all_motions.steps"),
-        ("budget_s = 0.0", "all_motions.budget_s"),
+        ("solves = 0", "all_motions.solves"),
+        ("budget_s = 60.0", "all_motions.budget_s: is no key any more.*Give solves"),
     ],
 )
 def test_bad_tables_are_refused_by_key(tmp_path, line, said):
@@ -103,7 +104,7 @@ def test_bad_tables_are_refused_by_key(tmp_path, line, said):
 def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
     case = one_case(result.data["all_motions"].to_dataset(), 0)
     told = {name: case[name].variable for name in case.variables}
-    for name in ("seconds", "budget_s", "tries", "spent", "unmarched"):
+    for name in ("seconds", "solves", "budget_solves", "tries", "spent", "unmarched"):
         told[name] = xr.Variable((), case.attrs[name])
     stable = np.where(case["motion_stability"].values[0] == "stable", case["motion_amplitude"].values[0], np.nan)  # fmt: skip
     count = case["motion_count"].values.copy()
@@ -119,7 +120,7 @@ def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
 def test_what_the_budget_left_and_where_a_branch_was_lost_are_said(result):
     case = one_case(result.data["all_motions"].to_dataset(), 0)
     told = {name: case[name].variable for name in case.variables}
-    for name in ("seconds", "budget_s", "tries", "spent", "unmarched"):
+    for name in ("seconds", "solves", "budget_solves", "tries", "spent", "unmarched"):
         told[name] = xr.Variable((), case.attrs[name])
     lost = case["end"].values.astype(object)
     lost[-1] = "lost at 0.05 Hz (why)"

@@ -160,7 +160,7 @@ class Model(Assembly):
         return self._answer("modal_synthesis", keys, folder)
 
     def all_motions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
-        """Search for motions that a sweep does not meet; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, budget_s=60.0``."""
+        """Search for motions that a sweep does not meet; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, solves=2000``."""
         return self._answer("all_motions", keys, folder)
 
     def quasi_periodic(self, *, folder: str | Path | None = None, **keys: Any) -> Result:

@@ -54,7 +54,7 @@ def branches(view: Motions) -> Plot:
         f"{_several(len(view.names), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
         f"{_several(view.integers('searched_hz').size, 'frequency', 'frequencies')} (marks) other motions were searched by "
         f"{int(view.scalar('tries'))} deflated solves and from {int(np.sum(view.integers('starts')))} random states in time, "
-        f"{number(view.scalar('seconds'), 3)} s of a budget of {number(view.scalar('budget_s'), 4)} s; what was new was followed.{spent} "
+        f"{int(view.scalar('solves'))} solves of a budget of {int(view.scalar('budget_solves'))}; what was new was followed.{spent} "
         "Stability is examined at the marks alone: the lines between them are thin, for nobody knows whether a motion there lasts. "
         "Nothing proves that there is no other motion."
     )

@@ -198,6 +198,8 @@ class AllMotions:
         Deflated solves, and starts in time.
     seconds
         What the search took.
+    solves
+        Deflated solves, starts and points of branches together.
     spent
         Whether the budget ended it before all was tried that was asked for.
     unmarched
@@ -209,6 +211,7 @@ class AllMotions:
     tries: int
     starts: int
     seconds: float
+    solves: int
     spent: bool
     unmarched: str = ""
 
@@ -249,12 +252,18 @@ def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) 
         sum(s.tries for s in stages if s.kind != "starts"),
         sum(s.tries for s in stages if s.kind == "starts"),
         sum(s.seconds for s in stages),
+        sum(work_of(s) for s in stages),
         any(SPENT in s.end for s in stages),
         next((s.end for s in starts.values() if s.end != SPENT), ""),
     )
 
 
 SPENT = "the budget is spent"
+
+
+def work_of(stage: Stage) -> int:
+    """Return what a stage counts in the budget: deflated solves or starts in time, and the points of a branch."""
+    return stage.tries + (stage.omega.size if stage.kind == "branch" else 0)
 
 
 def _amplitudes(problem: ForcedProblem, stage: Stage, periods: int) -> FloatArray:

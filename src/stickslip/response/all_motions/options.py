@@ -46,8 +46,8 @@ class MotionSearch:
         After which a start that repeats nothing is given up.
     steps
         Steps in a period of the motion.
-    seconds
-        Budget: no solve, no start and no point of a branch begins after it, and deflation leaves half of it to the starts.
+    solves
+        Budget of deflated solves, starts and points of branches together: none begins after it, and deflation leaves half of it to the starts.
     seed
         Of the random states.
     evaluator
@@ -69,7 +69,7 @@ class MotionSearch:
     spread: float = 1.5
     most_periods: int = 1000
     steps: int = 512
-    seconds: float = 120.0
+    solves: int = 10_000
     seed: int = 0
     evaluator: Evaluator = "events"
     newton: Newton = field(default_factory=Newton)
@@ -83,13 +83,16 @@ class MotionSearch:
             "modes",
             "steps",
             "most_periods",
+            "solves",
         ):
             if getattr(self, name) < 1:
                 raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
         if 2 * self.periods * self.harmonics >= self.steps:
             raise input_error("MotionSearch.steps", f"is {self.steps}, too few for {self.harmonics} harmonics over periods = {self.periods}", f"Give more than {2 * self.periods * self.harmonics}.")  # fmt: skip
-        if not (self.seconds > 0.0 and self.spread > 0.0):
-            raise input_error("MotionSearch", f"seconds = {self.seconds}, spread = {self.spread}", "Both are above zero.")  # fmt: skip
+        if not self.spread > 0.0:
+            raise input_error(
+                "MotionSearch.spread", f"is {self.spread}", "Give a factor above zero."
+            )
         low, high = self.omega_range
         if not all(low <= omega <= high for omega in self.at):
             raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")  # fmt: skip

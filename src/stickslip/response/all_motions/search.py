@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 from time import perf_counter
 
 import numpy as np
@@ -24,7 +25,16 @@ from stickslip.response.all_motions.basins import (
     sampler,
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
-from stickslip.response.all_motions.found import SPENT, AllMotions, Kind, Origin, Stage, gathered
+from stickslip.response.all_motions.found import (
+    SPENT,
+    AllMotions,
+    Kind,
+    Origin,
+    Stage,
+    gathered,
+    work_of,
+)
+from stickslip.response.all_motions.from_modes import mode_starts
 from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
@@ -44,7 +54,7 @@ from stickslip.solve.continuation import start_point
 from stickslip.solve.newton_method import Newton, newton
 
 ITERATIONS = 60  # of a deflated solve
-SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
+SHARE = 0.5  # of the budget of solves, after which deflation leaves the rest to time
 SCALES = (
     0.25,
     64.0,
@@ -78,7 +88,7 @@ def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> All
 def search_stages(
     problem: ForcedProblem, search: MotionSearch, done: Sequence[Stage] = ()
 ) -> Iterator[Stage]:
-    """Yield the stages of a search that are not in `done`, in their order; a budget counts what `done` took."""
+    """Yield the stages of a search that are not in `done`, in their order; the budget counts the work of `done`."""
     yield from _Search(problem, search, list(done)).run()
 
 
@@ -95,9 +105,8 @@ class _Search:
         # a deflated Jacobian has a full row more: it is an array
         self.balance: HarmonicBalance = replace(whole, jacobian="dense")
         self.weights = vibration_weights(self.balance)
-        self.before = sum(s.seconds for s in self.stages)
-        self.began = perf_counter()
-        self.mark = self.began
+        self.now = 0  # work since the last stage
+        self.mark = perf_counter()
 
     def run(self) -> Iterator[Stage]:
         """Go through all that was asked for."""
@@ -126,10 +135,16 @@ class _Search:
         stage = replace(stage, seconds=now - self.mark)
         self.mark = now
         self.stages.append(stage)
+        self.now = 0
         return stage
 
     def _spent(self, share: float = 1.0) -> bool:
-        return self.before + perf_counter() - self.began > share * self.search.seconds
+        return self.now + sum(work_of(s) for s in self.stages) >= share * self.search.solves
+
+    def _counted(self) -> bool:
+        """Count a point of a branch; return whether the budget is spent."""
+        self.now += 1
+        return self._spent()
 
     def _at(self, omega: float, but: int = -1) -> list[tuple[int, FloatArray]]:
         """Return the solutions at a frequency, each once, with the number of the branch that holds it; `but` those found in time at a place."""
@@ -177,7 +192,7 @@ class _Search:
 
     def _swept(self) -> Stage:
         search = self.search
-        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton, self._spent)  # fmt: skip
+        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton, self._counted)  # fmt: skip
         points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]  # fmt: skip
         lost = len(made) - len(points)
         end = f"{lost} points were not found" if lost else WHOLE
@@ -198,7 +213,7 @@ class _Search:
             following,
             first,
             most,
-            lambda: SPENT if self._spent() else "",
+            lambda: SPENT if self._counted() else "",
         )
         return self._stage("branch", place, origin, points, end)
 
@@ -224,7 +239,7 @@ class _Search:
             if found is None:
                 break
             yield self._kept(replace(self._branch(place, "deflation", found, omega), tries=tries))
-        end = SPENT if tries < self.search.tries else ""
+        end = SPENT if self._spent(SHARE) else ""
         yield self._kept(replace(self._stage("searched", place, "deflation", (), end), tries=tries))
 
     def _another(
@@ -236,16 +251,18 @@ class _Search:
     ) -> tuple[FloatArray | None, int]:
         """Return a solution that is none of the known ones, None where as many starts as asked for find nothing, and the starts taken."""
         apart = self._shifted(known)
-        for tries in range(self.search.tries):
+        chosen = mode_starts(self.problem, self.balance, omega, self.search.periods, known, self.search.modes)  # fmt: skip
+        most = len(chosen) + self.search.tries
+        for tries, start in enumerate(islice(chain(chosen, starts), most)):
+            self.now = tries
             if self._spent(SHARE):
                 return None, tries
-            start = next(starts)
             found = deflated_newton(
                 lambda x: self.balance.linearise(x, omega), start, apart, self._distance(known or [start]), options
             )  # fmt: skip
             if found.status.converged and not self._known(found.x, known):
                 return found.x, tries + 1
-        return None, self.search.tries
+        return None, most
 
     def _guesses(
         self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator
@@ -293,6 +310,7 @@ class _Search:
         ends: list[tuple[int, ComplexArray]] = []
         states = drawn(own, search.seed, place)
         while len(ends) < search.starts and not self._spent():
+            self.now = len(ends) + 1  # those before a branch was found count once
             found = in_time(own, next(states), stepping)
             rows = found.harmonics[:, : self.balance.linear.n]
             ends.append(({"settled": PERIODIC, "unsettled": APERIODIC, "diverged": DIVERGED}[found.status], rows))  # fmt: skip

@@ -51,7 +51,7 @@ class AllMotionsAnalysis:
             over = sum(s.kind != "branch" for s in stages)
             advance(0.95 * min(over / most, 1.0), _told(stage, inputs))
             yield stage
-        notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.seconds))
+        notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.solves))
 
     def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
         """Return what was found in all cases."""
@@ -79,7 +79,7 @@ def _said(question: Question) -> str:
     search = question.search
     return (
         f"{len(search.places)} frequencies searched by deflation and {search.starts} starts in time each, "
-        f"in {search.seconds:.4g} s at most; {search.harmonics} harmonics"
+        f"{search.solves} solves at most; {search.harmonics} harmonics"
     )
 
 

@@ -48,8 +48,8 @@ class Solver(Section):
     )
     rescue: Rescue = Field(
         "all",
-        description="of [forced_response]. all: a frequency that does not converge is looked for by other globalisations and homotopies, up to some "
-        "thousand Newton steps, then from the motion in time, if that repeats itself; in_time: by the corrector, from several starts, and from the "
+        description="of [forced_response]. all: a frequency that does not converge is looked for by homotopies and other globalisations, up to 300 "
+        "Newton steps at a point of 60 unknowns, then from the motion in time, if that repeats itself; in_time: by the corrector, from several starts, and from the "
         "motion in time, listed frequencies by no branch in between: for strong lift-off of many contacts; off: by the corrector alone",
     )
 

@@ -60,13 +60,14 @@ ABOUT = {
     "motion_share_high": ("searched motion", "1", "upper end"),
     "tries": ("", "1", "deflated solves"),
     "seconds": ("", "s", "what the search took"),
-    "budget_s": ("", "s", "budget"),
+    "solves": ("", "1", "deflated solves, starts in time and points of branches together"),
+    "budget_solves": ("", "1", "most of them"),
     "unmarched": ("", "1", "why nothing was started in time; empty where it was"),
     "spent": ("", "1", "1: the budget ended the search before all was tried that was asked for"),
 }  # fmt: skip
 
 
-def noted(found: AllMotions, budget: float) -> dict[str, Any]:
+def noted(found: AllMotions, budget: int) -> dict[str, Any]:
     """Return what was found as named arrays."""
     own = found.branches
     return {
@@ -82,7 +83,8 @@ def noted(found: AllMotions, budget: float) -> dict[str, Any]:
         **_at(found.at),
         "tries": found.tries,
         "seconds": found.seconds,
-        "budget_s": budget,
+        "solves": found.solves,
+        "budget_solves": budget,
         "spent": int(found.spent),
         "unmarched": found.unmarched,
     }

@@ -80,7 +80,7 @@ def question_of(case: Case, model: Model) -> Question:
         periods=asked.periods,
         most_periods=asked.most_periods,
         steps=asked.steps,
-        seconds=asked.budget_s,
+        solves=asked.solves,
         seed=asked.seed,
         evaluator=case.settings.solver.evaluator,
     )

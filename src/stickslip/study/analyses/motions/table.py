@@ -1,6 +1,6 @@
 """The table [all_motions] of a study file."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -23,9 +23,11 @@ class AllMotionsTable(Section):
     frequencies: int = Field(
         5, ge=1, le=200, description="number of frequencies that are searched, 1 to 200"
     )
-    budget_s: Positive = Field(
-        120.0,
-        description="budget in seconds of the clock: nothing new begins after it, branches end; deflation leaves half of it to time integration",
+    solves: int = Field(
+        10_000,
+        ge=1,
+        le=10_000_000,
+        description="budget of deflated solves, starts in time and points of branches together: nothing new begins after it, branches end; deflation leaves half of it to time integration",
     )
     harmonics: int = Field(
         7, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}"
@@ -69,6 +71,17 @@ class AllMotionsTable(Section):
     seed: int = Field(
         0, ge=0, description="a whole number that the random states and starts are made from"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_clock(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "budget_s" in given:
+            raise custom_error(
+                "is no key any more: seconds of the clock gave other motions on a busy machine",
+                "Give solves, a budget of deflated solves, starts in time and points of branches; 10000 is the default.",
+                "budget_s",
+            )
+        return given
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

@@ -23,12 +23,12 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if "origin" not in case:
         return [Verdict("wrong", label, None, "the search was not finished", "Run it again.")]
     found = [*_higher(label, case), *_basins(label, case)]
-    seconds, budget = float(case["seconds"].values), float(case["budget_s"].values)
+    solves, budget = int(case["solves"].values), int(case["budget_solves"].values)
     tries, starts = int(case["tries"].values), int(np.sum(case["starts"].values))
-    work = f"{tries} deflated solves and {starts} starts in time in {seconds:.3g} s"
+    work = f"{tries} deflated solves and {starts} starts in time, {solves} solves in all"
     if int(case["spent"].values):
-        why = f"the budget of {budget:.4g} s ended the search: {work}{_untried(case)}"
-        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.budget_s."))
+        why = f"the budget of {budget} solves ended the search: {work}{_untried(case)}"
+        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.solves."))
     found += [*_unfinished(label, case), *_harmonics(label, case)]
     unmarched = str(case["unmarched"].values)
     if unmarched:
@@ -181,9 +181,8 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
         f"up to {1e3 * peak:.6g} mm at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
         for i, peak in enumerate(case["peak_amplitude"].values)
     ]
-    budget = (
-        f"{float(case.attrs['seconds']):.3g} s of a budget of {float(case.attrs['budget_s']):.4g} s"
-    )
+    solves, most = int(case.attrs["solves"]), int(case.attrs["budget_solves"])
+    budget = f"{solves} solves of a budget of {most}, {float(case.attrs['seconds']):.3g} s"
     lines.append(f"{int(case.attrs['tries'])} deflated solves; {budget}.")
     columns = ("Hz", "branch", "amplitude mm", "stability", "starts that end on it, %")
     return TextTable(title, columns, tuple(rows), tuple(lines))

@@ -1,0 +1,117 @@
+"""Starts from free motions: a mode at the amplitude at which it has the frequency of one of the harmonics."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.linear import one_structure
+from stickslip.model.modes import normal_modes
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.forced.problem import ForcedProblem
+from stickslip.response.homotopies import GrowingLoad, growing_load
+
+PHASES = (
+    8  # of a free motion against the load; a shift by a period of the load gives the same motion
+)
+SPAN = (1e-2, 1e2)  # amplitudes that are looked at, in units of the largest known motion
+AMPLITUDES = 40
+HIGHEST = 3  # multiple of the load's frequency that is looked at
+ALIKE = 0.999  # cosine from which two shapes are one
+
+
+def mode_starts(
+    problem: ForcedProblem,
+    balance: HarmonicBalance,
+    omega: float,
+    periods: int,
+    known: Sequence[FloatArray],
+    modes: int,
+) -> list[FloatArray]:
+    """Return starts for motions that an internal or subharmonic resonance sustains, the one that needs least load first.
+
+    A mode with contacts stuck or open vibrates freely in one harmonic where damping and load are left away and the force along its shape
+    vanishes. A motion on a closed curve apart from the sweep lies near such a free motion plus the known motion, in some phase.
+
+    Parameters
+    ----------
+    problem
+        What vibrates.
+    balance
+        Its equation.
+    omega
+        Frequency of the period of the motion, rad/s.
+    periods
+        Of the load in it.
+    known
+        (size,) unknowns of the known motions.
+    modes
+        Number of lowest modes of either kind.
+    """
+    if not known or isinstance(problem.system.structure, TunedWheel | SpeedLine):
+        return []
+    free = growing_load(balance, omega)
+    base = min((balance.coefficients(x) for x in known), key=_size)
+    starts: list[tuple[float, FloatArray]] = []
+    for shape in _shapes(problem, balance, modes):
+        for harmonic in _harmonics(balance.order, periods):
+            for amplitude in _free_amplitudes(free, base, harmonic, shape):
+                for k in range(PHASES):
+                    q = base.copy()
+                    turn = np.exp(2j * np.pi * k / (PHASES * periods))
+                    q[harmonic] += amplitude * turn * shape
+                    x = balance.unknowns(q)
+                    lack = float(np.linalg.norm(balance.linearise(x, omega).residual))
+                    starts.append((lack, x))
+    return [x for _, x in sorted(starts, key=lambda start: start[0])]
+
+
+def _size(q: ComplexArray) -> float:
+    return float(np.linalg.norm(q[1:]))
+
+
+def _harmonics(order: int, periods: int) -> list[int]:
+    """Return the harmonics below that of the load, its own, and multiples of it."""
+    multiples = (periods * m for m in range(1, HIGHEST + 1))
+    return [h for h in (*range(1, periods), *multiples) if h <= order]
+
+
+def _shapes(problem: ForcedProblem, balance: HarmonicBalance, modes: int) -> Iterator[FloatArray]:
+    """Yield the shapes (n_retained,) of the lowest modes, largest entry one, with contacts stuck and open; those that are alike once."""
+    seen: list[FloatArray] = []
+    for side in (problem.system.stuck_structure(), problem.system.structure):
+        structure = one_structure(side, "all motions")
+        own = normal_modes(structure, min(modes, structure.n))
+        for column in np.asarray(own.shapes).real.T:
+            shape = column[balance.linear.retained]
+            largest = float(np.max(np.abs(shape), initial=0.0))
+            if largest == 0.0:
+                continue
+            unit = shape / np.linalg.norm(shape)
+            if not any(abs(unit @ other) > ALIKE for other in seen):
+                seen.append(unit)
+                yield shape / largest
+
+
+def _free_amplitudes(
+    free: GrowingLoad, base: ComplexArray, harmonic: int, shape: FloatArray
+) -> Iterator[float]:
+    """Yield the amplitudes of a shape, m, at which it vibrates freely in a harmonic about the static part of a motion."""
+    still = np.zeros_like(base)
+    still[0] = base[0]
+
+    def along(amplitude: float) -> float:
+        q = still.copy()
+        q[harmonic] = amplitude * shape
+        residual = free.linearise(free.balance.unknowns(q), 0.0).residual
+        return float(free.balance.coefficients(residual)[harmonic].real @ shape)
+
+    # without a vibration nothing says how large the others may be
+    size = float(np.max(np.abs(base[1:]), initial=0.0)) or free.balance.displacement_scale
+    tried = size * np.geomspace(*SPAN, AMPLITUDES)
+    force = np.array([along(a) / a for a in tried])
+    for i in np.flatnonzero(force[:-1] * force[1:] < 0.0):
+        yield float(brentq(along, tried[i], tried[i + 1], xtol=1e-6 * tried[i], rtol=1e-6))
