@@ -458,3 +458,31 @@ def test_points_of_the_peak_that_took_the_place_of_others_stand_along_the_branch
     amplitude = [1.0, 1.3, 1.6, 1.9, 1.5, 1.2]
     own = Curve(response(refinement=np.array([0, 0, 1, 1, 0, 1]), amplitude=amplitude), 0)
     assert own.branch.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_time_integration_speaks_for_all_outputs() -> None:
+    """An amplitude that agrees does not settle a prediction where another output, or a phase, is off."""
+    doubted = {"own_error_percent": values(TOP, 9.0, 1.0)}
+    near = response(**doubted, **checked(outputs_percent=3.0))
+    assert judged(near)[1] == "trusted"
+    off = response(**doubted, **checked(outputs_percent=11.0))
+    found, level, _ = judged(off)
+    assert level == "doubtful"
+    assert any("differ by 11 % in an output, phase included" in v.why for v in found)
+    assert any("predicted to change it by 9 %" in v.why for v in found)
+
+
+@pytest.mark.parametrize(("third", "word"), [(0.3, "note"), (0.01, "")])
+def test_harmonic_that_the_amplitude_leaves_out_is_told(third: float, word: str) -> None:
+    motion = np.zeros((6, 6, 1, 2))
+    motion[:, 1, 0, 0], motion[:, 3, 0, 0] = 1.9, -1.9 * third
+    data = response({"driven_harmonics": [1]})
+    data["output_displacement"] = (("point", "harmonic", "output", "part"), motion)
+    told = [v for v in verdicts(data, [""]) if "half of peak to peak" in v.why]
+    assert [v.word for v in told] == [word] * bool(word)
+    if told:
+        # (1 + third) of the first harmonic at its crest is no crest here: cos x - 0.3 cos 3x has its own
+        angle = np.linspace(0.0, 2 * np.pi, 100_001)
+        whole = 1.9 * np.ptp(np.cos(angle) - third * np.cos(3 * angle)) / 2
+        assert f"half of peak to peak is {1e3 * whole:.4g} mm" in told[0].why
+        assert "harmonic 3" in told[0].why

@@ -10,13 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.response.forced.accepted import audits_by_frequency
-from stickslip.response.forced.along import AGREE, NEAR, SAFETY
+from stickslip.response.forced.along import AGREE, NEAR, SAFETY, SMALL
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most
+WORK = 5000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
 # share of the threshold above which a prediction that nothing has confirmed is not believed
 BELIEVED = 0.5
 CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
@@ -56,7 +57,8 @@ def settle(
     if not problem.sweep.auto:
         return
     stages: tuple[Stage, Stage] = ("peak", "check") if of_peak else ("settled", "compared")
-    settling = _Settling(problem, list(accepted), stored, stages)
+    budget = max(WORK, sum(map(_work, solved)))
+    settling = _Settling(problem, list(accepted), stored, stages, budget)
     audits = audits_by_frequency(solved)
     for place, point in enumerate(accepted):
         mine = point.converged and (point.stage == "peak") == of_peak
@@ -75,12 +77,18 @@ def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoi
     return not bound <= BELIEVED * limit
 
 
+def _work(point: ForcedPoint) -> float:
+    """Return the work of a solution, in Newton steps of a small system."""
+    return point.iterations * (1.0 + point.unknowns / SMALL)
+
+
 @dataclass(slots=True, eq=False)
 class _Settling:
     problem: ForcedProblem
     known: list[ForcedPoint]
     stored: Iterator[ForcedPoint]
     stages: tuple[Stage, Stage]
+    left: float  # work
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
         """Raise the harmonics of a point until the motion stays, a solution after the other."""
@@ -93,7 +101,7 @@ class _Settling:
             balance, change = problem.balance(support), np.inf
             more: ForcedPoint | None = None
             for make in self._ways(place, balance):
-                if spent == SOLUTIONS:
+                if spent == SOLUTIONS or self.left <= 0.0:
                     return
                 spent += 1
                 found = yield from self._take(make)
@@ -138,4 +146,5 @@ class _Settling:
             made = make()
             known = replace(made, seconds_total=perf_counter() - began)
             yield known
+        self.left -= _work(known)
         return known
