@@ -14,6 +14,7 @@ from stickslip.harmonic.support import harmonics_of, multiples
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
+from stickslip.response.residual_tractions.bounds import TractionBounds, traction_bounds
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.verification import own_error
 
@@ -258,3 +259,17 @@ def test_study_tells_the_amplitude_that_it_measures(tmp_path, measure):
     assert data.attrs["amplitude_of"] == measure
     np.testing.assert_allclose(data.amplitude.values[0], own, rtol=1e-12)
     assert float(data.peak_amplitude[0]) == pytest.approx(float(own[0]))
+
+
+def test_bounds_over_residual_tractions_hear_the_third_harmonic():
+    """Near the resonance: with one harmonic the bounds are predicted to be off, as they are; with nine they are not."""
+    made, load = chain(1)
+    omega = 2 * math.pi * 11.4
+
+    def bounds(order: int) -> TractionBounds:
+        return next(iter(traction_bounds(made, load, [omega], 0, Discretisation(order=order))))
+
+    few, many = bounds(1), bounds(9)
+    assert abs(few.most.amplitude / many.most.amplitude - 1.0) > 0.1
+    assert min(few.most.error, few.reference.error) > 0.05
+    assert max(many.most.error, many.reference.error) < 0.02

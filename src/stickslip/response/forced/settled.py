@@ -17,10 +17,11 @@ from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most
-WORK = 5000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
+WORK = 2000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
 # share of the threshold above which a prediction that nothing has confirmed is not believed
 BELIEVED = 0.5
 CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
+LOST = 2  # levels without a motion nearby after which a point is left as it is
 BESIDE = 2  # neighbours on either side from which a motion with more harmonics is looked for
 
 Taken = Generator[ForcedPoint, None, ForcedPoint]
@@ -92,7 +93,7 @@ class _Settling:
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
         """Raise the harmonics of a point until the motion stays, a solution after the other."""
-        problem, spent = self.problem, 0
+        problem, spent, lost = self.problem, 0, 0
         limit = AGREE * problem.strategy.threshold
         for support in problem.sweep.supports:
             here = self.known[place]
@@ -110,7 +111,12 @@ class _Settling:
                     more, change = found, off
                 if change <= NEAR:
                     break
-            if more is None or change <= limit:
+            if more is None:
+                lost += 1  # what one level does not find the next may
+                if lost == LOST:
+                    return
+                continue
+            if change <= limit:
                 return
             last = support == problem.sweep.supports[-1]
             bound = CAP_SAFETY * change if last else np.nan
