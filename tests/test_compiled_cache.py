@@ -6,19 +6,20 @@ import sys
 import time
 
 import numba
+import numpy as np
 import pytest
 
 import stickslip.contact
-from stickslip.contact import cache, compiling
+from stickslip.contact import cache_files, compiling
 
 SOURCE = """
 from typing import NamedTuple
-import numba
+from stickslip.contact.cache import njit
 
 class {name}(NamedTuple):
     a: float
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def double(pair):
     return 2.0 * pair.a
 """
@@ -35,12 +36,149 @@ def test_types_that_are_gone_are_compiled_again(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "versioned")
 
 
-USED = "FACTOR = {factor}\n"
-USER = """
+SEVERAL = """
+from stickslip.contact.cache import njit
+
+@njit(cache=True)
+def inner(x):
+    return 3.0 * x
+
+@njit(cache=True)
+def outer(x):
+    return inner(x) + 1.0
+"""
+
+
+def damaged(content, rng):
+    """Return a file's bytes after a power cut, a bad disk, or another program: cut, empty, zeros, noise, flipped bits, doubled."""
+    at = int(rng.integers(1, len(content)))
+    flipped = np.frombuffer(content, np.uint8).copy()
+    places = rng.integers(0, len(content), 1 + int(rng.integers(3)))
+    np.bitwise_xor.at(flipped, places, 1 << rng.integers(0, 8, places.size).astype(np.uint8))
+    kinds = (
+        b"", content[:at], content[:at] + bytes(len(content) - at), rng.bytes(len(content)), content + content[:at],
+        content[at:], b"\x80" + content[1:], flipped.tobytes(), flipped.tobytes(),
+    )  # fmt: skip
+    return kinds[rng.integers(len(kinds))]
+
+
+@pytest.mark.parametrize(
+    ("seed", "rounds"), [(1, 6), pytest.param(2, 40, marks=pytest.mark.validation)]
+)
+def test_damaged_files_of_compiled_functions_are_made_anew(
+    tmp_path, monkeypatch, caplog, seed, rounds
+):
+    """Each is told by one line, or, where it looks like one of an earlier version, by none; what comes out is the same."""
+    rng = np.random.default_rng(seed)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "several.py").write_text(SEVERAL)
+    called(monkeypatch, "several")
+    files = sorted(path for path in tmp_path.rglob("*.nb[ic]"))
+    assert len(files) == 4
+    for number in range(rounds):
+        path = files[number % 4]
+        whole = path.read_bytes()
+        spoilt = damaged(whole, rng)
+        path.write_bytes(spoilt)
+        caplog.clear()
+        module = called(monkeypatch, "several")
+        said = [r.getMessage() for r in caplog.records if "is damaged" in r.getMessage()]
+        looks_old = spoilt[:1] == b"\x80"
+        assert said == ([] if looks_old or spoilt == whole else [f"{path} {SAID}"])
+        hits = [sum(f.stats.cache_hits.values()) for f in (module.inner, module.outer)]
+        assert sum(hits) < 2
+        assert path.read_bytes() != spoilt, "the damaged file was left"
+        module = called(monkeypatch, "several")
+        assert sum(module.outer.stats.cache_hits.values()) == 1, "what was made anew was not kept"
+
+
+SAID = "is damaged: the function is compiled again"
+
+
+def called(monkeypatch, name):
+    """Import a module anew, use it, and return it."""
+    sys.modules.pop(name, None)
+    importlib.invalidate_caches()
+    module = importlib.import_module(name)
+    monkeypatch.delitem(sys.modules, name)
+    assert (module.inner(2.0), module.outer(2.0)) == (6.0, 7.0)
+    return module
+
+
+def test_a_file_of_another_function_or_age_is_not_taken(tmp_path, monkeypatch):
+    """As a program that is killed between index and data leaves it: the index is of today, the code of before."""
+    monkeypatch.syspath_prepend(tmp_path)
+    for factor in ("3.0", "4.0"):
+        (tmp_path / "several.py").write_text(SEVERAL.replace("3.0 * x", f"{factor} * x"))
+        sys.modules.pop("several", None)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        module = importlib.import_module("several")
+        assert module.inner(1.0) == float(factor)
+        (data,) = tmp_path.rglob("several.inner*.nbc")
+        if factor == "3.0":
+            before = data.read_bytes()
+    data.write_bytes(before)
+    sys.modules.pop("several")
+    module = importlib.import_module("several")
+    assert module.inner(1.0) == 4.0
+    assert sum(module.inner.stats.cache_hits.values()) == 0
+    monkeypatch.delitem(sys.modules, "several")
+
+
+@pytest.mark.parametrize("other", ["folder", "nothing"])
+def test_what_is_no_file_costs_a_compilation(tmp_path, monkeypatch, other):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv(cache_files._TOLD, "yes")
+    (tmp_path / "several.py").write_text(SEVERAL)
+    called(monkeypatch, "several")
+    for path in tmp_path.rglob("*.nbi"):
+        path.unlink()
+        if other == "folder":
+            path.mkdir()
+    called(monkeypatch, "several")
+
+
+UNCHANGED = """
+import hashlib, inspect, pickle
 import numba
-from stickslip.used import FACTOR
+from numba.core import caching, compiler, dispatcher, decorators, serialize, typeinfer
+
+def attributes():
+    found = {}
+    for module in (caching, compiler, dispatcher, decorators, serialize, typeinfer, numba):
+        for name, item in vars(module).items():
+            found[module.__name__, name] = id(item)
+            if inspect.isclass(item) and item.__module__.startswith("numba"):
+                found |= {(module.__name__, name, own): id(value) for own, value in vars(item).items() if callable(value)}
+    return found
+
+before = attributes()
+import stickslip, stickslip.contact.march, stickslip.contact.events, stickslip.response.time.time_step
+after = attributes()
+print(*(key for key in before if before[key] != after.get(key)))
 
 @numba.njit(cache=True)
+def plain(x):
+    return x
+assert type(plain._cache) is caching.FunctionCache, type(plain._cache)
+"""
+
+
+def test_nothing_of_numba_is_replaced(tmp_path):
+    """A program that imports a solver keeps numba's own caches for its own functions."""
+    script = tmp_path / "program.py"
+    script.write_text(UNCHANGED)
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout.strip()) == (0, ""), ended.stdout + ended.stderr
+
+
+USED = "FACTOR = {factor}\n"
+USER = """
+from stickslip.contact.cache import njit
+from stickslip.used import FACTOR
+
+@njit(cache=True)
 def times(x):
     return FACTOR * x
 """
@@ -50,12 +188,12 @@ def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(
     tmp_path, monkeypatch
 ):
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(cache, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(cache_files, "_PACKAGE", tmp_path)
     # Python tells files of the same second and size apart by nothing, and would load the first one's bytecode
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     (tmp_path / "user.py").write_text(USER)
     for factor in (2.0, 3.0, 3.0):
-        cache._contents.cache_clear()
+        cache_files._contents.cache_clear()
         (tmp_path / "used.py").write_text(USED.format(factor=factor))
         for name in ("user", "stickslip.used"):
             sys.modules.pop(name, None)

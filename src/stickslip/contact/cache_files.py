@@ -1,0 +1,157 @@
+"""Where compiled functions are kept: numba's cache of one function, with a checksum of each file, and the age of all that it was made from.
+
+numba offers its caches as classes; the dispatcher of a function holds one as an attribute. Nothing of numba is replaced here, and
+functions of other programs keep numba's own cache.
+"""
+
+import hashlib
+import io
+import logging
+import os
+import pickle
+import re
+from functools import cache
+from inspect import getfile
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+LOG = logging.getLogger("stickslip")
+MARK = b"stickslip: compiled, SHA-256, pickle\n"  # at the beginning of each file
+NUMBAS_OWN = b"\x80"  # what files of numba begin with; earlier versions of this package kept such
+_PACKAGE = Path(__file__).parents[1]
+_IMPORT = re.compile(r"^\s*from stickslip\.([\w.]+) import", re.MULTILINE)
+_TOLD = "STICKSLIP_UNCACHED"  # in the environment: worker processes need not say it again
+
+
+class CheckedFiles(IndexDataCacheFile):
+    """Index and data of one function. A file that fails its checksum is thrown away with one line; one of another age counts for nothing.
+
+    A file holds `MARK`, the SHA-256 of the rest, and two pickles: its age, and its content. Data have the key of the index before
+    them: a file that another process, or one that was killed, left under the same name is not taken for another function's.
+    """
+
+    def load(self, key: Any) -> Any:
+        """Return what was saved under a key; None where it is not there, damaged, or of another age."""
+        name = self._load_index().get(key)
+        kept = None if name is None else self._read(self._path(name))
+        return None if kept is None or kept[0] != key else kept[1]
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save data under a key."""
+        super().save(key, (key, data))  # type: ignore[no-untyped-call]
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            return self._read(self._index_path) or {}
+        except OSError:
+            raise
+        except Exception:  # noqa: BLE001  a pickle of types that are gone fails in any way
+            return {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._write(self._index_path, overloads)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._path(name), data)
+
+    def _path(self, name: str) -> str:
+        return str(self._data_path(name))  # type: ignore[no-untyped-call]
+
+    def _age(self) -> Any:
+        return self._version, self._source_stamp
+
+    def _write(self, path: str, content: Any) -> None:
+        kept: bytes = self._dump(content)  # type: ignore[no-untyped-call]
+        both = pickle.dumps(self._age()) + kept
+        with self._open_for_write(path) as stream:
+            stream.write(MARK + hashlib.sha256(both).digest() + both)
+
+    def _read(self, path: str) -> Any:
+        """Return the content of a file; None where there is none that serves."""
+        file = Path(path)
+        if not file.exists():
+            return None
+        content = file.read_bytes() if file.is_file() else b""
+        head = len(MARK) + hashlib.sha256().digest_size
+        both = content[head:]
+        if content[:head] != MARK + hashlib.sha256(both).digest():
+            if content[:1] != NUMBAS_OWN:
+                LOG.warning("%s is damaged: the function is compiled again", path)
+            file.unlink()
+            return None
+        stream = io.BytesIO(both)
+        return pickle.load(stream) if pickle.load(stream) == self._age() else None
+
+
+class CheckedCache(FunctionCache):
+    """numba's cache of one function, with `CheckedFiles`. What cannot be read or written costs a compilation, and never ends a program.
+
+    Parameters
+    ----------
+    py_func
+        The function.
+
+    Raises
+    ------
+    RuntimeError
+        If numba finds no folder that it may write.
+    """
+
+    def __init__(self, py_func: Any) -> None:
+        super().__init__(py_func)  # type: ignore[no-untyped-call]
+        stamp = self._impl.locator.get_source_stamp(), _contents(Path(getfile(py_func)))
+        self._cache_file = CheckedFiles(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=stamp,
+        )  # type: ignore[no-untyped-call]
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function of a signature; None where it has to be compiled."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # noqa: BLE001  as above, of the compiled code; or nothing can be read
+            self._forget()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled function of a signature, if anything can be written."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except OSError:  # a disk that is full since
+            tell_uncached()
+
+    def _forget(self) -> None:
+        try:
+            self.flush()  # type: ignore[no-untyped-call]
+        except OSError:
+            tell_uncached()
+
+
+@cache
+def _contents(file: Path) -> str:
+    """Return the digest of all files of this package that a file imports, directly or through others.
+
+    numba looks at the function's own file only, and would go on with the constants and functions of before.
+    """
+    found: set[Path] = set()
+    to_do = [file] if file.is_file() else []
+    while to_do:
+        for name in _IMPORT.findall(to_do.pop().read_text(encoding="utf-8")):
+            path = _PACKAGE.joinpath(*name.split(".")).with_suffix(".py")
+            if path not in found and path.is_file():
+                found.add(path)
+                to_do.append(path)
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(found))).hexdigest()
+
+
+def tell_uncached() -> None:
+    """Say, once in all processes, that compiled functions cannot be kept."""
+    if _TOLD not in os.environ:
+        os.environ[_TOLD] = "yes"
+        LOG.warning(
+            "compiled functions cannot be kept for the next start, as neither this package's folder nor a home can be written: "
+            "every start compiles them again, which takes a minute. Name a folder in NUMBA_CACHE_DIR."
+        )
