@@ -113,7 +113,7 @@ trust: $(INSTALLED)  ## hold what a response trusts on random machines against a
 	$(ONE_THREAD) $(BIN)/python -m evidence.trust --seed $(or $(SEED),1) --systems $(or $(SYSTEMS),60) --workers $(WORKERS)
 
 mutants: $(INSTALLED)  ## change the library in one point, N=40 times, and list the changes that no test notices (SEED of the day; half an hour of recording the first time)
-	$(ONE_THREAD) $(BIN)/python -m evidence.mutants --n $(or $(N),40) --seed $(or $(SEED),$(shell date +%Y%m%d))
+	$(ONE_THREAD) $(BIN)/python -m evidence.mutants --n $(or $(N),40) --seed $(or $(SEED),$(shell date +%Y%m%d)) --workers $(WORKERS)
 
 calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)
 	apt-get update -qq

@@ -186,7 +186,7 @@ def synthesis_level(level: float, **changes: Any) -> SynthesisLevel:
         "direct_omega": np.array([100.0, 105.0, 110.0]), "direct_amplitude": 1e-3 * level * np.array([1.9, 1.25, 0.1]), "direct_peak": 1.6e-3 * level,
         "direct_peak_omega": 101.0, "seconds": 5.0 * level, "direct_seconds": 7.0 * level, "passage_omega": np.array([[90.0, 100.0, 110.0], [110.0, 100.0, 90.0]]),
         "passage_amplitude": 1e-3 * level * np.array([[0.5, 1.0, 1.5], [NAN, 1.2, 0.4]]), "passage_finished": np.array([1, 0]),
-        "passage_change": np.array([0.01, 0.02]) * level,
+        "passage_change": np.array([0.01, 0.02]) * level, "changed": 0.002 * level,
     }  # fmt: skip
     return SynthesisLevel(**(own | changes))
 
@@ -208,7 +208,7 @@ def test_synthesised_responses() -> None:
         answer=["trusted"] * 2, why=["at 1", "at 2"], peak_amplitude=2e-3 * both, detached_peak_amplitude=3e-3 * both,
         detached_peak_frequency_hz=(120.0 + both) / HZ, peak_frequency_hz=[100.0 / HZ] * 2, foreign=0.01 * both, others_in_output=0.02 * both,
         others_in_gaps=0.03 * both, next_frequency=0.5 * both, overlap=0.04 * both, growth=0.9 * both, higher_harmonics=0.05 * both,
-        resolved=0.001 * both, detached=[1, 2], seconds=5.0 * both, frequency_hz=np.array([[90.0, 95.0, 100.0, 105.0, 110.0]] * 2) / HZ,
+        resolved=0.001 * both, by_harmonics=0.002 * both, detached=[1, 2], seconds=5.0 * both, frequency_hz=np.array([[90.0, 95.0, 100.0, 105.0, 110.0]] * 2) / HZ,
         amplitude=1e-3 * rows * [0.5, 1.0, 2.0, 1.0, 0.5], curve=np.zeros((2, 5)), stable=[[1, 1, 1, 0, 1]] * 2, others=0.01 * rows * np.arange(5),
         alone=[[0, 1, 1, 1, 0], [0, 1, 0, 1, 0]], alone_from_hz=[95.0 / HZ, NAN], alone_to_hz=[105.0 / HZ, NAN],
         direct_frequency_hz=np.array([[100.0, 105.0, 110.0]] * 2) / HZ, direct_amplitude=1e-3 * rows * [1.9, 1.25, 0.1],
@@ -326,6 +326,7 @@ def traction_record(stage: Any, omega: float, amplitude: tuple[float, float, flo
         5 + k,
         k,
         1 + k,
+        np.array([0.01, 0.02, 0.03]) + k,
     )
 
 
@@ -344,11 +345,12 @@ def test_bounds_over_tractions() -> None:
         data, output="b.x", excitation_n=7.0, harmonics=5, frequency_hz=np.array([10.0, 12.0, 13.0, 14.0]) / HZ, reference_amplitude=[1.0, 4.0, 3.5, 2.0],
         least_amplitude=[0.5, 2.2, 1.9, 1.0], most_amplitude=[1.5, 4.5, 5.0, 3.0], stuck_springs=[[2, 1, 4]] * 4, solves=[5, 8, 9, 7],
         failures=[0, 3, 4, 2], branches=[1, 4, 5, 3], resonance_hz=np.array([12.0, 12.0, 13.0]) / HZ, resonance_amplitude=[4.0, 2.2, 5.0],
+        harmonics_error=np.array([0.01, 0.02, 0.03]) + np.array([[0], [3], [4], [2]]), resonance_harmonics_error=[1.01, 3.02, 4.03],
         resonance_inside=[1, 1, 1], spring=["L.1", "R.1"],
         multiplier=[[[1.1, NAN], [1.2, NAN]], [[NAN, 3.3], [NAN, NAN]], [[4.4, 4.4], [4.4, 4.4]]], **confirmed,
     )  # fmt: skip
     ends = [*records[:3], traction_record("least", 10.0, (1.0, 2.2, 1.5)), traction_record("most", 14.0, (2.0, 1.0, 5.0))]  # fmt: skip
-    check(of_tractions(solved(ends)), resonance_inside=[1, 0, 0])
+    check(of_tractions(solved(ends, {"model": {"harmonics": 5}})), resonance_inside=[1, 0, 0])
     lost = of_tractions(solved([traction_record("point", 10.0, (NAN, 0.5, 1.5))]))
     assert lost.attrs["failed"] == 1
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -477,3 +479,38 @@ def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
 
 def test_a_long_time_is_told_in_hours_and_days() -> None:
     assert [examination._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == ["8 s", "7000 s", "2 hours", "15 days"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("wheel", "verdict", "wave", "said"),
+    [
+        (True, "unstable", 9, ", in wave 9 (3 nodal diameters) near 50 Hz"),
+        (True, "undecided", 4, ", in wave 4 (4 nodal diameters) near 50 Hz"),
+        (True, "stable", 9, ""),
+        (True, "unstable", None, ""),
+        (False, "unstable", 9, ""),
+    ],
+)
+def test_the_wave_that_grows_is_named(
+    wheel: bool, verdict: str, wave: int | None, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    structure = Structure(np.eye(2), np.zeros((2, 2)), np.eye(2), numbered_dofs(2))
+    whole = TunedWheel(dict.fromkeys(range(12), structure), 12, 5, 2) if wheel else structure
+    asked: Any = SimpleNamespace(
+        problem="problem", model=SimpleNamespace(system=SimpleNamespace(structure=whole))
+    )
+    found: Any = SimpleNamespace(verdict=verdict, multiplier=1.2)
+    grows = None if wave is None else WaveDisturbance(1.2 + 0.0j, wave, 1.0, 50.0 * HZ)
+
+    def disturbances(*given: object) -> str:
+        assert given == ("problem", "point")
+        return "all"
+
+    def growing(*given: object) -> WaveDisturbance | None:
+        assert given == ("all", 1.2)
+        return grows
+
+    monkeypatch.setattr(stable, "point_disturbances", disturbances)
+    monkeypatch.setattr(stable, "growing_wave", growing)
+    accepted: Any = SimpleNamespace(point="point")
+    assert stable._of_wave(asked, accepted, found) == said

@@ -8,13 +8,17 @@ import pytest
 import xarray as xr
 from verdict_rows import INF, NAN, above, case_of, check
 
+from stickslip.response.nonlinear_modes.isolated import Isolation
 from stickslip.study.analyses.backbones import words as backbones
 from stickslip.study.analyses.cycles import words as cycles
 from stickslip.study.analyses.flutter import _doubts, _unstable, _unstable_wheel
+from stickslip.study.analyses.forced.jumps import jumps
 from stickslip.study.analyses.motions import words as motions
 from stickslip.study.analyses.resonances import words as resonances
 from stickslip.study.analyses.running import words as running
 from stickslip.study.analyses.synthesis import words as synthesis
+from stickslip.study.analyses.synthesis.percents import percent
+from stickslip.study.analyses.synthesis.solve import judged
 from stickslip.study.analyses.tractions import words as tractions
 from stickslip.study.analyses.two_frequencies import words as two_frequencies
 from stickslip.study.analyses.waves import doubts as waves
@@ -275,7 +279,7 @@ def test_a_peak_that_joins_another_ends_where_it_was_last_seen(own: Any, expecte
 BOUNDS: dict[str, Any] = {
     "resonance_amplitude": [1e-3, 1e-3, 1e-3], "resonance_hz": [50.0, 51.0, 52.0], "resonance_inside": [1, 1, 1], "branches": [1, 1],
     "failures": [0, 0], "solves": [4, 5], "multiplier": [[[0.5]], [[0.5]], [[0.5]]], "least_amplitude": [1e-3, 1e-3], "most_amplitude": [1e-3, 1e-3],
-    "frequency_hz": [40.0, 60.0], "confirmed": None, "resolved_amplitude": [1e-3, 1e-3], "time_amplitude": [1e-3, 1e-3],
+    "frequency_hz": [40.0, 60.0], "harmonics": 5, "confirmed": None, "resolved_amplitude": [1e-3, 1e-3], "time_amplitude": [1e-3, 1e-3],
 }  # fmt: skip
 AS_IT_IS = (
     "trusted",
@@ -296,6 +300,14 @@ BOUND_ROWS: list[Row] = [
     ({"branches": [3, 2]}, [AS_IT_IS, ("doubtful", "40.00 Hz: at 2 frequencies from 40 to 60 Hz", "up to 3")]),
     ({"failures": [0, 2]}, [AS_IT_IS, ("note", "from 2 starts of tractions no motion was found (9 were)")]),
     ({"confirmed": [1, 1]}, [AS_IT_IS]),
+    ({"resonance_harmonics_error": [0.0, 0.05, 0.05], "harmonics_error": [[0.0, 0.05, NAN]] * 2}, [AS_IT_IS]),
+    ({"resonance_harmonics_error": [0.0, NAN, 0.05], "harmonics_error": [[0.0, 0.05, NAN]] * 2}, [AS_IT_IS, ("doubtful", "nothing says how wrong H = 5 is", "residual_tractions.harmonics")]),
+    ({"resonance_harmonics_error": [0.06, above(0.05), 0.05], "harmonics_error": [[0.0, 0.5, NAN]] * 2}, [AS_IT_IS, ("doubtful", "50.00 Hz: more harmonics than 5 are predicted to change the resonance from the model's own start by 6 %")]),
+    ({"resonance_harmonics_error": [0.0, above(0.05), 0.05], "harmonics_error": [[0.0, 0.5, NAN]] * 2}, [AS_IT_IS, ("doubtful", "51.00 Hz: more harmonics than 5 are predicted to change the smallest resonance by 5 %")]),
+    ({"resonance_harmonics_error": [0.0, 0.0, 1.1], "harmonics_error": [[0.0, 0.0, 0.0]] * 2}, [AS_IT_IS, ("doubtful", "52.00 Hz", "the largest resonance by over 100 %")]),
+    ({"resonance_harmonics_error": [0.0, 0.0, 1.0], "harmonics_error": [[0.0, 0.0, 0.0]] * 2}, [AS_IT_IS, ("doubtful", "the largest resonance by 1e+02 %")]),
+    ({"resonance_harmonics_error": [0.0, 0.0, 0.0], "harmonics_error": [[0.0, 0.05, NAN], [0.0, NAN, 0.07]]}, [AS_IT_IS, ("note", "60.00 Hz: more harmonics than 5 are predicted to change the bounds by 7 % there, and by more than 5 % at 1 of 2 frequencies")]),
+    ({"resonance_harmonics_error": [0.0, 0.0, 0.0], "harmonics_error": [[0.0, 1.5, NAN], [0.0, NAN, 0.07]]}, [AS_IT_IS, ("note", "40.00 Hz", "over 100 % there, and by more than 5 % at 2 of 2")]),
     ({"confirmed": [0, 1], "resolved_amplitude": [1.0011e-3, 1e-3]}, [AS_IT_IS, ("doubtful", "51.00 Hz: the smallest resonance was not found again", "more harmonics")]),
     ({"confirmed": [1, 0], "resolved_amplitude": [NAN, NAN]}, [AS_IT_IS, ("doubtful", "52.00 Hz: the largest resonance was not found again")]),
     ({"confirmed": [1, 0], "time_amplitude": [1e-3, 2e-3]}, [AS_IT_IS, ("note", "52.00 Hz: the largest resonance, 1 mm", "it goes to 2 mm")]),
@@ -473,3 +485,88 @@ def test_an_engine_order_leaves_the_modes_at_a_speed(order: int, rpm: float | No
         share = (155.0**2 - 150.0**2) / (155.0**2 - 150.0**2 + 200.0**2 - 170.0**2)
         rpm = float(np.sqrt(1500.0**2 + share * (2000.0**2 - 1500.0**2)))
     assert found == (None if rpm is None else pytest.approx(rpm, rel=1e-12))
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "few", "expected"),
+    [
+        ([1.0, 2.0, 2.0], [0, 0, 0], []),
+        ([1.0, above(2.0), 2.0], [0, 0, 0], [(0, "amplitude 2 times")]),
+        ([2.0, 2.0, 0.5], [0, 0, 0], [(1, "amplitude 4 times")]),
+        ([1.0, 3.0, 3.0], [1, 1, 0], []),
+        ([1.0, 3.0, 3.0], [1, 0, 0], [(0, "amplitude 3 times")]),
+        ([1.0, 3.0, 3.0], [0, 1, 1], [(0, "amplitude 3 times")]),
+    ],
+)
+def test_amplitudes_jump_beyond_twice(amplitude: Any, few: Any, expected: Any) -> None:
+    found = jumps(np.array(amplitude), np.zeros(3), np.array(few, dtype=bool), 1.0)
+    assert [(j.step, j.what) for j in found] == expected
+
+
+@pytest.mark.parametrize(
+    ("loss", "expected"),
+    [
+        ([1.0, 1.0, 10.0, 10.0], []),
+        ([1.0, 1.0, 10.01, 10.01], [(1, "dissipation 10 times")]),
+        ([20.0, 20.0, 1.0, 1.0], [(1, "dissipation 20 times")]),
+        # four times the larger step beside it
+        ([1.0, 1.0, 21.0, 26.0], []),
+        ([1.0, 1.0, 21.1, 26.0], [(1, "dissipation 21.1 times")]),
+        ([6.0, 1.0, 21.0, 21.0], []),
+        ([5.9, 1.0, 21.0, 21.0], [(1, "dissipation 21 times")]),
+        # a hundredth of the largest does not matter
+        ([1.0, 1.0, 20.0, 20.0, 20.0, 2000.0], [(4, "dissipation 100 times")]),
+        ([1.0, 1.0, 20.0, 20.0, 20.0, 1999.0], [(1, "dissipation 20 times"), (4, "dissipation 100 times")]),
+        # rounding, a millionth of what the contacts store
+        ([0.99e-4, 0.99e-4, 1.0, 1.0], []),
+        ([1.1e-4, 1.1e-4, 1.0, 1.0], [(1, "dissipation 9.09e+03 times")]),
+        ([-1.0, 0.0, 1.0, 1.0], []),
+    ],
+)  # fmt: skip
+def test_dissipations_jump_beyond_ten_times(loss: Any, expected: Any) -> None:
+    """The contacts store 100 J, amplitudes are alike."""
+    n = len(loss)
+    found = jumps(np.ones(n), np.array(loss), np.zeros(n, dtype=bool), 100.0)
+    assert [(j.step, j.what) for j in found] == expected
+
+
+ISOLATED = {"output": 0.01, "gaps": 0.005, "distance": 0.5, "overlap": 0.0, "growth": 0.0, "harmonics": 0.2, "linear": False}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "resolved", "changed", "answer", "why"),
+    [
+        ({}, 0.08, 0.02, "trusted", "the other modes move by 1 % of the mode, the next frequency is 50 % away"),
+        ({"output": 0.02}, 0.0, 0.0, "trusted", "move by 2 % of the mode"),
+        ({"output": above(0.02)}, 0.0, 0.0, "doubtful", "is 50 % away: the peak may be off by about 2 %"),
+        ({"gaps": 0.05}, 0.0, 0.0, "doubtful", "move by 5 % of the mode, the next frequency is 50 % away: the peak may be off by about 5 %"),
+        ({"gaps": above(0.05)}, 0.0, 0.0, "refused", "the peak would be off by about 5 %"),
+        ({"overlap": 0.3}, 0.0, 0.0, "refused", "move by 1 % of the mode, the next frequency is 50 % away: the peak would be off by about 10 %"),
+        ({"output": 0.04, "growth": 0.75}, 0.0, 0.0, "trusted", "move by 4 % of the mode"),
+        ({}, above(0.08), 0.0, "doubtful", "without every second one the peak moves by 8 %"),
+        ({"harmonics": above(0.2)}, 0.0, 0.0, "doubtful", "higher harmonics have 20 % of the first"),
+        ({}, 0.0, NAN, "doubtful", "solved with one set of harmonics alone: raise modal_synthesis.most_harmonics"),
+        ({}, 0.0, above(0.02), "doubtful", "by 2 %: raise modal_synthesis.most_harmonics"),
+        ({"linear": True, "output": 1.0}, 1.0, NAN, "trusted", "nothing slips"),
+        ({"distance": INF}, 0.0, 0.0, "trusted", "there is no other mode"),
+        ({"distance": INF, "output": 0.03}, 0.0, 0.0, "doubtful", "there is no other mode, nothing is near: the peak may be off by about 3 %"),
+    ],
+)  # fmt: skip
+def test_a_mode_that_is_not_alone_is_told(
+    changes: Any, resolved: float, changed: float, answer: str, why: str
+) -> None:
+    found = judged(Isolation(**(ISOLATED | changes)), resolved, changed)
+    assert found[0] == answer
+    assert why in found[1]
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (10.0, "1000 %"), (10.01, "over 1000 %"), (-10.0, "-1000 %"), (-10.01, "below -1000 %"), (0.1, "10 %"), (0.0994, "9.9 %"), (0.09951, "10 %"),
+        (0.01234, "1.2 %"), (-0.01234, "-1.2 %"), (1.1e-5, "0.0011 %"), (0.9e-5, "< 0.001 %"), (0.0, "0 %"), (NAN, "-"), (INF, "-"), (0.02, "2 %"),
+    ],
+)  # fmt: skip
+def test_shares_are_written_with_the_digits_that_count(share: float, text: str) -> None:
+    assert percent(share) == text
+    assert percent(share, unit=False) == text.removesuffix(" %")

@@ -261,9 +261,38 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", RULES)
+# rows at the limits of rules, and beside them
+OVER = float(np.nextafter(5.0, 6.0))
+LIMITS: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
+    "own error at the limit": ({"own_error_percent": values(TOP, 5.0, 1.0)}, "trusted", {}, "predicted error 5 %"),
+    "own error above it": ({"own_error_percent": values(TOP, OVER, 1.0)}, "doubtful", {TOP: "doubtful"}, "predicted to change it by 5 %"),
+    "audit at the limit": ({"audit_error_percent": values(TOP, 5.0)}, "trusted", {}, "difference from more harmonics 5 %"),
+    "audit above it": ({"audit_error_percent": values(TOP, OVER)}, "doubtful", {TOP: "doubtful"}, "it differs by 5 %"),
+    "twice the harmonics at the limit": ({"reference_error_percent": values(TOP, 5.0, 1.0)}, "trusted", {}, "peak with H = 1"),
+    "twice the harmonics above it": ({"reference_error_percent": values(TOP, OVER, 1.0)}, "doubtful", {TOP: "doubtful"}, "amplitude or phase, by 5 %"),
+    "in time at the limit": (checked(motion="attained", difference_percent=-1.0), "trusted", {}, "attained in time integration"),
+    "in time above it": (checked(motion="attained", difference_percent=-1.001), "doubtful", {TOP: "doubtful"}, "differ by -1 %, more than 1 %"),
+    "wanders at the limit": (checked(motion="not periodic", scatter=0.01), "doubtful", {TOP: "doubtful"}, "it wanders by 1 %"),
+    "wanders above it": (checked(motion="not periodic", scatter=0.0101), "wrong", {TOP: "wrong"}, "is not periodic"),
+    "wanders little, elsewhere": (checked(motion="not periodic", scatter=0.005, difference_percent=1.1), "wrong", {TOP: "wrong"}, "is not periodic"),
+    "retention at the limit": ({"retention_peak_shift": [-0.01]}, "trusted", {}, "peak with H = 1"),
+    "retention above it": ({"retention_peak_shift": [0.0101]}, "doubtful", {}, "the peak changes by 1.01 %"),
+    "output that hardly moves": ({"amplitude": np.full(6, 1e-18)}, "trusted", {}, "peak with H = 1"),
+    "output just below it": ({"amplitude": np.full(6, 0.999e-18)}, "doubtful", {}, "tip.x does not move"),
+    "peak at the first frequency": (
+        {"amplitude": [1.5, 1.4, 1.3, 1.2, 1.1, 1.0], "peak_point": [0]}, "doubtful", {}, "at the end of the sweep (10.00 Hz)",
+    ),
+    "peak at the second frequency": ({"amplitude": [1.4, 1.5, 1.3, 1.2, 1.1, 1.0], "peak_point": [1]}, "trusted", {}, "peak with H = 1"),
+    "peak at the lower end of a fold": (
+        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 15.0, 16.0])}, "doubtful", {}, "and the peak stands among them",
+    ),
+    "peak below a fold": ({"frequency_hz": np.array([10.0, 11.0, 12.0, 12.9, 14.0, 13.0])}, "trusted", {}, "folds between 13.00 and 14.00"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*RULES, *LIMITS])
 def test_rule(name: str) -> None:
-    changes, case, of_points, words = RULES[name]
+    changes, case, of_points, words = (RULES | LIMITS)[name]
     found, level, points = judged(response(**changes))
     assert level == case
     if case != "wrong" or "status" not in changes:

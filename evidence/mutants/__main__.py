@@ -33,16 +33,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--cache", type=Path, default=HERE / "out", help="what is recorded")
     parser.add_argument("--budget", type=float, default=BUDGET_S, help="CPU of a mutant's tests, s")
+    parser.add_argument("--workers", type=int, default=1, help="processes that record")
     parser.add_argument("--record", action=argparse.BooleanOptionalAction, default=True)
     asked = parser.parse_args(argv)
     if asked.record:
-        record(ROOT, asked.cache)
+        record(ROOT, asked.cache, asked.workers)
     sources = sources_of(ROOT / "src" / "stickslip")
     texts = {f"tests/{f.name}": f.read_text(encoding="utf-8") for f in ROOT.glob("tests/test_*.py")}
     reach = Reach(asked.cache, sources, texts)
     with TemporaryDirectory(prefix="mutants-") as folder:
         copy = Copy(ROOT, Path(folder) / "tree")
         found = []
+        cheap = next(iter(reach.in_order(reach.cpu_s)), "")
+        if cheap and not copy.passes(cheap, reach.cost_s(cheap)):
+            raise RuntimeError(f"{cheap} fails without any mutant: no test can be run in the copy")
         for mutant in drawn(sources, asked.n, asked.seed, tuple(asked.only)):
             found.append(judged(copy, reach, mutant, asked.budget))
             print(told(found[-1], sources[mutant.path]), flush=True)

@@ -16,6 +16,7 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +33,7 @@ FILE_S = 10.0  # CPU that a test file takes of which nothing is known
 NAMED = 8  # letters of a name that says which function it is
 
 
-def record(root: Path, cache: Path) -> None:
+def record(root: Path, cache: Path, workers: int = 1) -> None:
     """Record the test files that are new or have changed since they were recorded, some files a process.
 
     Parameters
@@ -41,6 +42,8 @@ def record(root: Path, cache: Path) -> None:
         Of the checkout.
     cache
         Folder of what is recorded.
+    workers
+        Processes at a time.
     """
     cache.mkdir(parents=True, exist_ok=True)
     known = {(file, sum_) for piece in _pieces(cache) for file, sum_ in piece["files"].items()}
@@ -48,18 +51,24 @@ def record(root: Path, cache: Path) -> None:
         file for file in sorted((root / "tests").glob("test_*.py"))
         if (f"tests/{file.name}", _digest(file)) not in known
     ]  # fmt: skip
-    for start in range(0, len(to_do), PIECE):
-        files = to_do[start : start + PIECE]
-        sums = {f"tests/{file.name}": _digest(file) for file in files}
-        where = cache / f"piece_{hashlib.sha256(repr(sums).encode()).hexdigest()[:12]}"
-        print(f"recording {', '.join(sums)}", flush=True)
-        _run(root, where, list(sums))
-        shutil.copytree(
-            root / "src" / "stickslip", where.with_suffix(".src"),
-            ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True,
-        )  # fmt: skip
-        said = json.loads(where.with_suffix(".json").read_text(encoding="utf-8"))
-        where.with_suffix(".json").write_text(json.dumps(said | {"files": sums}), encoding="utf-8")
+    pieces = [to_do[start : start + PIECE] for start in range(0, len(to_do), PIECE)]
+    with ThreadPoolExecutor(workers) as pool:
+        for done in pool.map(lambda files: _record(root, cache, files), pieces):
+            print(f"recorded {', '.join(done)}", flush=True)
+
+
+def _record(root: Path, cache: Path, files: Sequence[Path]) -> list[str]:
+    """Record some test files, with the sources as they are, and return their names."""
+    sums = {f"tests/{file.name}": _digest(file) for file in files}
+    where = cache / f"piece_{_sum(repr(sums).encode())[:12]}"
+    _run(root, where, list(sums))
+    shutil.copytree(
+        root / "src" / "stickslip", where.with_suffix(".src"),
+        ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True,
+    )  # fmt: skip
+    said = json.loads(where.with_suffix(".json").read_text(encoding="utf-8"))
+    where.with_suffix(".json").write_text(json.dumps(said | {"files": sums}), encoding="utf-8")
+    return list(sums)
 
 
 def _run(root: Path, where: Path, files: Sequence[str]) -> None:
@@ -190,7 +199,10 @@ class Reach:
     @cached_property
     def cpu_s(self) -> dict[str, float]:
         """CPU of each test, s."""
-        return {t: s for piece in self.pieces for t, s in piece["cpu_s"].items()}
+        return {
+            t: s for piece in self.pieces for t, s in piece["cpu_s"].items()
+            if self._valid.get(t.partition("::")[0]) == piece["data"]
+        }  # fmt: skip
 
     @cached_property
     def failed(self) -> set[str]:
