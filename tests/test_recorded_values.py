@@ -262,8 +262,8 @@ def test_all_motions() -> None:
         AtFrequency(11.0, (MotionAt(1, 0.5, moved, "stable", 0.9, 0.01, 0.02), MotionAt(0, 0.25, moved, "unstable", 1.1, 0.03, np.inf)), Basins(11.0, ends), 6, True),
         AtFrequency(12.0, (), Basins(12.0, ()), 8, False),
     )  # fmt: skip
-    found = AllMotions(branches, at, 14, 10, 3.5, True, "not marched")
-    data = of_motions(solved([], {"found": noted(found, 60.0), "model": {"output": "b.x"}}))
+    found = AllMotions(branches, at, 14, 10, 3.5, 19, True, "not marched")
+    data = of_motions(solved([], {"found": noted(found, 60), "model": {"output": "b.x"}}))
     shares = [share_interval(3, 10), share_interval(1, 10)]
     nothing = [NAN, NAN]
     check(
@@ -274,7 +274,7 @@ def test_all_motions() -> None:
         motion_amplitude=[[0.5, 0.25], nothing], motion_stability=[["stable", "unstable"], ["", ""]], motion_multiplier=[[0.9, 1.1], nothing],
         motion_multiplier_error=[[0.01, 0.03], nothing], motion_change=[[0.02, np.inf], nothing], motion_count=[[3, 1], [-1, -1]],
         motion_share=[[0.3, 0.1], nothing], motion_share_low=[[s[0] for s in shares], nothing], motion_share_high=[[s[1] for s in shares], nothing],
-        tries=14, seconds=3.5, budget_s=60.0, unmarched="not marched", spent=1,
+        tries=14, seconds=3.5, solves=19, budget_solves=60, unmarched="not marched", spent=1,
     )  # fmt: skip
 
 

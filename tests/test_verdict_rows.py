@@ -172,7 +172,7 @@ MODES_ROWS: list[Row] = [
 # a branch of the sweep, one beside it; two frequencies, one motion each
 FOUND: dict[str, Any] = {
     "origin": ["sweep", "time"], "end": ["it closes in itself", "it reaches the end of the range"], "isola": [0, 1], "peak_amplitude": [1e-3, 1e-3],
-    "peak_hz": [50.0, 60.0], "seconds": 12.0, "budget_s": 30.0, "tries": 7, "spent": 0, "unmarched": "",
+    "peak_hz": [50.0, 60.0], "solves": 55, "budget_solves": 90, "tries": 7, "spent": 0, "unmarched": "",
     "searched_hz": [55.0, 65.0], "searched_spent": [0, 0], "starts": [20, 20], "aperiodic": [0, 0], "diverged": [0, 0], "unsolved": [0, 0],
     "motion_branch": [[0, 1], [0, -1]], "motion_amplitude": [[1e-3, 8e-4], [1e-3, NAN]], "motion_stability": [["stable", "unstable"], ["stable", ""]],
     "motion_change": [[0.0, 0.0], [0.0, NAN]], "motion_count": [[20, 0], [20, -1]], "motion_share": [[1.0, 0.0], [1.0, NAN]],
@@ -180,7 +180,7 @@ FOUND: dict[str, Any] = {
 }  # fmt: skip
 ALL = (
     "trusted",
-    "2 branches, 1 isola among them, by 7 deflated solves and 40 starts in time in 12 s",
+    "2 branches, 1 isola among them, by 7 deflated solves and 40 starts in time, 55 solves in all",
 )
 FOUND_ROWS: list[Row] = [
     ({"origin": None}, [("wrong", "not finished", "Run it again")]),
@@ -188,7 +188,7 @@ FOUND_ROWS: list[Row] = [
     ({"peak_amplitude": [1e-3, 1.002e-3]}, [("warning", "an isola reaches 1.002 mm at 60 Hz, 1 times"), ALL]),
     ({"peak_amplitude": [1e-3, 2e-3], "isola": [0, 0]}, [("warning", "a branch that no sweep meets reaches 2 mm at 60 Hz, 2 times"), ("trusted", "0 isolas")]),
     ({"origin": ["time", "time"], "peak_amplitude": [1e-3, 2e-3]}, [("warning",), ("warning",), ALL]),
-    ({"spent": 1}, [("doubtful", "the budget of 30 s ended the search", "in 12 s. Raise all_motions.budget_s")]),
+    ({"spent": 1}, [("doubtful", "the budget of 90 solves ended the search", "55 solves in all. Raise all_motions.solves")]),
     ({"spent": 1, "searched_spent": [0, 1]}, [("doubtful", "at 1 of 2 frequencies (65 Hz) not all")]),
     ({"end": ["it closes in itself", "20 steps"]}, [("doubtful", "branch 2 (time) is not known to its end: 20 steps", "all_motions.points")]),
     ({"end": ["it closes in itself", "the budget is spent"]}, [ALL]),

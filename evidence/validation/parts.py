@@ -104,9 +104,9 @@ def _in_time(workers: int) -> Counter[str]:
     return _comparisons(IN_TIME, workers)
 
 
-def _mutants(_workers: int) -> Counter[str]:
+def _mutants(workers: int) -> Counter[str]:
     """Draw mutants; where enough are noticed, those that survive count as left out for a person to judge, else as failures."""
-    command = [sys.executable, "-m", "evidence.mutants", "--n", str(MUTANTS), "--seed", f"{datetime.now(UTC):%Y%m%d}"]  # fmt: skip
+    command = [sys.executable, "-m", "evidence.mutants", "--n", str(MUTANTS), "--seed", f"{datetime.now(UTC):%Y%m%d}", "--workers", str(workers)]  # fmt: skip
     ended = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     print(ended.stdout, flush=True)
     said = NOTICED.search(ended.stdout)
