@@ -26,8 +26,10 @@ from stickslip.response.stability import (
 )
 from stickslip.response.stability.contact_states import located_states
 from stickslip.response.stability.contact_tangent import contact_tangents
+from stickslip.response.stability.hill_segment import Segment
 from stickslip.response.system import System
 from stickslip.solve.status import Status
+from stickslip.study.keep.archive import decode, encode
 
 
 def random_motion(law, seed):
@@ -211,3 +213,41 @@ def test_what_cannot_be_examined_is_refused():
     other = replace(system.interface, laws=(Dahl(k_t=1.0, limit=1.0),))
     with pytest.raises(InputError, match="not located"):
         hill_exponents(replace(system, interface=other), gaps, 1.0)
+
+
+def test_a_stopped_examination_goes_on_where_it_was(monkeypatch):
+    """Matrices of the segments are kept with what they were made of: none is made twice, and the bits are the same."""
+    problem, point, _ = forced(2.0)
+    made = []
+    node = Segment.node
+
+    def counted(self, sigma):
+        made.append(sigma)
+        return node(self, sigma)
+
+    monkeypatch.setattr(Segment, "node", counted)
+    whole = hill_stability(problem, point)
+    all_nodes, pieces = len(made), {}
+
+    def keep(content, make):
+        if content not in pieces:
+            if len(pieces) == most:
+                raise KeyboardInterrupt
+            pieces[content] = decode(encode(make()))  # as a journal does
+        return pieces[content]
+
+    made.clear()
+    for most in (3, 7, 10**6):
+        try:
+            found = hill_stability(problem, point, keep)
+        except KeyboardInterrupt:
+            assert len(pieces) == most
+    assert len(made) == all_nodes
+    np.testing.assert_array_equal(
+        found.stability.floquet.multipliers, whole.stability.floquet.multipliers
+    )
+    np.testing.assert_array_equal(found.stability.errors, whole.stability.errors)
+    made.clear()
+    other = replace(point, coefficients=point.coefficients * (1.0 + 1e-12))
+    hill_stability(problem, other, keep)
+    assert len(made) > 0.5 * all_nodes  # pieces of another motion are of no use

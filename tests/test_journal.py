@@ -12,6 +12,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.solve.status import Status
+from stickslip.study.analyses.analysis import Pieces
 from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
 from stickslip.study.keep.journal import JobJournal, read_note, read_sealed
 
@@ -215,6 +216,42 @@ def test_a_flipped_bit_of_a_job_is_refused_or_changes_nothing(
             assert list(notes["model"]["names"]) == ["L1.1", "R.3"]
     assert len(told) > count // 20
     assert set(told) == {(str(path), True)}
+
+
+def test_pieces_of_a_stopped_computation_are_found_again_and_given_up_at_its_end(
+    tmp_path: Path,
+) -> None:
+    path, made = tmp_path / "a.part", []
+
+    def make(value: int) -> dict[str, np.ndarray]:
+        made.append(value)
+        return {"a": np.full(200_000, float(value))}
+
+    def computed(journal: JobJournal, count: int) -> float:
+        pieces = Pieces(journal, "stability.0", seconds=0.0)
+        total = sum(pieces.keep(f"piece {i}", lambda i=i: make(i))["a"].sum() for i in range(count))  # type: ignore[misc]
+        if count == 5:
+            pieces.give_up()
+        return float(total)
+
+    with JobJournal(path, Point) as journal:
+        computed(journal, 3)  # stopped here
+    with JobJournal(path, Point) as journal:
+        assert len(journal.notes()) == 3
+        assert computed(journal, 5) == 200_000 * 10.0
+        assert made == [0, 1, 2, 3, 4]
+        assert journal.notes() == {}
+        journal.add(point(0))
+        large = path.stat().st_size
+        journal.seal()
+    assert path.with_suffix(".job").stat().st_size < 0.01 * large
+    assert same(read_sealed(path.with_suffix(".job"), Point)[0][0], point(0))
+
+
+def test_pieces_that_are_soon_made_are_not_kept(tmp_path: Path) -> None:
+    with JobJournal(tmp_path / "a.part", Point) as journal:
+        Pieces(journal, "stability.0").keep("piece", lambda: {"a": 1.0})
+        assert journal.notes() == {}
 
 
 def _read(path: Path) -> tuple[list[Point], dict[str, dict[str, object]]]:

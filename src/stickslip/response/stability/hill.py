@@ -1,6 +1,9 @@
 """Stability of a motion by Hill's method that is exact for friction: of a wheel against every wave, one sector at a time."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +21,7 @@ from stickslip.response.stability.contact_states import (
 from stickslip.response.stability.contact_tangent import contact_tangents
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.hill_modes import HillSide
-from stickslip.response.stability.hill_segment import Hill
+from stickslip.response.stability.hill_segment import Hill, Keep, not_kept
 from stickslip.response.stability.hill_spectrum import Exponents, exponents, segments_of
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.waves import WaveDisturbance
@@ -76,11 +79,20 @@ class HillStability:
 
 
 @by_one_thread
-def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
+def hill_stability(
+    problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept
+) -> HillStability:
     """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
 
     As in `stability`, the multipliers are those of the motion with more harmonics, and what these change is part of their errors. Structural damping
     and aerodynamic coefficients that follow the frequency act as in the balance.
+
+    Parameters
+    ----------
+    problem, point
+        As in `stability`.
+    keep
+        Keeps pieces under what they were made of, so that an interrupted examination goes on where it was.
 
     Raises
     ------
@@ -95,7 +107,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
         )
     system, more = problem.system.at(point.omega), corrected(problem, point)
     better, times = (point, np.inf) if more is None else more
-    hill, states = _of_point(system, problem, better)
+    hill, states = _of_point(system, problem, better, keep=keep)
     if hill is None or states is None:
         return _unknown()
     hill, found = _refined(hill)
@@ -103,7 +115,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     if better is point and more is not None:
         change[:] = 0.0
     elif more is not None:
-        solved, _ = _of_point(system, problem, point, hill.order)  # with the same modes
+        solved, _ = _of_point(system, problem, point, hill.order, keep)  # with the same modes
         change = change if solved is None else times * _changes(found, solved)
     return _judged(found, change, states, hill)
 
@@ -155,10 +167,22 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
 
 
 def _of_point(
-    system: System, problem: ForcedProblem, point: ForcedPoint, order: int | None = None
+    system: System,
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    order: int | None = None,
+    keep: Keep = not_kept,
 ) -> tuple[Hill | None, ContactStates | None]:
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
-    return _prepared(system, gaps, point.omega, order)
+    hill, states = _prepared(system, gaps, point.omega, order)
+    if hill is None:
+        return None, None
+    motion = sha256(np.ascontiguousarray(gaps).tobytes()).hexdigest()
+
+    def kept(place: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+        return keep(f"{motion} {point.omega!r} {place}", make)
+
+    return replace(hill, keep=kept), states
 
 
 def _prepared(

@@ -6,9 +6,10 @@ S(σ) that has no poles near the segment, and a polynomial through a few σ is e
 that are solved act through their first passage, ``-D R D`` with the receptance R at the ports.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -28,6 +29,12 @@ TAIL, MOST_TAIL = (
     60,
 )  # times the harmonics that are solved: up to which those beyond act, and so many at most
 HALF = 0.5  # frequency of the motion: length of a segment
+Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
+
+
+def not_kept(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Return what is made, which is kept nowhere."""
+    return make()
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +49,14 @@ class Hill:
         The contacts that change.
     order
         Highest harmonic of disturbances that is solved.
+    keep
+        Keeps the matrices of a segment, which take the time, under what they were made of.
     """
 
     side: HillSide
     tangents: Sequence[ContactTangent]
     order: int
+    keep: Keep = not_kept
 
     @cached_property
     def reach(self) -> float:
@@ -141,7 +151,18 @@ class Segment:
     @cached_property
     def nodes(self) -> list[Node]:
         """The matrices at the nodes."""
-        return [self.node(complex(self.growth, y)) for y in self.heights]
+        place = f"wave {self.wave}, {self.low} + {self.growth}, {self.away}, H = {self.hill.order}"
+        kept = self.hill.keep(place, self._matrices)
+        names = [f.name for f in fields(Node)]
+        return [
+            Node(**dict(zip(names, own, strict=True)))
+            for own in zip(*(kept[name] for name in names), strict=True)
+        ]
+
+    def _matrices(self) -> dict[str, Any]:
+        """Return the matrices of all nodes by their names in `Node`."""
+        found = [self.node(complex(self.growth, y)) for y in self.heights]
+        return {f.name: np.array([getattr(node, f.name) for node in found]) for f in fields(Node)}
 
     def weights(self, sigma: ComplexArray) -> ComplexArray:
         """Return the (k, NODES) shares of the nodes in the polynomial at exponents (k,)."""

@@ -3,8 +3,10 @@
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Protocol
 
 import xarray as xr
@@ -115,6 +117,52 @@ class Notes(Protocol):
     def get(self, name: str) -> dict[str, Any] | None:
         """Return what was stored under `name`, or None."""
         ...
+
+    def forget(self, name: str) -> None:
+        """Remove what was stored under `name`."""
+        ...
+
+
+@dataclass(eq=False)
+class Pieces:
+    """Pieces of a long computation in the notes of a job, so that a stopped one goes on where it was.
+
+    Parameters
+    ----------
+    notes
+        Of the job.
+    name
+        What the names of the pieces begin with.
+    seconds
+        On the clock: pieces that are made faster are made again.
+    places
+        Of the pieces that are kept.
+    """
+
+    notes: Notes
+    name: str
+    seconds: float = 0.5
+    places: set[str] = field(default_factory=set)
+
+    def keep(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+        """Return what `make` makes, or what it made before the job was stopped; `content` is all that this depends on."""
+        place = f"{self.name} {sha256(content.encode()).hexdigest()}"
+        known = self.notes.get(place)
+        if known is not None:
+            self.places.add(place)
+            return known
+        began = perf_counter()
+        made = make()
+        if perf_counter() - began >= self.seconds:
+            self.places.add(place)
+            self.notes.put(place, made)
+        return made
+
+    def give_up(self) -> None:
+        """Remove the pieces, once what they were made for is kept."""
+        for place in self.places:
+            self.notes.forget(place)
+        self.places.clear()
 
 
 class Analysis(Protocol):

@@ -16,7 +16,7 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
-from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.analysis import Case, Notes, Pieces, Solved, TextTable
 from stickslip.study.analyses.forced.bifurcating import (
     bifurcations_line,
     followed,
@@ -303,9 +303,10 @@ def _examined(question: Question, response: Response, notes: Notes) -> list[Exam
     def look(accepted: Accepted) -> Examined:
         nonlocal count
         name, count = f"{STABLE}.{count}", count + 1
-        known = notes.get(name)
-        one = Examined(**known) if known else examine(question, accepted)
+        known, pieces = notes.get(name), Pieces(notes, name)
+        one = Examined(**known) if known else examine(question, accepted, pieces.keep)
         notes.put(name, asdict(one))
+        pieces.give_up()
         return one
 
     found = examined_points(question, response, look)

@@ -21,6 +21,7 @@ AT_WORK, SEALED = ".part", ".job"
 BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
 WHOLE = "whole"  # of a file that has been sealed: the checksum of all its records and notes
 DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
+MANY_EMPTY = 256  # pages of notes that were given up, 4 kB each, from which a file is packed
 PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
 ANEW = "Run anew with --fresh, which removes what runs wrote into the folder and no other file."
 FRESH = (
@@ -138,6 +139,9 @@ class JobJournal:
         with _named(self._path):
             self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
             self._db.execute("insert into meta values (?, ?)", (WHOLE, _checksum(self._db)))
+            (empty,) = self._db.execute("pragma freelist_count").fetchone()
+            if empty >= MANY_EMPTY:
+                self._db.execute("vacuum")
             self._db.close()
             self._path.replace(self._path.with_name(f"{_key(self._path)}{SEALED}"))
 

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability import Stability, hill_stability, stability
+from stickslip.response.stability.hill_segment import Keep, not_kept
 from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.stability.waves import (
     WaveDisturbance,
@@ -100,15 +101,15 @@ class Examined:
         return f"{told}, the motion in time being {self.motion}; by the multipliers undecided: {self.reason}"
 
 
-def examine(question: Question, accepted: Accepted) -> Examined:
-    """Return what the multipliers say of a point, or why they say nothing."""
+def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Examined:
+    """Return what the multipliers say of a point, or why they say nothing; `keep` keeps pieces of a long examination."""
     omega = accepted.point.omega
     why, hill = why_not(question), by_hill(question.model.system)
     if why:
         return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
     try:
         if hill:
-            return _by_hill(question, accepted)
+            return _by_hill(question, accepted, keep)
         found = stability(question.problem, accepted.point)
         wave = _of_wave(question, accepted, found)
     except InputError as error:
@@ -119,9 +120,9 @@ def examine(question: Question, accepted: Accepted) -> Examined:
     return _seen(question, accepted, found, f"{found.reason}{wave}")
 
 
-def _by_hill(question: Question, accepted: Accepted) -> Examined:
+def _by_hill(question: Question, accepted: Accepted, keep: Keep) -> Examined:
     """Return what Hill's method says of a point of a wheel, against every wave."""
-    hill = hill_stability(question.problem, accepted.point)
+    hill = hill_stability(question.problem, accepted.point, keep)
     found, said = hill.stability, hill.reason
     wheel = isinstance(question.model.system.structure, TunedWheel)
     if wheel and hill.disturbance is not None and found.verdict != "stable":
