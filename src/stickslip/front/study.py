@@ -5,6 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from html import escape
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,7 @@ class Study:
         names = [only] if isinstance(only, str) else list(only)
         content = self.content
         if folder is not None:
-            content = _Elsewhere(content.file, content.memo, Path(folder).resolve())
+            content = _Elsewhere(content.file, content.memo, Path(realpath(folder)))
         share = None if shard is None else Shard.read(shard)
         with by_default(workers), one_loaded_blas_thread():
             outcome = run_study(

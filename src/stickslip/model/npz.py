@@ -32,6 +32,22 @@ _GARBLED = (
 BROKEN = "The file is damaged or was cut short: write or copy it again."
 
 
+def require_no_pipe(path: Path) -> None:
+    """Refuse named pipes, sockets and devices, from which a reader would wait for ever.
+
+    Raises
+    ------
+    InputError
+        If something is there that is neither a file nor a folder.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise input_error(
+            str(path),
+            "is no file, but a named pipe, a socket or a device",
+            "Write what comes out of it into a file, and give that.",
+        )
+
+
 def read_npz(path: Path) -> Arrays:
     """Return the arrays of an ``.npz`` file by name.
 
@@ -51,6 +67,7 @@ def read_npz(path: Path) -> Arrays:
         If the file is missing, is no ``.npz``, is damaged, holds Python objects (which could run code), or claims
         more than its size can hold.
     """
+    require_no_pipe(path)
     try:
         check_file(path)
         with zipfile.ZipFile(path) as archive:

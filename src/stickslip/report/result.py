@@ -6,6 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from stickslip.errors import input_error
+from stickslip.model.npz import require_no_pipe
 from stickslip.study.keep.netcdf import read_tree
 
 RESULT = "result.nc"
@@ -20,6 +21,7 @@ def open_result(path: Path) -> xr.DataTree:
         The file that ``stickslip run`` wrote, finished or not, or the folder that holds it.
     """
     file = path / RESULT if path.is_dir() else path
+    require_no_pipe(file)
     if not file.is_file():
         remedy = f"Give the {RESULT} that 'stickslip run' wrote, or its folder."
         raise input_error(str(file), "no such file", remedy)

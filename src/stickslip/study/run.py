@@ -9,6 +9,7 @@ from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from math import inf
+from os.path import realpath
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -223,7 +224,7 @@ def _refuse_result_of_another(study: Study) -> None:
     other = str(attributes_there(target).get("study_file", name))
     if other == name:
         return
-    of_home, before = target.resolve().is_relative_to(home), home / other
+    of_home, before = Path(realpath(target)).is_relative_to(home), home / other
     if of_home and (not before.exists() or before.samefile(study.path)):
         return
     own = f"{study.folder.name}_{study.path.stem}"

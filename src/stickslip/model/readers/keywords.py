@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from os.path import realpath
 from pathlib import Path
 
 import numpy as np
@@ -263,9 +264,9 @@ def _parse_keyword(line: str, path: Path, number: int) -> Block:
 
 def _included(block: Block, path: Path, stack: list[Path], count: list[int]) -> Path:
     """Return the file an ``*INCLUDE`` names, if it may be read."""
-    root = (stack or [path])[0].resolve().parent
+    root = Path(realpath((stack or [path])[0])).parent
     name = block.parameter("INPUT")
-    target = (root / name).resolve()
+    target = Path(realpath(root / name))
     if not target.is_relative_to(root):
         raise _refused(block, name, f"lies outside the deck's folder {root.name!r}")
     count[0] += 1

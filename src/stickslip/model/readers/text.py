@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import did_you_mean, input_error
+from stickslip.model.npz import require_no_pipe
 
 TEXT_RATIO = 200  # text of numbers packs to a fifth; a file that grows more is no such text
 PIECE = 2**24  # characters that are parsed at a time
@@ -24,6 +25,7 @@ def read_text(path: Path) -> str:
     InputError
         If the file is missing, cannot be read, is a damaged gzip file or unpacks to far more than text does.
     """
+    require_no_pipe(path)
     try:
         if path.suffix != ".gz":
             return _decoded(path, path.read_bytes())

@@ -1,5 +1,6 @@
 """The tables [load.NAME], [rotation] and [output]: what drives the model, and where its motion is reported."""
 
+from os.path import realpath
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -216,8 +217,10 @@ class Output(Section):
             or relative == Path()
         ):
             raise custom_error(f"must be a folder inside the study's folder, got {name!r}", remedy)
-        home = (info.context or {}).get("study", Path("study.toml")).resolve().parent
-        target = (home / relative).resolve()
+        home = Path(realpath((info.context or {}).get("study", "study.toml"))).parent
+        target = Path(
+            realpath(home / relative)
+        )  # of a link to itself the link, which the run refuses
         if target == home or not target.is_relative_to(home):
             raise custom_error(
                 f"leads out of the study's folder, got {name!r}, which is a link to {target}",

@@ -10,12 +10,14 @@ from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
 from stickslip.study.keep.journal import AT_WORK, BESIDE, SEALED
-from stickslip.study.keep.whole import beside, unwritable
+from stickslip.study.keep.whole import REMEDIES, beside, unwritable, unwritable_database
 
 NEEDED_BYTES = 200_000_000  # results, jobs and parts of a usual run
 RESULT, REPORT, LOG_FILE, LOCK = "result.nc", "report.html", "run.log", "run.lock"
 JOBS, PARTS = "jobs", "parts"
 TRIAL = ".stickslip-trial"
+LONGEST_PATH = 512  # bytes of the path of an SQLite file
+LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # of such a file in a folder
 WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until they are whole
 OWN = (
     *WHOLE,
@@ -39,6 +41,7 @@ def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
     try:
         for inner in (folder, folder / JOBS, folder / PARTS):
             inner.mkdir(parents=True, exist_ok=True)
+        _refuse_long_path(folder)
         _refuse_strangers(folder)
         _try_out(folder)
     except OSError as error:
@@ -46,9 +49,8 @@ def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
     try:
         lock = _locked(folder / LOCK, folder, shared=shared)
     except sqlite3.DatabaseError as error:
-        raise input_error(
-            str(folder / LOCK), f"is no lock of a run ({error})", "Delete it."
-        ) from None
+        no_lock = input_error(str(folder / LOCK), f"is no lock of a run ({error})", "Delete it.")
+        raise unwritable_database(folder / LOCK, error) or no_lock from None
     with closing(lock):
         if not shared:
             for path in (path for pattern in LEFT for path in _found(folder, pattern)):
@@ -111,6 +113,17 @@ def _refuse_strangers(folder: Path) -> None:
             raise _stranger(path, "is no file, but a run writes a file of that name")
 
 
+def _refuse_long_path(folder: Path) -> None:
+    """Refuse a folder in which SQLite could not open the files of jobs, before anything is computed."""
+    length = len(os.fsencode(folder.absolute()))
+    if length + LONGEST_NAME > LONGEST_PATH:
+        raise input_error(
+            f"output folder {folder}",
+            f"has a path of {length} bytes, and SQLite opens files of jobs in folders of up to {LONGEST_PATH - LONGEST_NAME}",
+            "Put the study into a folder with a shorter path.",
+        )
+
+
 def _stranger(path: Path, problem: str) -> InputError:
     return input_error(str(path), problem, "Remove it, or name another folder under [output].")
 
@@ -168,14 +181,13 @@ def _found(folder: Path, pattern: str) -> Iterator[Path]:
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:
-    inner = (folder / JOBS, folder / PARTS)
-    file = next(
-        (p for p in (*inner, folder, *folder.parents) if p.exists() and not p.is_dir()), None
-    )
-    if file is not None:
-        return _stranger(file, "is a file, and a run makes a folder of that name")
-    return input_error(
-        f"output folder {folder}",
-        f"cannot be written ({error.strerror})",
-        "Change its permissions, or name another folder under [output].",
-    )
+    # of os.path, which says no where a name is too long to be looked up
+    ways = (folder / JOBS, folder / PARTS, folder, *folder.parents)
+    for path in ways:
+        if os.path.exists(path) and not os.path.isdir(path):  # noqa: PTH110, PTH112
+            return _stranger(path, "is a file, and a run makes a folder of that name")
+        if os.path.islink(path) and not os.path.exists(path):  # noqa: PTH110, PTH114
+            return _stranger(path, "is a link that leads nowhere, or to itself")
+    denied = "Change its permissions, or name another folder under [output]."
+    remedy = REMEDIES.get(error.errno or 0, denied)
+    return input_error(f"output folder {folder}", f"cannot be written ({error.strerror})", remedy)

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from stickslip.errors import InputError, input_error
 from stickslip.study.keep.archive import FORMAT, decode, decode_record, encode, encode_record
-from stickslip.study.keep.whole import unwritable
+from stickslip.study.keep.whole import unwritable, unwritable_database
 
 AT_WORK, SEALED = ".part", ".job"
 BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
@@ -24,10 +24,7 @@ DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which reco
 MANY_EMPTY = 256  # pages of notes that were given up, 4 kB each, from which a file is packed
 PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
 ANEW = "Run anew with --fresh, which removes what runs wrote into the folder and no other file."
-FRESH = (
-    "If its disk is full, make room. Otherwise delete it, or start over with --fresh, which removes what runs wrote into the "
-    "folder and no other file."
-)
+FRESH = "Delete it, or start over with --fresh, which removes what runs wrote into the folder and no other file."
 TABLES = """
 create table if not exists meta (key text primary key, value text not null);
 create table if not exists record (
@@ -267,6 +264,9 @@ def _named(path: Path) -> Iterator[None]:
             raise input_error(
                 str(path.parent.parent), "another run is at work in it", "Wait for it, or stop it."
             ) from None
+        refused = unwritable_database(path, error) if isinstance(error, sqlite3.Error) else None
+        if refused is not None:
+            raise refused from error
         raise input_error(
             str(path), f"the file of a job cannot be used ({error})", FRESH
         ) from error

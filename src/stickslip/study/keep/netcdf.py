@@ -66,7 +66,7 @@ def attributes_there(path: Path) -> dict[str, Any]:
         check_file(path)
     except Cut:
         pass  # what stands before is whole, or HDF5 sees its end missing
-    except (FileNotFoundError, ValueError):
+    except (OSError, ValueError):
         return {}
     try:
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as root:

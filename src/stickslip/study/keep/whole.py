@@ -3,6 +3,7 @@
 import errno
 import os
 import signal
+import sqlite3
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -12,10 +13,17 @@ from uuid import uuid4
 from stickslip.errors import InputError, input_error
 
 _ROOM = "Make room and run the same command again: no finished point is lost."
-_REMEDIES = {
+_QUOTA = f"Your quota is used up, whatever room the disk has. {_ROOM}"
+_WRITTEN = (
+    "The disk is full, a quota or a limit of the size of files is met, or the disk is broken. Make room and run the same command "
+    "again: no finished point is lost."
+)
+_PLACE = "Give a place that you may write to."
+REMEDIES = {
     errno.ENOSPC: _ROOM,
-    errno.EDQUOT: _ROOM,
+    errno.EDQUOT: _QUOTA,
     errno.EFBIG: "Raise the limit of the size of files, or choose another disk.",
+    errno.EROFS: "Its disk may only be read: choose another one.",
     errno.EIO: "Look after the disk: it may be broken.",
     errno.ENOENT: "Make its folder first, or give another place.",
     errno.EISDIR: "A folder has that name: remove it, or give another name.",
@@ -27,8 +35,18 @@ _REMEDIES = {
 
 def unwritable(path: Path, error: OSError) -> InputError:
     """Return the refusal of a file that the system does not let us write."""
-    remedy = _REMEDIES.get(error.errno or 0, "Give a place that you may write to.")
+    remedy = REMEDIES.get(error.errno or 0, _PLACE)
     return input_error(str(path), f"cannot be written ({error.strerror or error})", remedy)
+
+
+def unwritable_database(path: Path, error: sqlite3.Error) -> InputError | None:
+    """Return the refusal of a file that SQLite cannot write, as it has no errno; None where its content is at fault."""
+    name = getattr(error, "sqlite_errorname", None) or ""
+    if name.startswith(("SQLITE_FULL", "SQLITE_IOERR")) and "READ" not in name:
+        return input_error(str(path), f"cannot be written ({error})", _WRITTEN)
+    if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM", "SQLITE_AUTH")):
+        return input_error(str(path), f"cannot be written ({error})", _PLACE)
+    return None
 
 
 def beside(name: str, mark: str = "*") -> str:

@@ -105,7 +105,13 @@ def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
             yield input_error(f"part.{name}", "is no name of a part", "Give one without dots.")
         if isinstance(table, FileModel):
             for key, file in table.files().items():
-                if not (home / file).is_file():
+                if (home / file).exists() and not (home / file).is_file():
+                    yield input_error(
+                        f"part.{name}.{key}",
+                        f"{home / file} is no file",
+                        "Give a file: what comes out of a pipe has to be written into one.",
+                    )
+                elif not (home / file).is_file():
                     yield input_error(
                         f"part.{name}.{key}",
                         f"there is no file {home / file}",

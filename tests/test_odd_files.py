@@ -1,0 +1,157 @@
+"""Files that are none, and names, letters and numbers that nobody expects: a line that says what to do, and no hang."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+
+import pytest
+from small_v2 import write_four_masses
+
+from stickslip.errors import InputError
+from stickslip.front.result import Result
+from stickslip.model import load_structure
+from stickslip.model.readers.open_model import read_model
+from stickslip.model.readers.units import Units
+from stickslip.study.keep.folder import locked_folder
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+
+SUFFIXES = (".inp", ".inp.gz", ".cdb", ".npz", ".mtx", ".mtx.gz", ".sti", ".h5", ".frd", ".full", ".rst", ".op2")  # fmt: skip
+
+
+@pytest.fixture
+def in_time() -> Iterator[None]:
+    """End what hangs: twenty seconds are a thousand times what a refusal takes."""
+
+    def late(_number: int, _frame: FrameType | None) -> None:
+        raise AssertionError("it waits for what never comes")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, 20.0)
+    yield
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("in_time")
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_named_pipe_as_a_deck_is_refused(tmp_path: Path, suffix: str) -> None:
+    pipe = tmp_path / f"a{suffix}"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match=r"is no file, but a named pipe.*Write what comes out"):
+        read_model(pipe, units=Units.mm_t_s())
+    study = tmp_path / "study.toml"
+    study.write_text(f'schema_version = 2\n[part.a]\nfile = "{pipe.name}"\nunits = "SI"\n[modes]\n')
+    with pytest.raises(InputError, match=r"a\S* is no file\. Give a file"):
+        read_study(study)
+
+
+@pytest.mark.usefixtures("in_time")
+@pytest.mark.parametrize(
+    ("name", "read", "words"),
+    [
+        ("study.toml", read_study, "is not a file"),
+        ("kept.npz", load_structure, "is no file, but a named pipe"),
+        ("result.nc", Result.open, "is no file"),
+    ],
+)
+def test_a_named_pipe_as_a_study_a_structure_or_a_result_is_refused(
+    tmp_path: Path, name: str, read: Callable[[Path], object], words: str
+) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match=words):
+        read(tmp_path / name)
+
+
+@pytest.mark.usefixtures("in_time")
+def test_a_named_pipe_that_a_deck_includes_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "nodes.inc")
+    deck = tmp_path / "a.inp"
+    deck.write_text("*INCLUDE, INPUT=nodes.inc\n*NODE\n1, 0, 0, 0\n")
+    with pytest.raises(InputError, match=r"nodes\.inc: is no file, but a named pipe"):
+        read_model(deck, units=Units.mm_t_s())
+
+
+@pytest.mark.parametrize(
+    ("folder", "words"),
+    [
+        ("loop", "is a link that leads nowhere, or to itself. Remove it"),
+        ("y" * 300, "cannot be written (File name too long). Give a shorter name."),
+        (
+            "/".join(60 * ["z" * 100]),
+            "cannot be written (File name too long). Give a shorter name.",
+        ),
+        ("/".join(5 * ["z" * 100]), "Put the study into a folder with a shorter path."),
+    ],
+)
+def test_a_results_folder_that_cannot_be_is_refused_with_what_helps(
+    tmp_path: Path, folder: str, words: str
+) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(InputError) as caught, locked_folder(tmp_path / folder):
+        pass
+    assert words in str(caught.value)
+
+
+def test_results_that_are_a_link_to_itself_are_refused_by_a_run(tmp_path: Path) -> None:
+    study = write_four_masses(tmp_path)
+    (tmp_path / "results").symlink_to("results")
+    with pytest.raises(InputError, match=r"results: is a link that leads nowhere, or to itself"):
+        run_study(read_study(study))
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (errno.EDQUOT, "Your quota is used up, whatever room the disk has. Make room"),
+        (errno.ENOSPC, "Make room and run the same command again"),
+        (errno.EROFS, "choose another one"),
+    ],
+)
+def test_a_full_disk_or_quota_is_no_reason_to_delete_anything(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, words: str
+) -> None:
+    def full(*_words: object, **_named: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr("stickslip.study.keep.folder.os.fsync", full)
+    with pytest.raises(InputError) as caught, locked_folder(tmp_path):
+        pass
+    assert words in str(caught.value)
+    assert "elete" not in str(caught.value)
+
+
+@pytest.mark.parametrize("what", ["note", "lock"])
+def test_a_limit_that_sqlite_meets_is_no_reason_to_delete_its_file(
+    tmp_path: Path, what: str
+) -> None:
+    """SQLite knows a full disk; a quota or a limit of the size of files is a disk error to it."""
+    program = f"""
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+from stickslip.study.keep.folder import locked_folder
+from stickslip.study.keep.journal import JobJournal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+if {what!r} == "lock":
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1, 1))
+    with locked_folder(Path(sys.argv[1])):
+        with JobJournal(Path(sys.argv[1]) / "jobs" / "a.part") as journal:
+            pass
+with JobJournal(Path(sys.argv[1]) / "a.part") as journal:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+    for i in range(100):
+        journal.put(f"note {{i}}", {{"a": np.zeros(1000)}})
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    last = ended.stderr.splitlines()[-1]
+    assert "a limit of the size of files is met" in last, ended.stderr
+    assert "Make room" in last
+    assert "elete" not in last
