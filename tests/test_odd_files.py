@@ -2,22 +2,27 @@
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
 import pytest
+from fault_readers import samples
 from small_v2 import write_four_masses
+from test_readers_ansys import cube
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, StickslipError
 from stickslip.front.result import Result
 from stickslip.model import load_structure
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.study.keep.folder import locked_folder
+from stickslip.study.keep.netcdf import attributes_there
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
@@ -136,6 +141,7 @@ import resource, signal, sys
 from pathlib import Path
 import numpy as np
 from stickslip.study.keep.folder import locked_folder
+from stickslip.study.keep.netcdf import attributes_there
 from stickslip.study.keep.journal import JobJournal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 if {what!r} == "lock":
@@ -155,3 +161,48 @@ with JobJournal(Path(sys.argv[1]) / "a.part") as journal:
     assert "a limit of the size of files is met" in last, ended.stderr
     assert "Make room" in last
     assert "elete" not in last
+
+
+def test_numbers_of_twenty_digits_and_other_scripts_end_in_a_line(tmp_path: Path) -> None:
+    """At the first numbers of each file, and at some others: NumPy's integers end at 19 digits, and '²' is a digit to Python."""
+    tried = 0
+    for sample in samples(tmp_path / "whole"):
+        binary = sample.path.suffix in (".gz", ".npz", ".h5", ".full", ".rst", ".op2")
+        if binary or sample.path.stat().st_size > 50_000:
+            continue
+        text = sample.path.read_text(encoding="utf-8", errors="replace")
+        places = [m.span() for m in re.finditer(r"(?<![\w.])\d+(?![\w.])", text)]
+        for first, end in places[:4] + places[4 :: max(1, len(places) // 3)]:
+            for number in ("9" * 20, "²"):
+                tried += 1
+                sample.path.write_text(text[:first] + number + text[end:], encoding="utf-8")
+                with suppress(StickslipError):
+                    sample.read(sample.path)
+        sample.path.write_text(text, encoding="utf-8")
+    assert tried > 150
+
+
+@pytest.mark.parametrize("node", ["9" * 20, "²", "9" * 5000])
+def test_coupled_pairs_of_impossible_nodes_are_refused_by_line(tmp_path: Path, node: str) -> None:
+    path = tmp_path / "a.cdb"
+    path.write_text(f"{cube()}CP,1,ALL,10,{node}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"a\.cdb: line \d+: constrains the model \(CP\)"):
+        read_model(path, units=Units.mm_t_s())
+
+
+@pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}])  # fmt: skip
+def test_names_that_are_no_utf8_stand_in_log_and_result(
+    tmp_path: Path, locale: dict[str, str]
+) -> None:
+    """Bytes of a file system without UTF-8, and a terminal without: no traceback of the log, and a result that says its study."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    study = write_four_masses(folder, {"modes.number": "1"})
+    study = study.rename(folder / os.fsdecode(b"st\xff.toml"))
+    command = [sys.executable, "-m", "stickslip", "run", study, "--only", "modes", "--no-report"]
+    ended = subprocess.run(command, capture_output=True, check=False, env={**os.environ, **locale})
+    assert ended.returncode == 0, ended.stderr
+    assert b"Logging error" not in ended.stderr
+    assert b"Traceback" not in ended.stderr
+    log = (folder / "results" / "run.log").read_text(encoding="utf-8")
+    assert r"caf\udce9/st\udcff.toml" in log
+    assert attributes_there(folder / "results" / "result.nc")["study_file"] == r"st\udcff.toml"

@@ -27,7 +27,7 @@ from stickslip.study.keep.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_fol
 from stickslip.study.keep.journal import SEALED, JobJournal, read_sealed
 from stickslip.study.keep.netcdf import attributes_there, write_tree
 from stickslip.study.keep.progress import LOG, Interrupted, written_down
-from stickslip.study.keep.provenance import Provenance, library_versions
+from stickslip.study.keep.provenance import Provenance, as_text, library_versions
 from stickslip.study.keep.store import PartStore
 from stickslip.study.keep.whole import whole_file
 from stickslip.study.keep.workers import Hands, check_kind, executor
@@ -170,7 +170,9 @@ def answer(
 def _run(
     study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]
 ) -> Outcome:
-    origin = Provenance(study.title, study.text, library_versions(), study_file=study.path.name)
+    origin = Provenance(
+        study.title, study.text, library_versions(), study_file=as_text(study.path.name)
+    )
     book = Book(origin, measured=study.measured)
     store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
@@ -220,7 +222,11 @@ def _run(
 
 def _refuse_result_of_another(study: Study) -> None:
     """Refuse to replace the result of a study file of another name, unless that one was renamed or removed."""
-    target, home, name = study.folder / RESULT, study.path.resolve().parent, study.path.name
+    target, home, name = (
+        study.folder / RESULT,
+        study.path.resolve().parent,
+        as_text(study.path.name),
+    )
     other = str(attributes_there(target).get("study_file", name))
     if other == name:
         return

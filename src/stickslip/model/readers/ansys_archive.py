@@ -20,6 +20,7 @@ from stickslip.model.readers.ansys_blocks import (
     TYPE,
     WRITE,
     Blocks,
+    is_whole,
     read_blocks,
 )
 from stickslip.model.readers.units import Units, check_material
@@ -216,7 +217,7 @@ def _coupled(blocks: Blocks) -> IntArray:
         if command.upper() not in CONSTRAINTS:
             continue
         nodes = words[2:] if command.upper() == "CP" else []
-        if len(nodes) != 2 or not all(word.isdigit() for word in nodes):
+        if len(nodes) != 2 or not all(map(is_whole, nodes)):
             raise input_error(
                 place,
                 f"constrains the model ({command.upper()}), and only coupled pairs of nodes are read (CP)",
@@ -233,10 +234,10 @@ def _check_options(blocks: Blocks) -> None:
         if command.upper() not in OPTIONS:
             continue
         number, option, value = (word.rstrip(".") for word in [*words, "0", "0", "0"][:3])
-        kind = blocks.types.get(int(number), 0) if number.isdigit() else 0
+        kind = blocks.types.get(int(number), 0) if is_whole(number) else 0
         if kind not in NODES_OF_SOLID or int(number) not in used or value in ("", "0"):
             continue
-        key = (kind, int(option)) if option.isdigit() else (kind, 0)
+        key = (kind, int(option)) if is_whole(option) else (kind, 0)
         if value not in HARMLESS_OPTIONS.get(key, ()):
             what = WHAT_OPTIONS.get(key, "what is not read")
             raise input_error(

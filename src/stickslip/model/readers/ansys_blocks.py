@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.model.readers.keywords import LARGEST
 from stickslip.model.readers.text import read_text
 
 HEAD = (
@@ -130,9 +131,27 @@ def read_blocks(path: Path) -> Blocks:
     )
 
 
+def integer(word: str) -> int:
+    """Return a whole number of digits alone; ValueError where it is none, or larger than any program's."""
+    number = int(word)
+    if not word.isascii() or abs(number) > LARGEST:
+        raise ValueError(word)
+    return number
+
+
+def is_whole(word: str) -> bool:
+    """Whether `integer` reads a word as a number from zero on."""
+    return (
+        word.isascii()
+        and word.isdecimal()
+        and len(word) <= len(str(LARGEST))
+        and int(word) <= LARGEST
+    )
+
+
 def _whole(path: Path, line: int, word: str) -> int:
     try:
-        return int(word)
+        return integer(word)
     except ValueError as error:
         raise input_error(
             f"{path}: line {line + 1}", f"{word[:40]!r} is no whole number", CUT_SHORT
@@ -188,14 +207,14 @@ def _node_block(path: Path, lines: list[str], at: int) -> tuple[FloatArray, int]
     first, end = at + 2, _block_end(lines, at + 2)
     body = lines[first:end]
     split = whole * width
-    numbers = _fields(path, [line[:width] for line in body], first, width, int)
+    numbers = _fields(path, [line[:width] for line in body], first, width, integer)
     rest = _fields(path, [line[split:] for line in body], first, max(real, 1), float)
     if any(len(row) != 1 for row in numbers) or any(len(row) > 6 for row in rest) or not real:
         raise input_error(
             f"{path}: line {at + 1}", "the nodes do not follow their format", CUT_SHORT
         )
     expected = stated[4] if len(stated) > 4 else ""
-    if expected.isdigit() and int(expected) != len(body):
+    if is_whole(expected) and int(expected) != len(body):
         raise input_error(
             f"{path}: line {end + 1}",
             f"the block of nodes ends after {len(body)} of {expected}",
@@ -221,7 +240,7 @@ def _element_block(
         )
     _, width, _ = _format(path, lines, at + 1)
     row, end = at + 2, _block_end(lines, at + 2)
-    table = _fields(path, lines[row:end], row, width, int)
+    table = _fields(path, lines[row:end], row, width, integer)
     i = 0
     while i < len(table):
         line = [int(number) for number in table[i]]
@@ -254,7 +273,7 @@ def _component(path: Path, lines: list[str], at: int, sets: dict[str, IntArray])
     read: list[int] = []
     line = at + 2
     while len(read) < size and line < len(lines):
-        found = [int(n) for row in _fields(path, [lines[line]], line, width, int) for n in row]
+        found = [int(n) for row in _fields(path, [lines[line]], line, width, integer) for n in row]
         if not found:
             break
         read, line = read + found, line + 1

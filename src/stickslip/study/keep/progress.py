@@ -85,7 +85,8 @@ def written_down(path: Path) -> Iterator[None]:
         If the file cannot be written, at any time.
     """
     try:
-        handler = _LogFile(path, encoding="utf-8")
+        # names of files may hold bytes that are no UTF-8
+        handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise unwritable(path, error) from None
     formatter = logging.Formatter("%(asctime)s %(head)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")

@@ -58,6 +58,11 @@ class Provenance:
         }
 
 
+def as_text(name: str) -> str:
+    """Return the name of a file with letters for what is no UTF-8 in it, which neither results nor pages can hold."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
 def library_versions() -> dict[str, str]:
     """Return the versions of this package, Python and the libraries that make numbers."""
     found = {"stickslip": __version__, "python": platform.python_version()}
