@@ -21,11 +21,11 @@ from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
 
 MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
-MOST_ROWS = 4000  # and of its unknowns
+MOST_ROWS = 4500  # and of its unknowns
 SOLUTIONS = 10  # of a point, at most
 ROUGHLY = 3.0  # times the change by one Newton step that a multiplier may be off
 FIRST = 2.0  # times the change from the motion as it was solved
-OTHER = 2.0  # times more where the numbers of transitions differ
+OTHER = 2.0  # times more for either where the numbers of transitions differ
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,8 @@ def _compared(found: Stability, other: _Rung, times: float) -> Stability:
     worse = other.stability
     if worse.unknown:
         return replace(found, errors=np.full_like(found.errors, np.inf), moduli=None)
-    times *= 1.0 if worse.transitions == found.transitions else OTHER
+    if times > 1.0 and worse.transitions != found.transitions:
+        times *= OTHER
     distance, modulus = changes(found.floquet.multipliers, worse.floquet.multipliers)
     own = found.errors if found.moduli is None else found.moduli
     return replace(found, errors=found.errors + times * distance, moduli=own + times * modulus)

@@ -13,7 +13,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.course import Course, course_of
 from stickslip.response.stability.cycle import has_transitions
-from stickslip.response.stability.missing_harmonics import factorisation
+from stickslip.response.stability.missing_harmonics import newton_work
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import by_hill
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
@@ -279,4 +279,4 @@ def _allowed(question: Question, response: Response) -> float:
     rows = max(2 * sectors * side.n, *(p.unknowns for p in response.solved))
     if not by_hill(system) and rows <= ALWAYS_ROWS:
         return np.inf
-    return sum(p.iterations * factorisation(p.unknowns) for p in response.solved)
+    return sum(p.iterations * newton_work(p.unknowns) for p in response.solved)
