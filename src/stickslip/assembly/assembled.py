@@ -83,11 +83,11 @@ class Frequencies:
             )
         ]
 
-    def warnings(self) -> list[str]:
-        """Return a sentence for each set of modes that the reduction does not reproduce."""
+    def warnings(self, up_to_hz: float = np.inf) -> list[str]:
+        """Return a sentence for each set of modes that the reduction does not reproduce, of those up to a frequency in Hz."""
         found = []
         for what, full, reduced in self._pairs():
-            error = np.abs(_errors(full, reduced))[:CHECKED]
+            error = np.abs(_errors(full, reduced))[:CHECKED][full[:CHECKED] <= up_to_hz]
             if np.any(error > AGREEMENT):
                 found.append(
                     f"the reduced model misses a {what} natural frequency by {100 * error.max():.3g} % (mode "

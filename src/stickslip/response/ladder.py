@@ -90,10 +90,10 @@ def _until(over: Callable[[], bool], every: Iterable[Followed]) -> Iterator[Foll
 
 
 def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotopy]:
-    yield from homotopies(balance, omega, _at_rest(system, balance, omega)[0].real)
+    yield from homotopies(balance, omega, at_rest(system, balance, omega)[0].real)
 
 
-def _at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
+def at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
     """Return the (1, n_retained) static equilibrium, m; zero at coordinates that are retained beside those of the system."""
     rest = np.zeros((1, balance.linear.n), dtype=complex)
     own = np.searchsorted(balance.linear.retained, system.retained)
@@ -111,7 +111,7 @@ def _starts(
     """Yield scaled unknowns to start Newton from."""
     yield from near
     guess = balance.coefficients(bonded_start(balance, omega, system))
-    guess[:1] = _at_rest(system, balance, omega)
+    guess[:1] = at_rest(system, balance, omega)
     yield balance.unknowns(guess)
     few = balance.with_harmonics(lowest_harmonics(balance))
     if few.order < balance.order:

@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from stickslip.harmonic.local import AnyBalance
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
@@ -19,6 +20,7 @@ from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
+WALK = 6  # points beyond the bracket, each twice as far, until the peak lies within
 PEAK_CHANGE = 0.005  # relative change of a peak by more harmonics that ends its audit
 ALMOST = 0.95  # share of the peak above which points get its harmonics
 SAME = 1e-5  # relative distance of frequencies at which another point would tell nothing
@@ -111,12 +113,22 @@ def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
         step_to(balance, middle, (1.0 + side) * point.omega, following)
         for side in (-NEARBY, NEARBY)
     ]
-    points = [
-        forced_point(balance, p.solution, "peak", 0, p.p, 0.0) for p in (sides[0], middle, sides[1])
-    ]
-    points = points[:: int(problem.sweep.forward)]
+    walked = [sides[0], middle, sides[1]]
+    for _ in range(WALK):
+        heights = [problem.amplitude(_at_peak(balance, p)) for p in walked if p.solution.status.converged]  # fmt: skip
+        top = int(np.argmax(heights))
+        if len(heights) < len(walked) or 0 < top < len(walked) - 1:
+            break
+        way = 1 if top else -1
+        wider = walked[top].p * (1.0 + way * NEARBY * 2.0 ** (len(walked) - 3))
+        walked.insert(top + (top > 0), step_to(balance, walked[top], wider, following))
+    points = [_at_peak(balance, p) for p in walked][:: int(problem.sweep.forward)]
     found = [p for p in [*points, *resolve_peak(problem, points)] if p.converged]
     return max(found, key=problem.amplitude)
+
+
+def _at_peak(balance: AnyBalance, point: Point) -> ForcedPoint:
+    return forced_point(balance, point.solution, "peak", 0, point.p, 0.0)
 
 
 Taken = Generator[ForcedPoint, None, ForcedPoint]

@@ -50,6 +50,11 @@ class DampedMode:
     ratio: float
     ends: float
 
+    def apart(self, omega: float) -> float:
+        """Return how far a frequency in rad/s lies from those between sticking and sliding."""
+        low, high = sorted((self.stuck, self.ends))
+        return max(low - omega, omega - high, 0.0)
+
     def __str__(self) -> str:
         stuck, best, ends = (omega / HZ for omega in (self.stuck, self.best, self.ends))
         damping = f"up to {100 * self.ratio:.2g} % of critical at {best:.2f} Hz"

@@ -26,6 +26,7 @@ from stickslip.study.analyses.forced.bifurcating import (
 from stickslip.study.analyses.forced.blades import of_blades
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
+from stickslip.study.analyses.forced.elsewhere import motions_elsewhere
 from stickslip.study.analyses.forced.estimate import estimate
 from stickslip.study.analyses.forced.examining import (
     examined_points,
@@ -33,7 +34,9 @@ from stickslip.study.analyses.forced.examining import (
     with_stable_peak,
 )
 from stickslip.study.analyses.forced.in_time import check_in_time, chosen
+from stickslip.study.analyses.forced.kinematics import motion_at_peak
 from stickslip.study.analyses.forced.known import (
+    doubts_of_model,
     inside,
     known,
     mixed_places,
@@ -41,6 +44,7 @@ from stickslip.study.analyses.forced.known import (
     nothing_pressed,
     off_engine_order,
 )
+from stickslip.study.analyses.forced.model_change import model_changes
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.not_periodic import (
     in_time_instead,
@@ -56,6 +60,7 @@ from stickslip.study.analyses.forced.question import (
     STABLE,
     Question,
     question_of,
+    with_comparisons,
 )
 from stickslip.study.analyses.forced.retention import peak_shift
 from stickslip.study.analyses.forced.section import ForcedResponse
@@ -117,7 +122,7 @@ class ForcedResponseAnalysis:
         """Return the assembled model and the sweep; refuse what cannot be computed."""
         for line in _of_pressures(case, model):
             LOG.info(line)
-        return question_of(case, model)
+        return with_comparisons(question_of(case, model), case, model)
 
     def solve(
         self, inputs: Question, done: Sequence[ForcedPoint], notes: Notes
@@ -149,7 +154,7 @@ class ForcedResponseAnalysis:
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
         if notes.get(PHYSICS) is None:
-            notes.put(PHYSICS, of_physics(inputs, response))
+            notes.put(PHYSICS, _of_physics(inputs, response))
         if failure is not None:
             raise failure
 
@@ -164,7 +169,7 @@ class ForcedResponseAnalysis:
         question = question_of(case, model)
         chooser, passages = question.chooser, case.settings.harmonics.passages
         labels = question.model.error_labels
-        of_model = [text for text in question.model.warnings if text not in model.warnings]
+        doubted = [text for text in doubts_of_model(question) if text not in model.warnings]
         physics = physics_of(question)
         known = [] if physics is None else list(beforehand(physics))
         notes = [v for v in known if not v.rank]
@@ -184,10 +189,7 @@ class ForcedResponseAnalysis:
             *bifurcations_line(question),
             *inside(question),
             *(f"note: {v.why}. {v.remedy}" for v in (*off_engine_order(question), *notes)),
-            *(
-                f"WARNING: {text}"
-                for text in (*of_model, *(f"{v.why}. {v.remedy}" for v in doubts))
-            ),
+            *(f"WARNING: {text}" for text in (*doubted, *(f"{v.why}. {v.remedy}" for v in doubts))),
         )
 
     def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
@@ -220,6 +222,16 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
     for point in forced_response(model.system, model.load, question.sweep, done=done):
         yield point
         advance(*progress(point, question.sweep))
+
+
+def _of_physics(question: Question, response: Response) -> Values:
+    """Return what the job knows of the physics of its case, and how far the model decides its peak."""
+    return (
+        of_physics(question, response)
+        | motion_at_peak(question, response)
+        | model_changes(question, response)
+        | motions_elsewhere(question, response)
+    )
 
 
 def _put_down(

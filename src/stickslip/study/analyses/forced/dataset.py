@@ -26,6 +26,7 @@ ROWS = {
     "alert_point": ("alert_case", "alert_frequency_hz"),
     "check": ("verify_case", "verify_frequency_hz"),
     "examined": ("stability_case", "stability_frequency_hz"),
+    "another": ("another_case", "another_frequency_hz"),
     "not_periodic": ("not_periodic_case", "not_periodic_frequency_hz"),
     "tuned_point": ("tuned_case", "tuned_frequency_hz"),
     "bifurcation": ("bifurcation_case", "bifurcation_frequency_hz"),
@@ -35,6 +36,7 @@ ROWS = {
 SOME = (
     "check",
     "examined",
+    "another",
     "not_periodic",
     "tuned_point",
     "bifurcation",

@@ -34,7 +34,7 @@ def known(
         What `peak_shift` found.
     """
     return (
-        *(doubt(text) for text in question.model.warnings),
+        *(doubt(text) for text in doubts_of_model(question)),
         *(
             mixed_places(question.model.error_labels)
             if question.sweep.relative_to == "each"
@@ -45,6 +45,14 @@ def known(
         *_of_drift(question, response),
         *_of_retention(question, response, shift),
     )
+
+
+def doubts_of_model(question: Question) -> list[str]:
+    """Return what the assembled model warns of; of modes that the reduction misses those that the load can reach."""
+    known = question.model.frequencies
+    reach = question.driven[-1] * max(question.sweep.omega_range) / HZ
+    others = set(known.warnings())
+    return [t for t in question.model.warnings if t not in others] + known.warnings(reach)
 
 
 def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:

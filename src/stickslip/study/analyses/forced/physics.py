@@ -22,6 +22,7 @@ from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.values import Values
 from stickslip.study.analyses.verdict import Verdict, to_json
+from stickslip.units import HZ
 
 PHYSICS = "physics"  # the note of a job
 BESIDE = 0.01  # of a frequency: a resonance stands so near to the mode that it belongs to
@@ -102,7 +103,7 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
         yield Verdict("doubtful", why=why, remedy=GIVE_DAMPING)
     yield from _of_bounds(physics)
     yield from _of_bodies(physics)
-    yield from _of_dampers(physics, "")
+    yield from _of_dampers(physics)
 
 
 def afterwards(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
@@ -118,7 +119,7 @@ def afterwards(question: Question, physics: Physics, response: Response) -> Iter
     yield from _of_energy(question, physics, response)
     yield from _of_bounds(physics)
     yield from _of_bodies(physics)
-    yield from _of_dampers(physics, _loads_move(question, response))
+    yield from _of_dampers(physics, _loads_move(question, response), response.peak_hz)
 
 
 def of_physics(question: Question, response: Response) -> Values:
@@ -183,8 +184,8 @@ def _of_bodies(physics: Physics) -> Iterator[Verdict]:
         yield Verdict("doubtful", why=why, remedy=remedy)
 
 
-def _of_dampers(physics: Physics, moving: str) -> Iterator[Verdict]:
-    """Yield the note on what friction can do to the modes, or why there is no estimate."""
+def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> Iterator[Verdict]:
+    """Yield the note on what friction can do to the modes, of a peak to the mode that it belongs to, or why there is no estimate."""
     if not physics.damped:
         return
     if moving:
@@ -193,13 +194,12 @@ def _of_dampers(physics: Physics, moving: str) -> Iterator[Verdict]:
             "trusted", why=why, remedy="stickslip check has the estimate for steady ones."
         )
         return
-    told = "; ".join(str(d) for d in physics.damped[:NAMED_MODES])
-    why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for all contacts at one slip ratio and steady normal loads"
-    yield Verdict(
-        "trusted",
-        why=why,
-        remedy="More slip than that, or less, damps less: choose the normal load for it.",
-    )
+    shown = physics.damped[:NAMED_MODES]
+    if np.isfinite(peak_hz):
+        shown = (min(physics.damped, key=lambda d: d.apart(peak_hz * HZ)),)
+    told = "; ".join(str(d) for d in shown)
+    why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for steady normal loads and one slip ratio of all contacts"
+    yield Verdict("trusted", why=why, remedy="More slip damps less, and so does less slip.")
 
 
 def _loads_move(question: Question, response: Response) -> str:

@@ -9,10 +9,13 @@ import numpy as np
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import static_state
+from stickslip.assembly.extent import Extent, extent_of
 from stickslip.assembly.model import Model
+from stickslip.assembly.more_modes import more_modes
 from stickslip.assembly.whole import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.sparse_stiffness import Unreduced
@@ -20,6 +23,7 @@ from stickslip.harmonic.support import is_full, named
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
@@ -73,6 +77,10 @@ class Question:
         Most points that are marched so.
     rpm
         Speed of rotation, 1/min.
+    richer
+        The model and its load with half again as many modes; None where there are no more, or nobody asked.
+    extent
+        Size and stiffness of its bodies; None where nobody asked.
     """
 
     label: str
@@ -88,6 +96,8 @@ class Question:
     not_periodic_s: float = 0.0
     not_periodic_points: int = 2
     rpm: float = 0.0
+    richer: tuple[System, HarmonicLoad] | None = None
+    extent: Extent | None = None
 
     @property
     def over_speed(self) -> bool:
@@ -160,6 +170,15 @@ def peak_first(model: Assembled) -> Assembled:
     labels = tuple(model.output_labels[i] for i in order)
     system, bare = (replace(s, outputs=s.outputs[order]) for s in (model.system, model.bare))
     return replace(model, system=system, bare=bare, output_labels=labels, peak_output=0)
+
+
+def with_comparisons(question: Question, case: Case, model: Model) -> Question:
+    """Return the question with what its peak is compared with: the model with more modes, and the extent of its bodies."""
+    order = question.sweep.high_harmonics[-1]
+    more = more_modes(model, order, case.store)
+    more = None if more is None else peak_first(more)
+    richer = None if more is None else (more.system, more.load)
+    return replace(question, richer=richer, extent=extent_of(model, order))
 
 
 def question_of(case: Case, model: Model) -> Question:

@@ -278,9 +278,8 @@ def retention(case: Curve) -> Iterator[Finding]:
 
 def known_to_the_job(case: Curve) -> Iterator[Finding]:
     """Return what only the model knew."""
-    for name in ("known_verdicts", "physics_verdicts"):
-        for v in from_json(case.text(name) or "[]"):
-            yield Finding(v.level, v.why, v.remedy)
+    for v in from_json(case.text("known_verdicts") or "[]"):
+        yield Finding(v.level, v.why, v.remedy)
 
 
 RULES: tuple[Rule, ...] = (

@@ -11,6 +11,7 @@ from stickslip.harmonic.judging import REACH
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import Curve
 from stickslip.study.analyses.forced.finding import Finding, without_place
+from stickslip.study.analyses.forced.physics_rules import PHYSICS_RULES, told_of_model
 from stickslip.study.analyses.forced.rules import RULES
 from stickslip.study.analyses.forced.stable_rules import LEFT
 from stickslip.study.analyses.forced.stable_words import said_of
@@ -109,6 +110,7 @@ def _examined(case: Curve) -> str:
     ):
         said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
     said += ["attained in time integration"] * bool(case.attained[peak])
+    said += told_of_model(case)
     return ", ".join(said)
 
 
@@ -124,7 +126,7 @@ def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
     """
     curves = [Curve(data, i) for i in range(len(labels))]
     return tuple(
-        Judged(label, curve, tuple(tuple(rule(curve)) for rule in RULES))
+        Judged(label, curve, tuple(tuple(rule(curve)) for rule in (*RULES, *PHYSICS_RULES)))
         for label, curve in zip(labels, curves, strict=True)
     )
 

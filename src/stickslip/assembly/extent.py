@@ -1,0 +1,60 @@
+"""How large and how stiff the bodies of a model are: what its motions are held against."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.asked import asked
+from stickslip.assembly.model import Model
+from stickslip.model.facts import facts_of_part
+from stickslip.model.fe.solid import Material
+from stickslip.model.part import Part
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """Size and stiffness of a model's meshes.
+
+    Parameters
+    ----------
+    stiff_volume
+        Young's modulus times volume of all elastic parts, J: at least what their mean strain is told by; NaN where one has no mesh.
+    labels, from_clamp
+        Outputs, and the distance of each from the nearest clamped node of its part, m; NaN where there is none.
+    """
+
+    stiff_volume: float
+    labels: tuple[str, ...]
+    from_clamp: FloatArray
+
+
+def extent_of(model: Model, harmonics: int) -> Extent:
+    """Return how large and stiff a model is; `harmonics` as in `Model.assembled`."""
+    volumes = [_stiff_volume(part) for part in model.parts.values() if part.body is None]
+    labels, table = asked(model, harmonics).labels, model.places.dofs
+    away = [_from_clamp(model.parts[table.part[d]], table.position[d]) for d in labels.dofs]
+    return Extent(float(sum(volumes)), labels.names, np.array(away, dtype=float))
+
+
+def _stiff_volume(part: Part) -> float:
+    """Return the largest Young's modulus times the volume that the least density gives, J."""
+    solid = part.solid if part.template is None else part.template.solid
+    if solid is None:
+        return float("nan")
+    own = solid.material
+    every = [own] if isinstance(own, Material) else list(own)
+    volume = facts_of_part(part).mass / min(m.density for m in every)
+    return float(volume * max(m.young_modulus for m in every))
+
+
+def _from_clamp(part: Part, position: FloatArray) -> float:
+    if part.mesh is None or not np.all(np.isfinite(position)):
+        return float("nan")
+    clamped = np.ones(len(part.mesh.points), dtype=bool)
+    table = part.structure.dofs
+    free = np.unique(table.node[table.node >= 0])
+    clamped[np.isin(part.mesh.numbers, free)] = False
+    if not clamped.any() or clamped.all():
+        return float("nan")
+    return float(np.linalg.norm(part.mesh.points[clamped] - position, axis=1).min())

@@ -1,0 +1,72 @@
+"""The same contacts with half as many points: each stands for itself and its nearest neighbour."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.response.system import System
+
+FEWEST_HALVED = 8  # points of a contact below which half of them would hold it otherwise
+
+
+def halved(
+    system: System, groups: Sequence[str], position: FloatArray, area: FloatArray
+) -> tuple[System, int] | None:
+    """Return a system with half the points of its meshed contacts, and how many points are left out; None where none is meshed finely enough.
+
+    Parameters
+    ----------
+    system
+        With contacts on meshes.
+    groups
+        (p,) which contact each point belongs to.
+    position
+        (p, 3) in m.
+    area
+        (p,) in m²; NaN where a point stands for no facets.
+
+    Notes
+    -----
+    A point that stays takes the weight of the neighbour that goes, by their stuck stiffness, so that a contact is as stiff as before.
+    """
+    own = system.interface
+    stiffness = own.stuck_stiffness().reshape(-1, 3).sum(axis=1)
+    takes: IntArray = np.arange(own.n_contacts)
+    for group in dict.fromkeys(groups):
+        points = np.flatnonzero(np.array(groups) == group)
+        meshed = np.all(np.isfinite(area[points])) and np.all(np.isfinite(position[points]))
+        if points.size >= FEWEST_HALVED and meshed and np.all(stiffness[points] > 0.0):
+            takes[points] = points[_pairs(position[points])]
+    stays = np.flatnonzero(takes == np.arange(takes.size))
+    if stays.size == takes.size:
+        return None
+    share = np.zeros(own.n_contacts)
+    np.add.at(share, takes, stiffness / stiffness[takes])
+    rows = (3 * stays[:, None] + np.arange(3)).reshape(-1)
+    few = Interface(
+        tuple(own.names[i] for i in stays),
+        tuple(own.laws[i] for i in stays),
+        own.gap_operator[rows],
+        (own.factors * share)[stays],
+    )
+    return replace(system, interface=few), int(takes.size - stays.size)
+
+
+def _pairs(position: FloatArray) -> IntArray:
+    """Return for each point that which stands for it: itself, or the nearest of the points before it that stands for itself alone."""
+    takes = np.arange(len(position))
+    open_to = np.ones(len(position), dtype=bool)
+    for i in range(len(position)):
+        if not open_to[i]:
+            continue
+        others = np.flatnonzero(open_to)
+        others = others[others > i]
+        if not others.size:
+            break
+        near = others[np.argmin(np.linalg.norm(position[others] - position[i], axis=1))]
+        takes[near] = i
+        open_to[[i, near]] = False
+    return takes
