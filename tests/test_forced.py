@@ -280,7 +280,7 @@ HASTY = replace(BETWEEN, newton=Newton(max_iterations=2), points=40)
 def no_rescue(monkeypatch):
     """Nothing but Newton and shorter steps: points fail that are found otherwise."""
 
-    def newton_only(evaluate, starts, options, *_):
+    def newton_only(evaluate, starts, options, *_, **__):
         for start in starts:
             solution = newton(evaluate, start, options)
             if solution.status.converged:

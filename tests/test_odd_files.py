@@ -196,9 +196,12 @@ def test_coupled_pairs_of_impossible_nodes_are_refused_by_line(tmp_path: Path, n
 
 
 def test_names_that_are_no_utf8_stand_in_log_and_result(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Bytes of a file system without UTF-8: no traceback of the log, and a result that says its study."""
+    monkeypatch.setattr(
+        LOG, "propagate", False
+    )  # pytest-xdist cannot send such letters of a captured log
     name = os.fsdecode(b"st\xff.toml")
     with written_down(tmp_path / "run.log"):
         LOG.info(f"study {name}")

@@ -57,7 +57,7 @@ def test_rigid_friction_is_the_limit_of_stiff_springs(chain, tmp_path):
     (tmp_path / "rigid").mkdir()
     rigid, data = motion(tmp_path / "rigid", changes=chain)
     # no error is predicted where a contact is rigid, and the peak stands at the end of the sweep
-    unexamined, end = stored(data.attrs)
+    unexamined, end, *_ = stored(data.attrs)
     assert (unexamined.level, end.level) == ("doubtful", "doubtful")
     assert "A contact is rigid, of which no error is predicted" in unexamined.remedy
     assert "at the end of the sweep" in end.why

@@ -326,7 +326,7 @@ WRONG = [
     ({"harmonics.samples": "32", "harmonics.high": "5"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
     ({"harmonics.low": "9"}, "harmonics.samples: must be at least 8 times low = 9, got 64. Give at least 72, better 128."),
     ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times the harmonic 5 that high = 'auto' begins with, got 32. Give at least 40, better 64."),
-    ({"forced_response.stability": '"yes"'}, "forced_response.stability: is not known, got 'yes'. Known: all, off, peak. It means: whether a disturbance dies, by Floquet multipliers. peak: at the peak"),
+    ({"forced_response.stability": '"yes"'}, "forced_response.stability: is not known, got 'yes'. Known: all, auto, off, peak. It means: whether a disturbance dies"),
     ({"harmonics.alert_over": '"contact"'}, "harmonics.alert_over: must be answer, along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?"),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"}, "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two"),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6]"}, "part.damper.inertia_kg_m2: has the wrong number of entries"),

@@ -1,5 +1,5 @@
 """Direct time integration that shares no law and no step with the library: the judge of its laws, its steps and its balance.
 
-`propagator`, `settling` and parts of `transient` are copies of `stickslip.response.time` and judge nothing of it; `time_step`, `hysteresis` and
+`propagator`, `settling` and parts of `transient` are copies of the time integration of the library and judge nothing of it; `time_step`, `hysteresis` and
 `verlet` were written anew (``docs/judges.md``).
 """

@@ -100,7 +100,7 @@ def at_modal_amplitudes(
     for a in wanted:
         p, shift = np.log(a) + share, 0.0
         for _ in range(30):
-            solution = curve.fresh(0, p + shift, near, most=True)
+            solution = curve.fresh(0, p + shift, near, effort=1.0)
             at = Followed("point", 0, 0, Point(solution.x, p + shift, np.zeros(0), 0.0, solution, 0.0), Judged(), 0.0)  # fmt: skip
             made = mode_point(curve, at)
             off = float(np.log(made.modal_amplitude / a))

@@ -118,9 +118,11 @@ def _with_waves(problem: ForcedProblem, own: HarmonicBalance) -> HarmonicBalance
     if most is None or most >= top:
         return own
     try:
-        return replace(own, linear=problem.system.condensed(own.linear.load, top))
+        wide = problem.system.condensed(own.linear.load, top)
+        known = wide.most  # along an engine-order line the waves are condensed when first asked for
     except InputError:
         return own
+    return replace(own, linear=wide) if known is None or known > most else own
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:

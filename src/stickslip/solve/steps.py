@@ -42,7 +42,7 @@ LOOKS_AHEAD = (
 )  # smallest steps at which the far side of a corner is looked for
 NEAR = 2.0  # lengths of a step by which its end may be away: farther, it lies on another piece of the branch
 LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
-ROUND = 60  # Newton steps for the far side of a corner, after which none is looked for
+ROUND = 300  # Newton steps for the far side of a corner, after which none is looked for
 LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 
 

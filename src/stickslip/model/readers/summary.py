@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.errors import StickslipError
+from stickslip.errors import InputError, StickslipError
 from stickslip.model.dense_modes import mass_rank
 from stickslip.model.fe.factorisation import DENSE, Say, silent
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -153,7 +153,10 @@ def _rank_of_mass(structure: Structure) -> tuple[int, list[str]]:
     said = [f"{structure.n - heavy} dofs have no mass."] if heavy < structure.n else []
     if not 0 < structure.n <= DENSE:
         return heavy, said
-    rank = mass_rank(structure.mass)
+    try:
+        rank = mass_rank(structure.mass)
+    except InputError:  # a negative mass: what looks for the modes says so
+        return heavy, said
     if rank < heavy:
         said.append(
             f"The mass has rank {rank} of {structure.n}: the other motions have none, as of few bricks with reduced integration."
