@@ -432,7 +432,9 @@ def test_body_that_may_drift_is_told_and_retention_is_judged() -> None:
     assert 0.0 < abs(float(data.retention_peak_shift[0])) < 1e-3
 
 
-def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def fails(*_: object, **__: object):
         raise SingularError("static equilibrium: coordinate x is held by nothing")
         yield
