@@ -351,6 +351,102 @@ def test_missing_cards_are_named(tmp_path):
         read_cards(tmp_path, "GRID,1,,0.,0.,0.\n")
 
 
+# --- nothing is passed over in silence; no package needed
+
+WHOLE = SMALL + HEAD.format(name="MAAX") + "DMIG,MAAX,1,1,,1,1,2.\n"
+
+
+@pytest.mark.parametrize(
+    ("card", "message"),
+    [
+        ("CQUAD4,1,1,1,2,3,4", r"line 8: CQUAD4 is not read, and may change the model\. Write the DMIG"),
+        ("SPC1    1       123456  1", "SPC1 is not read"),
+        ("PARAM,WTMASS,.00259", "PARAM WTMASS is not read"),
+        ("param,ck2,2.", "PARAM ck2 is not read"),
+        ("INCLUDE 'more.pch'", r"line 8: includes a file, which is not read\. Write the lines"),
+        ("include,more.pch", "includes a file"),
+        ("DMIG    KAAX           0       6       2       0", "DMIG KAAX has a second head"),
+        ("DMIG,MAAX,1,2,9,1,2,3.", "has a number where none belongs"),
+        ("DMIG,MAAX,1,2,,,2,3.", "has a number where none belongs"),
+        ("DMIG,MAAX,1,2,,1,2,3.,,+A\n+B,,,1.", r"line 9: continues the card that ends with 'B'"),
+        ("GRID\t1\t\t0.", "has a tab"),
+        ("=,*(1),=,*(1.)==\n=(5)", r"line 8: repeats cards \(=\), which is not read"),
+    ],
+)  # fmt: skip
+def test_cards_that_would_be_passed_over_are_refused_by_line(tmp_path, card, message):
+    with pytest.raises(InputError, match=message):
+        read_cards(tmp_path, f"{WHOLE}{card}\n")
+
+
+def test_what_surrounds_matrices_is_read_past(tmp_path):
+    """Executive and case control, tables and parameters of printing, and whatever follows ENDDATA."""
+    before = "SOL 103\nCEND\nINCLUDE 'case.inc'\nBEGIN BULK\nPARAM,POST,-1\nDTI,A,1,2.,ENDREC\nGRID,1,,0.,0.,0.\n"
+    structure = read_cards(tmp_path, f"{before}{WHOLE}ENDDATA\nCQUAD4,1\n")
+    np.testing.assert_array_equal(structure.stiffness.toarray(), [[2e3, -1e3], [-1e3, 1.5e3]])
+
+
+@pytest.mark.parametrize("asked", ["kaax", "maax"])
+def test_a_matrix_of_moduli_and_phases_is_refused_where_it_is_asked_for(tmp_path, asked):
+    head = "DMIG    KAAX           0       6       2       0       {}\n"
+    text = WHOLE.replace(HEAD.format(name="KAAX"), head.format(1), 1)
+    assert text != WHOLE
+    (tmp_path / "a.pch").write_text(text)
+    if asked == "maax":
+        found = read_nastran_dmig(tmp_path / "a.pch", mass="maax", stiffness="maax")
+        assert found.n == 1
+        return
+    with pytest.raises(InputError, match=r"KAAX: holds moduli and phases \(POLAR\)"):
+        read_nastran_dmig(tmp_path / "a.pch", mass="maax", stiffness="kaax")
+
+
+@pytest.mark.parametrize(
+    ("cards", "message"),
+    [
+        ("GRDSET,,7\nGRID,1,,1.,2.,3.", r"line 1: GRDSET is not read, and says in which systems"),
+        ("GRID,1,,0.,0.,0.\nSEQGP,1,5", "line 2: SEQGP is not read, and says in which order"),
+        ("CORD1R,7,1,2,3\nGRID,1,7,0.,0.,0.", "CORD1R is not read, and says where a coordinate"),
+        ("GRID,1,,0.,0.,0.\nINCLUDE 'more.bdf'", "line 2: includes a file"),
+        ("GRID,1,,0.,0.,0.\nGRID,1,,1.,0.,0.", "line 2: grid 1 is there twice"),
+        ("GRID,1,7,0.,0.,0.", r"line 1: coordinate system 7 is not in the file\. Add its CORD2"),
+        ("GRID,1,,x,0.,0.", "'x' is no number"),
+        ("BEGIN BULK\nGRID,1,,0.,0.,0.\nBEGIN SUPER=2\nGRID,2", "line 3: begins the bulk data of another"),
+    ],
+)  # fmt: skip
+def test_geometry_that_would_be_misread_is_refused_by_line(tmp_path, cards, message):
+    (tmp_path / "m.bdf").write_text(cards + "\n")
+    with pytest.raises(InputError, match=message):
+        read_nastran_dofs(tmp_path / "m.bdf")
+
+
+@pytest.mark.parametrize(
+    "cards", ["SPC1,1,123456,7", "RBE2,9,3,123456,7", "MPC,1,3,1,1.,7,1,-1.", "GRID,8,,1.,1.,1.,,123"]
+)  # fmt: skip
+def test_constraints_that_matrices_of_the_g_set_do_not_show_are_refused(library, tmp_path, cards):
+    matrix = np.eye(18 if cards.startswith("GRID") else 12)
+    library["op4"].write(str(tmp_path / "m.op4"), {"mgg": matrix, "kgg": matrix})
+    (tmp_path / "m.bdf").write_text(f"GRID,7,,1.,2.,3.\nGRID,3,,4.,5.,6.\n{cards}\n")
+    with pytest.raises(InputError, match=r"m\.bdf: line 3: \w+: holds degrees of freedom or ties"):
+        read_nastran_op4(
+            tmp_path / "m.op4",
+            mass="mgg",
+            stiffness="kgg",
+            geometry=tmp_path / "m.bdf",
+            dof_set="g",
+        )
+
+
+def test_places_go_through_with_all_their_digits(library, tmp_path):
+    place = np.random.default_rng(3).standard_normal(3)
+    cards = (
+        f"GRID*   {7:16d}{'':16s}{place[0]:16.9e}{place[1]:16.9e}\n*       {place[2]:16.9e}\n"
+        f"  GRID,8,,{place[0]!r},{place[1]!r},1.5-3\n"
+    )
+    (tmp_path / "m.bdf").write_text(cards)
+    points = read_nastran_dofs(tmp_path / "m.bdf").points[::6]
+    np.testing.assert_array_equal(points[0], [float(f"{x:.9e}") for x in place])
+    np.testing.assert_array_equal(points[1], [place[0], place[1], 1.5e-3])
+
+
 # --- guards around the library; no package needed
 
 
@@ -421,7 +517,8 @@ def test_missing_package_is_named(tmp_path, monkeypatch):
     for module in ("pyyeti.nastran.op4", "pyyeti.nastran.bulk"):
         monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / "a.op4").write_text("       1       1       6       2M\n")
+    (tmp_path / "a.bdf").write_text("GRID,1,,0.,0.,0.\n")
     with pytest.raises(StickslipError, match=r"pyyeti: not installed.*stickslip\[readers\]"):
         read_nastran_op4(
-            tmp_path / "a.op4", mass="m", stiffness="m", geometry=tmp_path / "a.op4", dof_set="g"
+            tmp_path / "a.op4", mass="m", stiffness="m", geometry=tmp_path / "a.bdf", dof_set="g"
         )

@@ -98,6 +98,13 @@ def read_nastran_op4(
     names = [name.lower() for name in (mass, stiffness, damping) if name is not None]
     known = read_nastran_dofs(geometry)
     rows = known.rows(dof_set)
+    if dof_set == "g" and known.constraint:
+        raise input_error(
+            known.constraint,
+            "holds degrees of freedom or ties them, which matrices of the g-set do not show",
+            "Give the .op2 file with the table USET and a set without them, or a file with the GRID and CORD2 cards alone to "
+            "take the matrices as they are.",
+        )
     found = op4_matrices(path, names, partial(_check_size, path, known, dof_set))
     dependent = np.intersect1d(known.sets.get("m", []), rows)
     if len(dependent):

@@ -1,7 +1,5 @@
 """Matrices from ``DMIG`` cards of Nastran's bulk data and punch files; read here, so that no package is needed."""
 
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,18 +7,22 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import did_you_mean, input_error
 from stickslip.model.readers.nastran import assembled, real_symmetric
+from stickslip.model.readers.nastran_cards import CUT_SHORT, Card, bulk_cards, real, refused, whole
 from stickslip.model.readers.nastran_dofs import NastranDofs, read_nastran_dofs
 from stickslip.model.readers.nastran_library import existing_file
-from stickslip.model.readers.text import read_text
 from stickslip.model.readers.units import Units, check_units, in_si
 from stickslip.model.structure import Structure
 
 SQUARE, SYMMETRIC = 1, 6
-SHORTENED = re.compile(r"(?<=[\d.])([+-]\d+)$")  # 1.5-3 is 1.5e-3
-CUT_SHORT = "The file was cut short, or its cards are not in order."
-FIELDS = {True: (16, 4), False: (8, 8)}  # large or small: width of a field, fields a line
+# cards that say where grids lie, to which sets they belong, and tables: all but these change what the matrices are
+BESIDE = {
+    "ASET", "ASET1", "BNDFIX", "BNDFIX1", "BNDFREE", "BNDFREE1", "BSET", "BSET1", "CORD1C", "CORD1R", "CORD1S", "CORD2C",
+    "CORD2R", "CORD2S", "CSET", "CSET1", "DMI", "DTI", "EIGR", "EIGRL", "EPOINT", "EXTRN", "GRDSET", "GRID", "QSET", "QSET1",
+    "SECONCT", "SEBULK", "SPOINT", "USET", "USET1",
+}  # fmt: skip
+PRINTS = {"EXTOUT", "GRDPNT", "POST", "PRTMAXIM"}  # parameters that choose what is printed
 
 
 @dataclass(eq=False)
@@ -31,6 +33,8 @@ class Cards:
     ----------
     form
         1 square, 6 symmetric; others are rectangular.
+    refused
+        Why the matrix cannot be read, if so.
     rows, columns
         Coordinates, ten times the grid plus the component.
     values
@@ -38,6 +42,7 @@ class Cards:
     """
 
     form: int
+    refused: str = ""
     rows: list[int] = field(default_factory=list)
     columns: list[int] = field(default_factory=list)
     values: list[complex] = field(default_factory=list)
@@ -55,7 +60,8 @@ def read_nastran_dmig(
 ) -> Structure:
     """Read mass, stiffness and damping from ``DMIG`` cards: small, large or free fields.
 
-    Coordinates with neither mass nor stiffness are left out. ``INCLUDE`` is not followed.
+    Coordinates with neither mass nor stiffness are left out. A card that may change the model is refused: the file holds
+    the matrices, and beside them what says where grids lie and to which sets they belong.
 
     Parameters
     ----------
@@ -80,15 +86,19 @@ def read_nastran_dmig(
     Raises
     ------
     InputError
-        If a card is damaged, a name unknown, or a matrix complex or not symmetric.
+        If a card is damaged or not read, a name unknown, or a matrix complex or not symmetric.
     """
     units = Units.si() if units is None else units
     path = existing_file(path)
     found = _cards(path)
     names = [name.upper() for name in (mass, stiffness, damping) if name is not None]
     for name in names:
-        if name in found and found[name].form not in (SQUARE, SYMMETRIC):
-            raise input_error(f"{path}: {name}", "is rectangular", "Give square matrices.")
+        if name in found and found[name].refused:
+            raise input_error(
+                f"{path}: {name}",
+                found[name].refused,
+                "Give square matrices with real and imaginary parts.",
+            )
         if name not in found:
             raise input_error(
                 str(path),
@@ -149,101 +159,66 @@ def _matrix(cards: Cards, keys: IntArray, place: str) -> Matrix:
 
 
 def _cards(path: Path) -> dict[str, Cards]:
-    """Return all square DMIG matrices of a file."""
+    """Return all DMIG matrices of a file, those that cannot be read with the reason and without entries."""
     found: dict[str, Cards] = {}
-    for line, fields in _logical_cards(path):
-        place = f"{path}: line {line}"
-        name, second = fields[0].upper(), fields[1]
-        if second in {"", "0"} and name not in found:
-            found[name] = Cards(_whole(fields[2], place))
+    for card in bulk_cards(path, {"DMIG", "PARAM"}):
+        if card.name != "DMIG":
+            _refuse_what_is_missed(card)
+            continue
+        name, second = card.fields[0].upper(), card.fields[1]
+        if second in {"", "0"}:
+            if name in found:
+                raise input_error(
+                    card.place, f"DMIG {name} has a second head", "Give each matrix once."
+                )
+            found[name] = _head(card)
             continue
         if name not in found:
             raise input_error(
-                place, f"DMIG {name} has a column before its head (DMIG {name} 0 ...)", CUT_SHORT
+                card.place,
+                f"DMIG {name} has a column before its head (DMIG {name} 0 ...)",
+                CUT_SHORT,
             )
-        cards = found[name]
-        if cards.form not in (SQUARE, SYMMETRIC):
-            continue  # rectangular ones are refused only where they are asked for
-        column = _key(second, fields[2], place)
-        for i in range(4, len(fields), 4):
-            if not fields[i]:
-                continue
-            cards.rows.append(_key(fields[i], fields[i + 1], place))
-            cards.columns.append(column)
-            cards.values.append(complex(_real(fields[i + 2], place), _real(fields[i + 3], place)))
+        if not found[name].refused:  # the others are refused only where they are asked for
+            _add_column(found[name], card)
     return found
 
 
-def _logical_cards(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield each DMIG card with its line number: its data fields, continuations joined, filled up to fours."""
-    card: list[str] = []
-    start = 0
-    for number, line in enumerate(read_text(path).splitlines(), 1):
-        text = line.split("$")[0].rstrip()
-        if not text:
-            continue
-        first = text.split(",")[0] if "," in text else text[:8]
-        mark = first.strip().upper()
-        if mark[:1] in {"+", "*"} or not mark:
-            if card:
-                card += _fields(text, large=mark[:1] == "*", place=f"{path}: line {number}")
-            continue
-        if card:
-            yield start, card
-        card = []
-        if mark in {"DMIG", "DMIG*"}:
-            card = _fields(text, large=mark == "DMIG*", place=f"{path}: line {number}")
-            start = number
-    if card:
-        yield start, card
+def _head(card: Card) -> Cards:
+    form, polar = whole(card.fields[2], card.place), card.fields[5]
+    if form not in (SQUARE, SYMMETRIC):
+        return Cards(form, "is rectangular")
+    return Cards(form, "" if polar in {"", "0"} else "holds moduli and phases (POLAR)")
 
 
-def _fields(text: str, *, large: bool, place: str) -> list[str]:
-    """Return the data fields of one line, eight small or four large ones."""
-    width, count = FIELDS[large]
-    if "," in text:
-        fields = [part.strip() for part in text.split(",")[1:]]
-        if len(fields) == count + 1:
-            fields = fields[:count]  # the last one names the continuation
-    else:
-        if "\t" in text:
-            raise input_error(place, "has a tab, which fixed fields cannot have", "Use blanks.")
-        fields = [text[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
-    if len(fields) > count:
-        raise input_error(place, f"has {len(fields)} fields, {count} at most", CUT_SHORT)
-    return fields + [""] * (count - len(fields))
+def _add_column(cards: Cards, card: Card) -> None:
+    """Add the entries of one column: fields of the column, then four for each entry."""
+    column = _key(card.fields[1], card.fields[2], card.place)
+    groups = [card.fields[i : i + 4] for i in range(4, len(card.fields), 4)]
+    if card.fields[3] or any(any(group) for group in groups if not group[0]):
+        raise input_error(card.place, "has a number where none belongs", CUT_SHORT)
+    for point, component, value, imaginary in filter(lambda group: group[0], groups):
+        cards.rows.append(_key(point, component, card.place))
+        cards.columns.append(column)
+        cards.values.append(complex(real(value, card.place), real(imaginary, card.place)))
+
+
+def _refuse_what_is_missed(card: Card) -> None:
+    """Refuse a card that adds to the model, holds it or scales it: nothing but matrices is read here."""
+    if card.name == "PARAM" and card.fields[0].upper() in PRINTS:
+        return
+    if card.name not in BESIDE:
+        name = " ".join(filter(None, (card.name, *card.fields[:1])))
+        raise input_error(
+            card.place,
+            f"{name} is not read, and may change the model",
+            "Write the DMIG cards into a file of their own if the matrices are the whole model.",
+        )
 
 
 def _key(point: str, component: str, place: str) -> int:
     """Return ten times the grid or scalar point plus the component, 0 ... 6."""
-    number = _whole(component or "0", place)
+    number = whole(component or "0", place)
     if number > 6:
-        raise _not(component, "component 0 to 6", place)
-    return 10 * _whole(point, place) + number
-
-
-def _whole(word: str, place: str) -> int:
-    try:
-        number = int(word)
-    except ValueError as error:
-        raise _not(word, "whole number", place) from error
-    if not 0 <= number < 10**9:
-        raise _not(word, "grid or component", place)
-    return number
-
-
-def _real(word: str, place: str) -> float:
-    """Return a real number of Nastran: ``1.5``, ``1.5E-3``, ``1.5D-3``, ``1.5-3``; blank is zero."""
-    if not word:
-        return 0.0
-    plain = word.upper().replace("D", "E")
-    if "E" not in plain:
-        plain = SHORTENED.sub(r"E\1", plain)
-    try:
-        return float(plain)
-    except ValueError as error:
-        raise _not(word, "number", place) from error
-
-
-def _not(word: str, what: str, place: str) -> InputError:
-    return input_error(place, f"{word[:40]!r} is no {what}", CUT_SHORT)
+        raise refused(component, "component 0 to 6", place)
+    return 10 * whole(point, place) + number

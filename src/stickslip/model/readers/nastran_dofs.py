@@ -3,8 +3,9 @@
 They come from the tables of an ``.op2`` file or from the ``GRID`` and ``CORD2`` cards of bulk data.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs
+from stickslip.model.readers.nastran_cards import CUT_SHORT, Card, bulk_cards, real, whole
 from stickslip.model.readers.nastran_library import (
     check_records,
     existing_file,
@@ -23,6 +25,16 @@ from stickslip.model.readers.nastran_library import (
 from stickslip.model.readers.nodal_axes import rotation_to_global
 
 COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # 0 is a scalar point
+SYSTEMS = {"CORD2R", "CORD2C", "CORD2S"}
+MISSED = {
+    **dict.fromkeys(("CORD1R", "CORD1C", "CORD1S", "CORD3G", "CORD3R"), "where a coordinate system lies"),
+    "GRDSET": "in which systems grids lie that do not",
+    "SEQGP": "in which order the grids stand in the matrices",
+}  # fmt: skip
+CONSTRAINTS = {
+    "MPC", "MPCADD", "RBAR", "RBAR1", "RBE1", "RBE2", "RBE3", "RJOINT", "RROD", "RSPLINE", "RTRPLT", "RTRPLT1", "SPC", "SPC1",
+    "SPCADD", "SPCOFF", "SPCOFF1",
+}  # fmt: skip
 RECTANGULAR, CYLINDRICAL, SPHERICAL = 1, 2, 3
 
 
@@ -46,6 +58,9 @@ class NastranDofs:
         Name of a set of Nastran, such as ``a`` -> its degrees of freedom; only ``g`` where the file does not tell.
     place
         The file, for messages.
+    constraint
+        Place and name of the first card that holds degrees of freedom or ties them to others, where the file has such
+        cards and the sets do not show them.
     """
 
     ids: IntArray
@@ -55,6 +70,7 @@ class NastranDofs:
     turns: FloatArray
     sets: Mapping[str, IntArray]
     place: str
+    constraint: str = ""
 
     def rows(self, dof_set: str) -> IntArray:
         """Return the degrees of freedom of a set; an `InputError` names those that are known."""
@@ -86,19 +102,17 @@ class NastranDofs:
 def read_nastran_dofs(path: Path | str) -> NastranDofs:
     """Read the degrees of freedom of a model from an ``.op2`` file, bulk data or the ``.asm`` file of ``EXTSEOUT``.
 
-    ``INCLUDE`` is not followed.
-
     Raises
     ------
     InputError
-        If the file is damaged or holds no grids.
+        If the file is damaged, holds no grids, or has cards that change where grids lie and are not read (``INCLUDE``).
     """
     path = existing_file(path)
     binary = is_binary(path)
     if binary:
         check_records(path)
     with reading(path):
-        table, sets = _table_of_op2(path) if binary else _table_of_bulk(path)
+        table, sets, constraint = (*_table_of_op2(path), "") if binary else _table_of_bulk(path)
     if table is None or not len(table):
         raise input_error(
             str(path),
@@ -106,7 +120,7 @@ def read_nastran_dofs(path: Path | str) -> NastranDofs:
             "Give bulk data with GRID cards, or an .op2 file written with PARAM,POST,-1.",
         )
     with reading(path):
-        return _dofs(table, sets, str(path))
+        return replace(_dofs(table, sets, str(path)), constraint=constraint)
 
 
 def _table_of_op2(path: Path) -> tuple[Any, dict[str, IntArray]]:
@@ -124,15 +138,73 @@ def _table_of_op2(path: Path) -> tuple[Any, dict[str, IntArray]]:
     return table, {name: np.flatnonzero(member & int(mask)) for name, mask in masks.items()}
 
 
-def _table_of_bulk(path: Path) -> tuple[Any, dict[str, IntArray]]:
-    """Return pyYeti's table of all grids; of an external superelement (``.asm``) also its a-set, in its own order."""
+def _table_of_bulk(path: Path) -> tuple[Any, dict[str, IntArray], str]:
+    """Return pyYeti's table of all grids, sets, and the first constraint; an external superelement (``.asm``) has its a-set in its own order."""
+    text, constraint = _geometry(path)
     bulk = nastran_library("bulk")
     if path.suffix.lower() != ".asm":
-        return bulk.bulk2uset(str(path), follow_includes=False)[0], {}
+        return bulk.bulk2uset(StringIO(text), follow_includes=False)[0], {}, constraint
     # which components the grids keep stands in the .pch file beside it
-    existing_file(path.with_suffix(".pch"))
+    _geometry(existing_file(path.with_suffix(".pch")))
     table, _, _, kept = bulk.asm2uset(str(path), try_rdextrn="pv_only", follow_includes=False)
-    return table, {"a": np.flatnonzero(kept)}
+    return table, {"a": np.flatnonzero(kept)}, ""
+
+
+def _geometry(path: Path) -> tuple[str, str]:
+    """Return the grids and coordinate systems of bulk data as plain cards, and the first constraint among all cards."""
+    lines, constraint = [], ""
+    seen: dict[str, set[int]] = {"grid": set(), "coordinate system": {0}}
+    named: dict[int, str] = {}  # systems, with the card that names them first
+    for card in bulk_cards(path, {"GRID", *SYSTEMS}):
+        if card.name in MISSED:
+            raise input_error(
+                card.place,
+                f"{card.name} is not read, and says {MISSED[card.name]}",
+                "Write it into the GRID and CORD2 cards.",
+            )
+        if card.name in CONSTRAINTS or (card.name == "GRID" and card.fields[6] not in {"", "0"}):
+            constraint = constraint or f"{card.place}: {card.name}"
+        if card.name == "GRID":
+            number, reference, *at, output = card.fields[:6]
+            grid, systems = _once(number, "grid", seen, card), [reference, output]
+            words = [str(_whole(word, card)) for word in systems]
+            lines.append(f"GRID,{grid},{words[0]},{_reals(at, card)},{words[1]}")
+        elif card.name in SYSTEMS:
+            number, reference, *points = [*card.fields, *[""] * 8][:11]
+            system, systems = _once(number, "coordinate system", seen, card), [reference]
+            lines.append(
+                f"{card.name},{system},{_whole(reference, card)},{_reals(points[:6], card)}"
+            )
+            lines.append("," + _reals(points[6:], card))
+        else:
+            continue
+        for word in systems:
+            named.setdefault(_whole(word, card), card.place)
+    for system in named.keys() - seen["coordinate system"]:
+        raise input_error(
+            named[system], f"coordinate system {system} is not in the file", "Add its CORD2 card."
+        )
+    return "\n".join(lines) + "\n", constraint
+
+
+def _once(word: str, what: str, seen: dict[str, set[int]], card: Card) -> int:
+    """Return the number of a grid or a system, which no card before has."""
+    number = whole(word, card.place)
+    if number in seen[what]:
+        raise input_error(card.place, f"{what} {number} is there twice", "Give each once.")
+    seen[what].add(number)
+    return number
+
+
+def _whole(word: str, card: Card) -> int:
+    return whole(word or "0", card.place)
+
+
+def _reals(words: Sequence[str], card: Card) -> str:
+    values = [real(word, card.place) for word in words]
+    if not np.isfinite(values).all():
+        raise input_error(card.place, "has a place that is not finite", CUT_SHORT)
+    return ",".join(map(repr, values))
 
 
 def _dofs(table: Any, sets: dict[str, IntArray], place: str) -> NastranDofs:
