@@ -14,7 +14,10 @@ from stickslip.assembly.held import refuse_unheld, unheld
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.assembly.pulled import refuse_pulled
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.polynomial_spring import PolynomialSpring
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.model.dofs import numbered_dofs
@@ -22,6 +25,8 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.part import rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import preload
+from stickslip.response.system import System
 
 STICKY = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=5e6, mu=0.3)
 
@@ -184,3 +189,55 @@ def test_a_wheel_that_only_its_shrouds_touch_is_free_and_check_says_so(tmp_path:
     chain.write_text(FREE.partition("[contact")[0] + "[modes]\nnumber = 2\n")
     said = " ".join(done("check", str(chain)).split())
     assert "note: part.chain: the body of m2 is held by nothing" in said
+
+
+@pytest.mark.parametrize(
+    ("law", "held"),
+    [
+        (CubicSpring(cubic_t=1.0), True),
+        (CubicSpring(cubic_t=-1.0), False),
+        (PolynomialSpring(along_t=(0.0, 0.0, 1.0)), True),
+        (PolynomialSpring(along_t=(0.0, 1.0)), False),  # it pushes one way alone
+    ],
+)
+def test_a_mass_is_held_by_a_spring_whose_force_opposes_large_displacements(law, held):
+    one = np.ones((1, 1))
+    mass = structure_part(Structure(one, 0.0 * one, 0.0 * one, numbered_dofs(1)))
+    first = mass.structure.dofs.labels[0]
+    model = Model(
+        parts={"mass": mass},
+        contacts={
+            "spring": Contact(between=(f"mass.{first}", "ground"), law=law, acts="tangential")
+        },
+        loads={"shake": Load(on=f"mass.{first}", newton=1.0)},
+    )
+    assert bool(unheld(model, np.ones(1, dtype=bool))) is not held
+
+
+@pytest.mark.parametrize("force", [0.0, 8.0])
+def test_the_equilibrium_of_a_mass_on_a_cubic_spring_alone(force):
+    one, gap = np.ones((1, 1)), np.array([[1.0], [0.0], [0.0]])
+    structure = Structure(one, 0.1 * one, 0.0 * one, numbered_dofs(1))
+    contact = Interface(("spring",), (CubicSpring(cubic_t=1.0),), gap)
+    system = System(structure, contact, np.array([0]))
+    # x³ = force
+    assert preload(system, np.array([force])) == pytest.approx([np.cbrt(force)], rel=1e-6)
+
+
+@pytest.mark.parametrize("springs", ["", "springs_n_per_m = [[1, 2, 1e4]]"])
+def test_masses_that_a_cubic_spring_alone_holds_have_normal_modes(tmp_path: Path, springs: str):
+    from stickslip.model.modes import normal_modes
+    from stickslip.study.models.study import read_study
+
+    path = tmp_path / "study.toml"
+    spring = "law = 'cubic_spring'\ncubic_tangential_n_per_m3 = 1e8\n"
+    text = FREE.partition("[contact")[0].replace("[1.0, 1.0, 1.0]", "[1.0, 3.0]")
+    text = "\n".join(springs if line.startswith("springs") else line for line in text.splitlines())
+    text += f"\n[contact.c]\nbetween = ['chain.m1', 'ground']\n{spring}"
+    path.write_text(text + "[load.l]\non = 'chain.m1'\nforce_n = 1.0\n[modes]\nnumber = 1\n")
+    model = read_study(path).model()
+    if springs:
+        refuse_unheld(model)
+    squares = normal_modes(model.parts["chain"].structure, 2).squares
+    # all free without springs; with one between them ω² = k (1/m1 + 1/m2)
+    assert squares == pytest.approx([0.0, 1e4 * (1 + 1 / 3) if springs else 0.0], rel=1e-12)

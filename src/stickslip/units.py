@@ -120,7 +120,33 @@ class Quantity:
         )
 
 
+LONGEST_M = 1e3  # amplitude beyond which no number is given: a motion that grows without bound
+BEYOND = "more than a kilometre"
+LARGEST_PERCENT = 1e5  # of a difference that is told: beyond it one of the two is no amplitude
 _ANY = Quantity(about="")
+
+
+def millimetres(size: float, digits: int = 4) -> str:
+    """Return an amplitude (m) in millimetres for a sentence; in words where it is no number, or none that a machine can have."""
+    return _beyond(size) or f"{1e3 * size:.{digits}g} mm"
+
+
+def millimetres_between(least: float, most: float, digits: int = 4) -> str:
+    """Return a range of amplitudes (m) in millimetres for a sentence; in words as `millimetres`."""
+    if _beyond(least) or _beyond(most):
+        return f"{millimetres(least, digits)} to {millimetres(most, digits)}"
+    return f"{1e3 * least:.{digits}g} to {1e3 * most:.{digits}g} mm"
+
+
+def metres(size: float) -> str:
+    """Return an amplitude (m) in metres for a comparison; in words as `millimetres`."""
+    return _beyond(size) or f"{size:.5e} m"
+
+
+def _beyond(size: float) -> str:
+    if not math.isfinite(size):
+        return "no finite amplitude"
+    return BEYOND if abs(size) > LONGEST_M else ""
 
 
 def quantity(about: str, unit: str = "", *, default: Any = MISSING, **limits: Any) -> Any:

@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked
+from stickslip.contact.law import holding_directions
 from stickslip.contact.laws import law_name
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, input_error
@@ -180,9 +181,10 @@ def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
     """Return rows on the dofs of all parts that vanish where nothing is strained."""
     pairs, ties = model.pairs, model.ties
     stiff = [
-        np.ones(3) if isinstance(law, RigidCoulomb) else law.stuck_stiffness() for law in pairs.laws
+        np.ones(3, dtype=bool) if isinstance(law, RigidCoulomb) else holding_directions(law)
+        for law in pairs.laws
     ]
-    rows = np.flatnonzero(np.repeat(holds, 3) & (np.array(stiff).reshape(-1) > 0))
+    rows = np.flatnonzero(np.repeat(holds, 3) & np.array(stiff, dtype=bool).reshape(-1))
     n = model.places.n
     found = [
         (pairs.own + pairs.following)[rows],

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.units import quantity_of
 
@@ -89,6 +89,21 @@ def scaled(law: Law, factor: float) -> Law:
             "Mark stiffnesses and forces with stickslip.units.quantity(..., shared=True), or give the law of each point.",
         )
     return replace(law, **changed)  # type: ignore[type-var]
+
+
+@runtime_checkable
+class Restoring(Protocol):
+    """A law without memory whose force may oppose a displacement although its stiffness at rest is zero."""
+
+    def restores(self) -> BoolArray:
+        """Return the (3,) directions t, w, n along which the force opposes every large displacement."""
+        ...
+
+
+def holding_directions(law: ContactLaw) -> BoolArray:
+    """Return the (3,) directions t, w, n along which a contact that sticks and is closed holds what it touches."""
+    holds = law.stuck_stiffness() > 0.0
+    return holds | law.restores() if isinstance(law, Restoring) else holds
 
 
 @runtime_checkable

@@ -278,7 +278,8 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
     for name in ("mass", "stiffness"):
         matrix = getattr(structure, name)
         largest = float(abs(matrix).max()) if structure.n else 1.0
-        if not 1 / ABSURD < largest < ABSURD:
+        unstrained = name == "stiffness" and largest == 0.0  # bodies that contacts alone hold
+        if not (1 / ABSURD < largest < ABSURD or unstrained):
             raise input_error(
                 f"{place}: {name}",
                 f"has entries up to {largest:.3g}, which no model has",
@@ -327,9 +328,9 @@ def usual_shift(structure: Structure) -> float:
 
 
 def _mean_square(structure: Structure) -> float:
-    """Return the mean stiffness over the mean mass of single dofs, in rad²/s²."""
+    """Return the mean stiffness over the mean mass of single dofs, in rad²/s²; 1 where no dof has stiffness."""
     stiffness, mass = (m.diagonal().real for m in (structure.stiffness, structure.mass))
-    return float(abs(stiffness).sum() / mass.sum())
+    return float(abs(stiffness).sum() / mass.sum()) or 1.0
 
 
 def _small(stiffness: Matrix, n: int) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.units import BEYOND, LARGEST_PERCENT, LONGEST_M
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 NARROW_SPACE = "\u202f"
@@ -60,7 +61,9 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Write `value` in `unit` with an engineering prefix, e.g. ``12.3 µm``."""
+    """Write `value` in `unit` with an engineering prefix, e.g. ``12.3 µm``; lengths that no motion of a machine has in words."""
+    if _beyond(value, unit):
+        return BEYOND
     scale = scale_for(np.array([value]), unit)
     return f"{number(value * scale.factor, digits)} {scale.unit}" if math.isfinite(value) else NONE
 
@@ -72,8 +75,16 @@ def column(values: FloatArray, unit: str, digits: int = 4) -> tuple[str, list[st
     -------
     unit, cells
     """
-    scale = scale_for(values, unit)
-    return scale.unit, aligned(np.asarray(values) * scale.factor, digits)
+    given = np.asarray(values)
+    beyond = np.array([_beyond(float(v), unit) for v in given], dtype=bool)
+    usual = np.where(beyond, np.nan, given)
+    scale = scale_for(usual, unit)
+    cells = aligned(usual * scale.factor, digits)
+    return scale.unit, [BEYOND if far else cell for far, cell in zip(beyond, cells, strict=True)]
+
+
+def _beyond(value: float, unit: str) -> bool:
+    return unit == "m" and math.isfinite(value) and abs(value) > LONGEST_M
 
 
 def aligned(values: FloatArray, digits: int = 4) -> list[str]:
@@ -87,9 +98,11 @@ def aligned(values: FloatArray, digits: int = 4) -> list[str]:
 
 
 def percent(value: float, digits: int = 2) -> str:
-    """Write a value in percent; what is below a ten thousandth is said to be so."""
+    """Write a value in percent; what is below a ten thousandth, or beyond any use, is said to be so."""
     if math.isfinite(value) and 0 < abs(value) < 1e-4:
         return "< 0.0001 %"
+    if math.isfinite(value) and value > LARGEST_PERCENT:
+        return f"over {number(LARGEST_PERCENT)} %"
     return f"{number(value, digits)} %" if math.isfinite(value) else NONE
 
 

@@ -7,7 +7,7 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.contact.frozen import freezable, left_behind, sharing_friction
-from stickslip.contact.law import ContactLaw
+from stickslip.contact.law import ContactLaw, holding_directions
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.aft import contact_forces
@@ -175,12 +175,20 @@ def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArra
         matrix = with_contacts(balance.linear_block(omega, h), springs, rows)
         if h == 0:
             static = _static(real_part(matrix), load[0].real)
+            if static is None and any(map(_hardens, system.interface.laws)):
+                # held by springs without a stiffness at rest: Newton's method goes on from what the others hold
+                static = np.linalg.lstsq(as_array(matrix.real), load[0].real, rcond=None)[0]
             if static is None:
                 raise SingularError(_unheld(as_array(matrix.real), system))
             q[0] = static
         else:
             q[h] = solved(matrix, load[place])
     return balance.unknowns(q)
+
+
+def _hardens(law: ContactLaw) -> bool:
+    """Whether a law holds along a direction in which it has no stiffness at rest."""
+    return bool(np.any(holding_directions(law) & ~(law.stuck_stiffness() > 0.0)))
 
 
 def _static(matrix: Matrix, right: FloatArray) -> FloatArray | None:

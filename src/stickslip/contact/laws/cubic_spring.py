@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.polynomial_spring import polynomial_step
@@ -79,3 +79,11 @@ class CubicSpring:
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) linear stiffnesses along t, w, n, N/m."""
         return np.array([self.k_t, self.k_w, self.k_n])
+
+    def restores(self) -> BoolArray:
+        """Return the (3,) directions t, w, n along which the force opposes every large displacement."""
+        linear, cubic = (
+            np.array(v)
+            for v in ((self.k_t, self.k_w, self.k_n), (self.cubic_t, self.cubic_w, self.cubic_n))
+        )
+        return np.asarray((cubic > 0.0) | ((cubic == 0.0) & (linear > 0.0)))

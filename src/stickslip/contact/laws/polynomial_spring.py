@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.law import STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.errors import input_error
 from stickslip.units import check_quantities, quantity
@@ -90,3 +90,9 @@ class PolynomialSpring:
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses at zero displacement, N/m."""
         return np.array([c[0] if c else 0.0 for c in (self.along_t, self.along_w, self.along_n)])
+
+    def restores(self) -> BoolArray:
+        """Return the (3,) directions t, w, n along which the force opposes every large displacement: the last power is odd, its coefficient positive."""
+        last = [np.flatnonzero(c) for c in (self.along_t, self.along_w, self.along_n)]
+        each = zip(last, (self.along_t, self.along_w, self.along_n), strict=True)
+        return np.array([bool(k.size and k[-1] % 2 == 0 and c[k[-1]] > 0.0) for k, c in each])

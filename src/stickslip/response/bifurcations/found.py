@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability.found import Stability
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 BifurcationKind = Literal[
     "fold", "period doubling", "Neimark-Sacker", "branch point", "jump of multipliers"
@@ -92,7 +92,7 @@ class Bifurcation:
             doubt = "; by the error of its multiplier it may lie in another step of the branch, or nowhere"
         return (
             f"{head}{self.kind} at {self.omega / HZ:.6g}{error} Hz: {LEADS_TO[self.kind]}; "
-            f"amplitude {self.amplitude:.4g} m{known}{beat}{doubt}"
+            f"amplitude {millimetres(self.amplitude)}{known}{beat}{doubt}"
         )
 
 

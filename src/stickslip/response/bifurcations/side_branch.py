@@ -21,7 +21,7 @@ from stickslip.response.forced.problem import (
 )
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.continuation import advance, start_point, step_to
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 POINTS = 80  # of a branch, at most
 ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
@@ -109,7 +109,7 @@ class SideBranch:
         ends = self.omegas / HZ
         return (
             f"branch {kind}, {len(self.points)} points between {ends.min():.6g} and {ends.max():.6g} Hz, "
-            f"amplitude up to {self.amplitudes.max():.4g} m; {self.end}"
+            f"amplitude up to {millimetres(self.amplitudes.max())}; {self.end}"
         )
 
 

@@ -26,6 +26,7 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
 from stickslip.solve.status import Status
+from stickslip.units import millimetres
 
 Concept = Literal["periodic", "decaying"]
 BEGINS = 0.5  # of the amplitude at which slip begins
@@ -329,11 +330,11 @@ def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bo
     slips = next((p.amplitude for p in solved if p.slipping == 1.0), None)
     if points[-1] is end and (found.p == last or (stops and end.slipping == 1.0)):
         if found.p != last:
-            return f"gross slip at {1e3 * end.amplitude:.4g} mm"
+            return f"gross slip at {millimetres(end.amplitude)}"
         if slips is None and end.sticking == 0.0:
-            return f"amplitude reached, no contact sticks at {1e3 * end.amplitude:.4g} mm: those that do not slip stay open"
-        return f"amplitude reached{'' if slips is None else f', gross slip from {1e3 * slips:.4g} mm on'}"
-    told = f"{1e3 * end.amplitude:.4g} mm after {len(points)} points"
+            return f"amplitude reached, no contact sticks at {millimetres(end.amplitude)}: those that do not slip stay open"
+        return f"amplitude reached{'' if slips is None else f', gross slip from {millimetres(slips)} on'}"
+    told = f"{millimetres(end.amplitude)} after {len(points)} points"
     if end.open_for > 0.0:
         opened = f"contacts open for up to {100 * end.open_for:.0f} % of the period"
         return f"lift-off ends it at {told}: {opened}"

@@ -84,7 +84,7 @@ from stickslip.study.analyses.forced.values import (
 from stickslip.study.analyses.forced.verdicts import verdicts
 from stickslip.study.analyses.verdict import Verdict, to_json
 from stickslip.study.keep.progress import LOG, advance, sum_up
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
@@ -244,7 +244,7 @@ def _put_down(
     notes.put("model", of_model(question, response.output))
     told = {"known_verdicts": to_json(known(question, response, shift))}
     notes.put("response", of_response(question, response, shift) | told)
-    size = f"peak {1e3 * response.peak_amplitude:.4g} mm at {response.peak_hz:.3f} Hz"
+    size = f"peak {millimetres(response.peak_amplitude)} at {response.peak_hz:.3f} Hz"
     peak = f"{size}, {peak_word(response, examined)}, {len(response.accepted)} points"
     if response.top is None:
         peak = f"no peak, {len(response.accepted)} points"

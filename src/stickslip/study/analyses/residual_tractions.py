@@ -27,7 +27,7 @@ from stickslip.study.analyses.tractions.table import ResidualTractionsTable
 from stickslip.study.analyses.tractions.words import tables
 from stickslip.study.analyses.verdict import Verdict, stored
 from stickslip.study.keep.progress import advance
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres_between
 
 TOPS: tuple[End, End] = ("least", "most")
 
@@ -117,8 +117,8 @@ def _along(question: Question, done: Sequence[TractionRecord]) -> Iterator[Tract
 def _told(bounds: TractionBounds) -> str:
     if not bounds.converged:
         return f"{bounds.omega / HZ:.2f} Hz: no motion found"
-    least, most = (1e3 * end.amplitude for end in (bounds.least, bounds.most))
-    return f"{bounds.omega / HZ:.2f} Hz: {least:.4g} to {most:.4g} mm, {bounds.solves} motions"
+    size = millimetres_between(bounds.least.amplitude, bounds.most.amplitude)
+    return f"{bounds.omega / HZ:.2f} Hz: {size}, {bounds.solves} motions"
 
 
 def _resonance(question: Question, known: Sequence[TractionBounds], end: End) -> TractionBounds:

@@ -21,7 +21,7 @@ from stickslip.study.analyses.resonances.words import tables
 from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
 from stickslip.study.analyses.vibrating import represented
 from stickslip.study.keep.progress import LOG, advance
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
 UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
@@ -137,7 +137,7 @@ def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
         state = "" if point.converged else f", {point.status.advice}"
         advance(
             0.9 * min(share, 1.0),
-            f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {1e3 * point.amplitude:.5g} mm{state}",
+            f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {millimetres(point.amplitude, 5)}{state}",
         )
         yield point
 

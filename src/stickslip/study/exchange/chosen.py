@@ -10,7 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.study.analyses.vibrating import ONE
 from stickslip.study.keep.netcdf import one_case
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 ROUNDED = 1e-3  # of a number that was read from a table, relative
 FORCED, MODE, CYCLE = "forced_response", "nonlinear_mode", "limit_cycle"
@@ -185,7 +185,7 @@ def _forced(data: xr.Dataset, case: int, point: int) -> Chosen:
     highest = int(data.attrs.get("high_order", most))
     return Chosen(
         FORCED,
-        f"{_of_case(label)}{what} at {hz:.6g} Hz, {1e3 * amplitude:.4g} mm of {told}",
+        f"{_of_case(label)}{what} at {hz:.6g} Hz, {millimetres(amplitude)} of {told}",
         label,
         hz * HZ,
         labels,
@@ -220,7 +220,7 @@ def _mode(own: xr.Dataset, label: str, number: int, amplitude_mm: float | None) 
     hz, damping = float(branch["frequency_hz"].values[point]), float(ratio[point])
     wave = int(branch["wave_number"].values)
     what = "the most damped motion" if amplitude_mm is None else "the motion"
-    told = f"{_of_case(label)}{_of_wave(wave)}nonlinear mode {int(branch['mode'].values)}, {what}: {1e3 * amplitude[point]:.4g} mm of {own.attrs['output']} at {hz:.6g} Hz, damping ratio {100 * damping:.3g} %"
+    told = f"{_of_case(label)}{_of_wave(wave)}nonlinear mode {int(branch['mode'].values)}, {what}: {millimetres(amplitude[point])} of {own.attrs['output']} at {hz:.6g} Hz, damping ratio {100 * damping:.3g} %"
     return _free(branch.isel(point=point), own, MODE, told, label, (hz, damping, wave))
 
 
@@ -230,8 +230,8 @@ def _cycle(own: xr.Dataset, label: str, number: int, _amplitude_mm: float | None
     cycle = own.isel(cycle=number)
     wave = int(own["wave_number"].values[int(cycle["cycle_branch"].values)])
     hz = float(cycle["cycle_frequency_hz"].values)
-    size, word = 1e3 * float(cycle["cycle_amplitude"].values), str(cycle["cycle_stability"].values)
-    told = f"{_of_case(label)}{_of_wave(wave)}limit cycle {number} ({word}): {size:.4g} mm of {own.attrs['output']} at {hz:.6g} Hz"
+    size, word = float(cycle["cycle_amplitude"].values), str(cycle["cycle_stability"].values)
+    told = f"{_of_case(label)}{_of_wave(wave)}limit cycle {number} ({word}): {millimetres(size)} of {own.attrs['output']} at {hz:.6g} Hz"
     return _free(cycle, own, CYCLE, told, label, (hz, 0.0, wave))
 
 

@@ -9,6 +9,7 @@ from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.cycles.words import branch_name
 from stickslip.study.analyses.verdict import Verdict
+from stickslip.units import millimetres, millimetres_between
 
 NONE = 1e-9  # damping ratio below which there is none
 LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
@@ -30,10 +31,10 @@ def _followed(case: Mapping[str, xr.Variable], sound: Sequence[int]) -> str:
     ratio, at = (float(case[f"largest_damping_{n}"].values[most]) for n in ("ratio", "amplitude"))
     who = branch_name(case, most) if every == 1 else f"{len(sound)} of {every} modes"
     damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"  # fmt: skip
-    where = f" at {1e3 * at:.4g} mm" if abs(ratio) > NONE else ""
+    where = f" at {millimetres(at)}" if abs(ratio) > NONE else ""
     of = f", of {branch_name(case, most)}" if every > 1 and where else ""
-    low, high = 1e3 * float(np.nanmin(amplitude)), 1e3 * float(np.nanmax(amplitude))
-    return f"{who} followed from {low:.4g} to {high:.4g} mm: {damping}{where}{of}"
+    sizes = millimetres_between(float(np.nanmin(amplitude)), float(np.nanmax(amplitude)))
+    return f"{who} followed from {sizes}: {damping}{where}{of}"
 
 
 def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:

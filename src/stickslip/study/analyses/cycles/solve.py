@@ -29,7 +29,7 @@ from stickslip.study.analyses.cycles.time import compete, settle_cycles
 from stickslip.study.analyses.forced.examination import too_long
 from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate, known_coordinates
 from stickslip.study.keep.progress import LOG, advance
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 NOT_EXAMINED = "not examined"
 BEGINS = 0.5  # of the amplitude at which slip begins: where the curve begins
@@ -186,7 +186,7 @@ def _told(branch: CycleBranch) -> str:
     if branch.problem:
         return branch.problem
     each = [
-        f"{1e3 * a:.5g} mm at {w / HZ:.4f} Hz ({word})"
+        f"{millimetres(a, 5)} at {w / HZ:.4f} Hz ({word})"
         for a, w, word in zip(branch.cycle_amplitude, branch.cycle_omega, json.loads(branch.stable), strict=True)
     ]  # fmt: skip
     return f"limit cycles: {', '.join(each) or 'none'}"

@@ -27,7 +27,7 @@ from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.forced.question import MOST_IN_TIME
 from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate
 from stickslip.study.keep.progress import LOG
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 STEPS = 512
 FEW_STEPS = 256  # where hundreds of periods are followed for what wins
@@ -53,8 +53,8 @@ def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
         if not marched.overflowed:
             amplitude[i], omega[i] = marched.amplitude[0], marched.frequency[0]
         LOG.info(
-            f"time integration: {1e3 * amplitude[i]:.5g} mm at {omega[i] / HZ:.4f} Hz where the balance has "
-            f"{1e3 * branch.cycle_amplitude[i]:.5g} mm at {branch.cycle_omega[i] / HZ:.4f} Hz{_unconfirmed(branch, i, marched)}"
+            f"time integration: {millimetres(amplitude[i], 5)} at {omega[i] / HZ:.4f} Hz where the balance has "
+            f"{millimetres(branch.cycle_amplitude[i], 5)} at {branch.cycle_omega[i] / HZ:.4f} Hz{_unconfirmed(branch, i, marched)}"
         )
     return {"amplitude": amplitude, "omega": omega, "said": said}
 

@@ -9,6 +9,7 @@ from stickslip.response.self_excited.in_time import UNSETTLED
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
+from stickslip.units import millimetres
 
 CLOSE = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
 MORE = "Raise limit_cycle.most_harmonics."
@@ -41,7 +42,7 @@ def _of_competition(label: str, outcome: str, case: Mapping[str, xr.Variable]) -
         return Verdict("trusted", label, None, why, "That may depend on the start.")
     last = case["wave_amplitude"].values[-1]
     wave = int(np.argmax(last))
-    there = f" (wave {wave} has {1e3 * last[wave]:.4g} mm{_stable_of(case, wave)})"
+    there = f" (wave {wave} has {millimetres(last[wave])}{_stable_of(case, wave)})"
     remedy = "limit_cycle.periods were too few to settle: raise it."
     return Verdict("doubtful", label, None, why + there, remedy)
 
@@ -49,7 +50,7 @@ def _of_competition(label: str, outcome: str, case: Mapping[str, xr.Variable]) -
 def _stable_of(case: Mapping[str, xr.Variable], wave: int) -> str:
     """Name the stable limit cycles of a wave."""
     own = [
-        f"{1e3 * float(case['cycle_amplitude'].values[c]):.4g} mm"
+        f"{millimetres(float(case['cycle_amplitude'].values[c]))}"
         for c in _cycles(case)
         if str(case["cycle_stability"].values[c]) == "stable"
         and int(case["wave_number"].values[int(case["cycle_branch"].values[c])]) == wave
@@ -101,7 +102,7 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
 
 def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) -> list[Verdict]:
     amplitude, hertz = (float(case[f"cycle_{n}"].values[c]) for n in ("amplitude", "frequency_hz"))
-    what = f"{name}: the limit cycle of {1e3 * amplitude:.4g} mm"
+    what = f"{name}: the limit cycle of {millimetres(amplitude)}"
     found = []
     if not case["cycle_enough"].values[c]:
         change = float(case["cycle_change"].values[c])

@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 
+from stickslip.units import LARGEST_PERCENT, metres
+
 PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of a damper never ends
 LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
 STEPS = 1024  # of a period
@@ -84,10 +86,15 @@ class Check:
     def sentence(self) -> str:
         """What was compared and what happened."""
         return (
-            f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
-            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.3g} %; "
+            f"{self.frequency_hz:.3f} Hz: balance {metres(self.balance)} (H = {self.order}), "
+            f"time integration {metres(self.transient)}{self._difference}; "
             f"{self._outputs}{self._motion}{self._step}{self._verdict}{self._became}"
         )
+
+    @property
+    def _difference(self) -> str:
+        percent = self.difference_percent
+        return f", difference {percent:+.3g} %" if abs(percent) < LARGEST_PERCENT else ""
 
     @property
     def _outputs(self) -> str:
@@ -127,7 +134,7 @@ class Check:
         if not np.isfinite(self.refined):
             return f"; the balance with {self.refined_order} harmonics does not converge"
         left = 100 * (self.refined - self.transient) / self.transient
-        return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
+        return f"; the balance with {self.refined_order} harmonics gives {metres(self.refined)} ({left:+.2f} %)"
 
     @property
     def _became(self) -> str:

@@ -24,7 +24,7 @@ from stickslip.study.analyses.forced.in_time import GOLDEN, KICK
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question, too_large
 from stickslip.study.analyses.forced.stable import Examined
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres, millimetres_between
 
 STEPS = 512  # in a period, at least
 AGREE = 0.1  # relative difference of a root mean square with half the step that counts as none
@@ -239,15 +239,15 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
     settled = of.settled and not (alike and march.stayed) and not doubt
     if alike and march.stayed:
         body = (
-            f"it has not left the motion that it started on by more than {100 * march.away:.2g} %, {label} {1e3 * of.largest[own]:.4g} mm {counted}; "
+            f"it has not left the motion that it started on by more than {100 * march.away:.2g} %, {label} {millimetres(of.largest[own])} {counted}; "
             + _patience(march)
         )
     elif alike and settled:
-        body = f"it settles to another periodic motion, {label} {1e3 * of.largest[own]:.4g} mm {counted}"
+        body = f"it settles to another periodic motion, {label} {millimetres(of.largest[own])} {counted}"
     else:
         body = (
-            f"its amplitude goes from {1e3 * of.least[own]:.4g} to {1e3 * of.largest[own]:.4g} mm ({label}, half of peak to peak in a period), "
-            f"root mean square {1e3 * of.rms[own]:.4g} mm, {counted}"
+            f"its amplitude goes from {millimetres_between(of.least[own], of.largest[own])} ({label}, half of peak to peak in a period), "
+            f"root mean square {millimetres(of.rms[own])}, {counted}"
         )
         body += f"; besides multiples of the frequency {', '.join(strange)}" if strange else ""
         body += _settledness(of.spread, of.settled)
@@ -285,7 +285,7 @@ def _of_the_step(march: _March, own: int) -> str:
         )
     if abs(fine - rms) <= AGREE * max(fine, rms):
         return ""
-    return f"; with half the step the root mean square is {1e3 * fine:.4g} mm: too few steps, or too few periods"
+    return f"; with half the step the root mean square is {millimetres(fine)}: too few steps, or too few periods"
 
 
 def _off(hertz: float, own: float) -> bool:

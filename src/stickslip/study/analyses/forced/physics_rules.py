@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.study.analyses.forced.curve import Curve
 from stickslip.study.analyses.forced.finding import Finding, Rule
 from stickslip.study.analyses.verdict import from_json
+from stickslip.units import millimetres
 
 LARGEST_ROTATION_RAD = 0.1  # that linear kinematics describes
 LARGEST_STRAIN = 3e-3
@@ -62,7 +63,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
         word = str(said["another_stability"])
         state = {"stable": ", which is stable", "undecided": ", of which nobody knows whether it is stable"}.get(word, ", whose stability was not examined")  # fmt: skip
         why = (
-            f"another motion of {1e3 * size:.4g} mm exists at {hz:.2f} Hz, where the response has {1e3 * float(said['another_known']):.4g} mm: "
+            f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said['another_known']))}: "
             f"found from {said['another_start']}{state}"
         )
         remedy = (

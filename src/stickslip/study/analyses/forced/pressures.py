@@ -12,6 +12,7 @@ from stickslip.assembly.model import Model
 from stickslip.model.modes import normal_modes
 from stickslip.reduction.waves import excited_wave
 from stickslip.study.analyses.waves.numbers import label
+from stickslip.units import millimetres
 
 ROUNDING = 1e-12  # m
 MODES = 3  # whose modal force is told where a study does not say
@@ -30,7 +31,7 @@ def _about(model: Model, name: str, load: Load, count: int) -> list[str]:
     assert load.field is not None
     put = load.field.on(model.places, load.on, f"load.{name}.on")
     (force, moment), (own_force, own_moment) = put.before, put.after
-    offset = f"; points up to {1e3 * put.offset if put.offset > ROUNDING else 0.0:.3g} mm off it"
+    offset = f"; points up to {millimetres(put.offset if put.offset > ROUNDING else 0.0, 3)} off it"
     if put.inward:
         offset += ", their normals point into the body"
     if np.any(put.clamped):

@@ -26,6 +26,7 @@ from stickslip.study.analyses.forced.stable_rules import (
     unstable_stretches,
 )
 from stickslip.study.analyses.verdict import from_json
+from stickslip.units import LARGEST_PERCENT, millimetres
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
@@ -199,13 +200,19 @@ def in_time(case: Curve) -> Iterator[Finding]:
             remedy = "See the table of checks: it says what drifts or rings on."
             yield Finding("doubtful", why, remedy, (point,))
         elif not abs(off) <= ATTAINED:
-            why = f"time integration and harmonic balance differ by {off:+.3g} %, more than {ATTAINED:g} %"
+            why = f"time integration and harmonic balance differ by {_difference_text(off)}, more than {ATTAINED:g} %"
             remedy = f"{_more(case, point)}; the table of checks says which of the two is wrong."
             yield Finding("doubtful", why, remedy, (point,), abs(off))
         elif case.outputs_off[point] > case.limit:
             why = f"time integration and harmonic balance differ by {error_text(case.outputs_off[point])} in an output, phase included"
             remedy = f"{_more(case, point)}; believe the time integration."
             yield Finding("doubtful", why, remedy, (point,), float(case.outputs_off[point]))
+
+
+def _difference_text(percent: float) -> str:
+    if abs(percent) < LARGEST_PERCENT:
+        return f"{percent:+.3g} %"
+    return "no finite amount" if not np.isfinite(percent) else f"over {LARGEST_PERCENT:g} %"
 
 
 def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
@@ -216,7 +223,7 @@ def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
     if share > case.limit:
         own = case.amplitude[case.peak]
         why = (
-            f"half of peak to peak is {1e3 * whole:.4g} mm at {case.output}, {100 * (whole / own - 1):+.2g} % from the amplitude that is told: "
+            f"half of peak to peak is {millimetres(whole)} at {case.output}, {100 * (whole / own - 1):+.2g} % from the amplitude that is told: "
             f"harmonic {harmonic}, which that leaves out, holds {error_text(share)}"
         )
         remedy = 'output.measure = "half_peak_to_peak" tells extreme values.'

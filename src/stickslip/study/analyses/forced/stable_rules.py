@@ -8,6 +8,7 @@ from stickslip.study.analyses.forced.curve import ATTAINED, Curve
 from stickslip.study.analyses.forced.finding import Finding, in_time_there, without_place
 from stickslip.study.analyses.forced.quantities import MOTION
 from stickslip.study.analyses.forced.question import ALONE, MOST_IN_TIME, TOO_MANY
+from stickslip.units import millimetres
 
 UNDECIDED = MOTION["undecided"]
 LEFT = "unstable: a machine does not stay there"
@@ -52,7 +53,7 @@ def unstable_stretches(case: Curve) -> Iterator[Finding]:
             for said in case.rows("not_periodic")
             if abs(float(said["not_periodic_frequency_hz"]) / hz - 1.0) < ATTAINED / 100
         ]
-        why = f"the largest motion, {1e3 * larger:.4g} mm at {hz:.4g} Hz, is unstable; the peak is the largest motion that a machine keeps"
+        why = f"the largest motion, {millimetres(larger)} at {hz:.4g} Hz, is unstable; the peak is the largest motion that a machine keeps"
         yield Finding("trusted", "; ".join([why, *there[:1]]), "See the stability of the points.")
     elif off.size:
         low, high = case.hz[off].min(), case.hz[off].max()

@@ -12,6 +12,7 @@ from stickslip.response.bifurcations.side_branch import CLOSES, LEAVES
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import told_apart
 from stickslip.study.analyses.verdict import Verdict
+from stickslip.units import millimetres
 
 HIGHER = 1.001  # times the swept peak, from where a branch is said to reach higher
 CHANGED = ALIKE  # relative change by more harmonics from which it is said: starts in time are told apart by as much
@@ -97,7 +98,7 @@ def _higher(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         return found
     for i in np.flatnonzero((origin != "sweep") & (peak > HIGHER * swept)):
         kind = "an isola" if case["isola"].values[i] else "a branch that no sweep meets"
-        why = f"{kind} reaches {1e3 * peak[i]:.4g} mm at {hertz[i]:.6g} Hz, {peak[i] / swept:.3g} times the peak of the sweep"
+        why = f"{kind} reaches {millimetres(peak[i])} at {hertz[i]:.6g} Hz, {peak[i] / swept:.3g} times the peak of the sweep"
         remedy = "A disturbance can throw the machine there: count on the larger amplitude."
         found.append(Verdict("trusted", label, None, why, remedy, warns=True))
     return found
@@ -128,7 +129,7 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         if origin[branch[i, most]] != "sweep":
             why = (
                 f"most starts end on a branch that no sweep meets: {100 * share[i, most]:.3g} % ({low:.3g} to {high:.3g} %), amplitude "
-                f"{1e3 * case['motion_amplitude'].values[i, most]:.4g} mm"
+                f"{millimetres(case['motion_amplitude'].values[i, most])}"
             )
             found.append(Verdict("trusted", label, float(hertz[i]), why, "The branch of the sweep is not what the machine is most likely to do.", warns=True))  # fmt: skip
     return found
@@ -144,7 +145,7 @@ def _not_reached(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Ve
         return []
     high = 100 * case["motion_share_high"].values[i, k]
     why = (
-        f"the largest stable motion, {1e3 * height[k]:.4g} mm, was reached by none of {int(case['starts'].values[i])} starts: its share "
+        f"the largest stable motion, {millimetres(height[k])}, was reached by none of {int(case['starts'].values[i])} starts: its share "
         f"of such starts is below {high:.2g} % with 95 % confidence, not zero"
     )
     remedy = (
@@ -178,7 +179,7 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
     title = f"{head}Motions of {case.attrs.get('output', '')}"
     lines = [
         f"Branch {i + 1} ({case['origin'].values[i]}): {case['lowest_hz'].values[i]:.6g} to {case['highest_hz'].values[i]:.6g} Hz, "
-        f"up to {1e3 * peak:.6g} mm at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
+        f"up to {millimetres(peak, 6)} at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
         for i, peak in enumerate(case["peak_amplitude"].values)
     ]
     solves, most = int(case.attrs["solves"]), int(case.attrs["budget_solves"])

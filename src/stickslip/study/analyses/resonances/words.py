@@ -9,6 +9,7 @@ import xarray as xr
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict, from_json
+from stickslip.units import millimetres
 
 FAR_BELOW = 0.01  # of the maximum beside it: by phase, a peak that is none
 ENOUGH = 0.01  # change of the highest peak by twice the harmonics
@@ -143,7 +144,7 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
         value, amplitude, hertz = (float(case.attrs[f"smallest_{k}"]) for k in ("value", "amplitude", "frequency_hz"))  # fmt: skip
         where = f"at {hertz:.6g} Hz" if np.isfinite(hertz) else "where two peaks are equally high"
         lines.append(
-            f"The highest peak is lowest at {value:.6g}: {1e3 * amplitude:.6g} mm {where}."
+            f"The highest peak is lowest at {value:.6g}: {millimetres(amplitude, 6)} {where}."
         )
     title = (
         f"{head}Resonances of {case.attrs.get('output', '')} over {case.attrs.get('parameter', '')}"

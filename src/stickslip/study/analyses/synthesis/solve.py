@@ -38,7 +38,7 @@ from stickslip.study.analyses.synthesis.percents import percent
 from stickslip.study.analyses.synthesis.question import Question
 from stickslip.study.analyses.synthesis.records import SynthesisLevel
 from stickslip.study.keep.progress import LOG, advance
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 TRUSTED, DOUBTFUL = 0.02, 0.05  # relative error that other modes may make of the peak
 COARSE = 0.08  # change of the peak by every second point of the backbone: four times what all points leave
@@ -125,8 +125,8 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     answer, why = _answer(shared, curve, alone, (resolved, changed))
     shown = answer in ("trusted", "doubtful")
     if shown and len(peaks) > 1 and curve.resonances[0].top:
-        swept = f"the highest peak that a sweep meets has {1e3 * peaks[0][0]:.4g} mm at {peaks[0][1] / HZ:.5g} Hz"
-        answer, why = "doubtful", f"{swept}, that of a detached curve {1e3 * detached[0]:.4g} mm at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
+        swept = f"the highest peak that a sweep meets has {millimetres(peaks[0][0])} at {peaks[0][1] / HZ:.5g} Hz"
+        answer, why = "doubtful", f"{swept}, that of a detached curve {millimetres(detached[0])} at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
     beside = along(shared.others, curve, question.dof)
     spent = process_time() - began

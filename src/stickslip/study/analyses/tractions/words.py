@@ -8,6 +8,7 @@ import xarray as xr
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import one_case
+from stickslip.units import millimetres
 
 SMALL = 1e-3  # relative width below which residual tractions change nothing that counts
 LARGE = 1e-2  # above which the user is warned
@@ -45,11 +46,11 @@ def _of_width(
         )
         elsewhere = _widest(case)
         also = f"; elsewhere in the range {elsewhere}" if elsewhere else ""
-        why = f"residual tractions leave the resonance as it is, {1e3 * own:.4g} mm at {hertz[0]:.5g} Hz: {because}{also}"
+        why = f"residual tractions leave the resonance as it is, {millimetres(own)} at {hertz[0]:.5g} Hz: {because}{also}"
         return Verdict("trusted", label, None, why)
     why = (
-        f"the resonance is {1e3 * own:.4g} mm from the model's own start, and by residual tractions alone anywhere from {1e3 * least:.4g} mm at "
-        f"{hertz[1]:.5g} Hz to {1e3 * most:.4g} mm at {hertz[2]:.5g} Hz ({100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %): so far "
+        f"the resonance is {millimetres(own)} from the model's own start, and by residual tractions alone anywhere from {millimetres(least)} at "
+        f"{hertz[1]:.5g} Hz to {millimetres(most)} at {hertz[2]:.5g} Hz ({100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %): so far "
         "the answer of forced_response may be off because of them"
     )
     return Verdict(
@@ -132,9 +133,9 @@ def _of_ends(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
             why = f"the {end} resonance was not found again where forces are marched over samples"
             found.append(Verdict("doubtful", label, float(hertz[k]), why, "Take more harmonics."))
             continue
-        went = f"goes to {1e3 * time:.4g} mm" if np.isfinite(time) else "diverges"
+        went = f"goes to {millimetres(time)}" if np.isfinite(time) else "diverges"
         why = (
-            f"the {end} resonance, {1e3 * height[k]:.4g} mm, is a periodic motion that a machine leaves: in time, begun with its tractions, it "
+            f"the {end} resonance, {millimetres(height[k])}, is a periodic motion that a machine leaves: in time, begun with its tractions, it "
             f"{went}"
         )
         found.append(Verdict("trusted", label, float(hertz[k]), why, "The bound holds; it may be wider than what can be attained."))  # fmt: skip

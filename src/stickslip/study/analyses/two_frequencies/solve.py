@@ -18,7 +18,7 @@ from stickslip.study.analyses.two_frequencies.question import NAME, Question, he
 from stickslip.study.analyses.two_frequencies.records import TwoFrequencies
 from stickslip.study.analyses.two_frequencies.time import compared
 from stickslip.study.keep.progress import LOG, advance
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres_between
 
 PHASES = 96
 GRID = 64  # phases of either frequency, over which the largest distance from the mean is taken
@@ -189,6 +189,6 @@ def _told(one: TwoFrequencies) -> str:
     if one.kind == "no second tone":
         return f"{head}: no second tone: {one.why}"
     return (
-        f"{head} and {hertz(one.second)} ({one.kind}): amplitude {1e3 * one.least[0]:.4g} to {1e3 * one.largest[0]:.4g} mm, "
+        f"{head} and {hertz(one.second)} ({one.kind}): amplitude {millimetres_between(one.least[0], one.largest[0])}, "
         f"{len(one.indices) - 1} combined frequencies, {100 * one.left_out:.2g} % left out"
     )

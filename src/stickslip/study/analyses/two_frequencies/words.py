@@ -8,6 +8,7 @@ import xarray as xr
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
+from stickslip.units import millimetres_between
 
 LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful
 SLIP = 5e-3  # rad a turn, the same
@@ -50,7 +51,7 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
         size = ends[0][0]
         apart = max(abs(b - t) for b, t in ends) / size
         if apart > 2 * LARGE:
-            told = f"in time the amplitude goes from {1e3 * ends[1][1]:.4g} to {1e3 * ends[0][1]:.4g} mm, the balance has {1e3 * ends[1][0]:.4g} to {1e3 * size:.4g} mm"
+            told = f"in time the amplitude goes from {millimetres_between(ends[1][1], ends[0][1])}, the balance has {millimetres_between(ends[1][0], size)}"
             found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))  # fmt: skip
     return found
 

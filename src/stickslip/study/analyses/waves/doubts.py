@@ -10,7 +10,7 @@ from stickslip.assembly.statics import MOST_DISPLACEMENT, MOST_ROTATION, MOST_ST
 from stickslip.response.rotating.safe import Safe
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.results import WaveBranches
-from stickslip.units import HZ, RPM
+from stickslip.units import HZ, RPM, millimetres
 
 BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above which there is a warning
 
@@ -32,8 +32,8 @@ def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple
         return ()
     alone = ", without what contacts hold back," if contacts else ""
     why = (
-        f"the static displacement at {state.speed / RPM:g} rpm{alone} is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
-        f"at a radius of {1e3 * state.radius:.4g} mm, strains up to {100 * state.strain:.3g} %, rotations up to "
+        f"the static displacement at {state.speed / RPM:g} rpm{alone} is too large for linear statics: up to {millimetres(state.displacement)} "
+        f"at a radius of {millimetres(state.radius)}, strains up to {100 * state.strain:.3g} %, rotations up to "
         f"{state.rotation:.3g} rad (the limits are {100 * MOST_DISPLACEMENT:g} % of the radius, {100 * MOST_STRAIN:g} %, "
         f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt"
     )
