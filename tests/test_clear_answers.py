@@ -109,6 +109,7 @@ def free_dofs(n: int) -> Dofs:
         (np.diag([1.0, -1.0]), np.eye(2), r"mass: is negative, -1, at node1.x"),
         (np.array([[1.0, 2.0], [2.0, 1.0]]), np.eye(2), r"mass: is not positive definite"),
         (1e-308 * np.eye(2), np.eye(2), r"mass: has entries up to 1e-308"),
+        (np.diag([1e-300, 1.0]), np.eye(2), r"mass: is 1e-300 at node0.x, which no model has"),
         (np.eye(2), np.diag([1e308, -1e308]), r"stiffness: has entries up to 1e\+308"),
     ],
 )

@@ -14,6 +14,7 @@ from stickslip.response.stability.low_rank_flow import (
     flow_of,
 )
 from stickslip.response.stability.modal_states import ModalStates
+from stickslip.response.stability.propagation import transition
 
 N = 52  # coordinates
 
@@ -103,3 +104,11 @@ def test_free_bodies_and_small_structures_take_full_matrices(monkeypatch):
     assert isinstance(flow_of(modes, contacts), FullFlow)
     monkeypatch.setattr(low_rank_flow, "FEW", N + 1)
     assert isinstance(flow_of(*states()), FullFlow)
+
+
+@pytest.mark.parametrize("stiffness", [1e60, 1e90, 1e300])
+def test_a_motion_too_fast_for_a_number_says_so(stiffness: float) -> None:
+    """Before, squares of squares went to NaN or lost every digit, and the motion counted as stable."""
+    matrix = np.array([[0.0, 1.0], [-stiffness, -1.0]])
+    with pytest.raises(FloatingPointError, match="too fast for a number"):
+        transition(matrix, np.zeros((1, 0)), 1.0)

@@ -6,8 +6,10 @@ from study_texts import DETACHED, JENKINS, answered, study_of
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.report.page import plots
 from stickslip.study.analyses.synthesis import solve as solving
+from stickslip.study.analyses.synthesis.question import _bounded
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.run import run_study
 
@@ -121,7 +123,7 @@ def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_pa
 
 
 def test_a_level_at_which_nothing_slips_is_answered_in_proportion_however_small(tmp_path):
-    text = STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1e-300, 1e-3]")
+    text = STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1e-30, 1e-3]")
     outcome = answered(text.replace("amplitude_mm = [100.0, 20000.0]\n", ""), tmp_path)
     case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
     # stuck: 0.1 N over c ω, damped as little as that
@@ -132,5 +134,9 @@ def test_a_level_at_which_nothing_slips_is_answered_in_proportion_however_small(
 
 
 def test_a_level_beyond_all_numbers_is_refused_by_its_value(tmp_path):
-    with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+300"):
+    with pytest.raises(InputError, match=r"modal_synthesis\.levels\[1\]: is 1e\+300, which no"):
         answered(STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]"), tmp_path)  # fmt: skip
+    with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+30, with which"):
+        _bounded(
+            [1.0, 1e30], HarmonicLoad(np.zeros(1), {1: np.array([1e31 + 0j])})
+        )  # of loads in Python

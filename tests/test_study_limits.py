@@ -9,6 +9,7 @@ from small_v2 import write_four_masses
 from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.toml import read_toml
 from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
 
 HUGE = {
     "a key of many parts": (".".join("a" * 50_000) + " = 1", "more than 20 parts"),
@@ -86,3 +87,35 @@ def test_names_that_are_no_names_are_refused(tmp_path: Path, name: str) -> None:
     path.write_text(path.read_text().replace("[part.chain]", f'[part."{name}"]'))
     with pytest.raises(InputError, match="is no name, got"):
         read_study(path)
+
+
+BEYOND = {
+    "forced_response.frequency_hz": ("[1e-300, 1e300]", ["[0]: is 1e-300", "[1]: is 1e+300"]),
+    "part.chain.masses_kg": ("[1.0, 1e-300, 1.0, 1.0]", ["[1]: is 1e-300"]),
+    "part.chain.springs_n_per_m": ('[["ground", 1, -1e31]]', ["[0][2]: is -1e+31"]),
+    "load.shaker.force_n": ("9.9e-31", [": is 9.9e-31"]),
+    "vary.load.shaker.force_n": ("[1.0, 1e300]", [": is 1e+300"]),
+}
+
+
+@pytest.mark.parametrize("key", BEYOND)
+def test_numbers_that_no_quantity_is_are_refused_by_key(tmp_path: Path, key: str) -> None:
+    """Range ends of 1e300 and masses of 1e-300 overflowed in one power or another, or gave other frequencies."""
+    value, told = BEYOND[key]
+    with pytest.raises(InputError) as caught:
+        read_study(write_four_masses(tmp_path, {key: value}))
+    lines = str(caught.value).splitlines()
+    assert [line.split(key)[1].split(",")[0] for line in lines] == told
+    assert all("between 1e-30 and 1e+30 in size. Check the unit." in line for line in lines)
+
+
+def test_numbers_at_the_limits_run_without_a_fault(tmp_path: Path) -> None:
+    few = {"forced_response.points": "2", "forced_response.peak_points": "0", "harmonics.high": "3", "harmonics.samples": "64"}  # fmt: skip
+    extreme = {
+        "forced_response.frequency_hz": "[1e-30, 1e30]",
+        "part.chain.masses_kg": "[1e-30, 1.0, 1e30, 1.0]",
+        "load.shaker.force_n": "1e30",
+    }
+    outcome = run_study(read_study(write_four_masses(tmp_path, few | extreme)))
+    assert outcome.tree.attrs["complete"] == 1
+    assert any(verdict.rank for verdict in outcome.verdicts)  # and nobody is told to trust it

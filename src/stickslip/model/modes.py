@@ -293,6 +293,14 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
             f"is negative, {diagonal[dof]:.6g}, at {structure.dofs.labels[dof]}",
             "A mass matrix is positive definite: check its source.",
         )
+    least = np.where(diagonal > 0, diagonal, np.inf)
+    if structure.n and np.min(least) < 1 / ABSURD:
+        dof = int(np.argmin(least))
+        raise input_error(
+            f"{place}: mass",
+            f"is {least[dof]:.3g} at {structure.dofs.labels[dof]}, which no model has",
+            "Check the program that wrote it, and its units, or write 0.",
+        )
     if structure.n > DENSE:
         return
     dense = structure.mass.toarray() if scipy.sparse.issparse(structure.mass) else structure.mass

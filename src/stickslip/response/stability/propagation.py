@@ -12,6 +12,7 @@ from stickslip.arrays import FloatArray
 
 SHORT = 1.0  # |A| times the length up to which the series costs less than a rational function
 ACCURACY = 1e-14  # of the last term of the series, relative to the result
+TOO_FAST = "the linear motion between contacts' changes is too fast for a number"
 RATIONAL = 5.37  # |A| times the length up to which the rational function is exact to rounding
 NUMERATOR = (
     64764752532480000.0, 32382376266240000.0, 7771770303897600.0, 1187353796428800.0, 129060195264000.0, 10559470521600.0,
@@ -44,22 +45,34 @@ def propagate(
 
 
 def transition(a: FloatArray, pull: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the (2n, 2n) matrix that takes states through an interval and the (2n, m) one that adds what the sliders do."""
-    a2 = _times(a, a)
-    a4 = a2 @ a2
-    powers = a2, a4, a4 @ a2
-    # roots of powers come closer to the spectral radius than norms do (Al-Mohy & Higham 2009)
-    size = length * max(
-        float(np.linalg.norm(m, 1)) ** (1.0 / k) for m, k in zip(powers[1:], (4, 6), strict=True)
-    )
-    halvings = max(0, int(np.ceil(np.log2(max(size, RATIONAL) / RATIONAL))))
-    part = length / 2**halvings
-    columns = np.zeros((len(a), pull.shape[1]))
-    columns[len(pull) :] = part * pull
-    exponential, driven = _rational(a, powers, part, columns)
-    for _ in range(halvings):
-        driven += exponential @ driven
-        exponential = exponential @ exponential
+    """Return the (2n, 2n) matrix that takes states through an interval and the (2n, m) one that adds what the sliders do.
+
+    Raises
+    ------
+    FloatingPointError
+        If the motion turns or grows so fast that no digit of the states is left.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        a2 = _times(a, a)
+        a4 = a2 @ a2
+        powers = a2, a4, a4 @ a2
+        # roots of powers come closer to the spectral radius than norms do (Al-Mohy & Higham 2009)
+        size = length * max(
+            float(np.linalg.norm(m, 1)) ** (1.0 / k)
+            for m, k in zip(powers[1:], (4, 6), strict=True)
+        )
+        if not size < 1.0 / np.finfo(float).eps:  # not a digit of the phase is left
+            raise FloatingPointError(TOO_FAST)
+        halvings = max(0, int(np.ceil(np.log2(max(size, RATIONAL) / RATIONAL))))
+        part = length / 2**halvings
+        columns = np.zeros((len(a), pull.shape[1]))
+        columns[len(pull) :] = part * pull
+        exponential, driven = _rational(a, powers, part, columns)
+        for _ in range(halvings):
+            driven += exponential @ driven
+            exponential = exponential @ exponential
+    if not (np.all(np.isfinite(exponential)) and np.all(np.isfinite(driven))):
+        raise FloatingPointError(TOO_FAST)
     return exponential, driven
 
 

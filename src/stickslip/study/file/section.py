@@ -1,12 +1,14 @@
 """What all tables of a study file have in common."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 _NO_NAME = "/\\:*?[]<>|\"'`$"  # what is no part of a file's name everywhere
+LARGEST_NUMBER = 1e30  # in the units of the file: ten of them multiplied, or ten of their inverses, are still numbers
 LONGEST_VALUE = 60  # characters of a value that a message shows
 
 Positive = Annotated[float, Field(gt=0)]
@@ -26,9 +28,37 @@ Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_plain
 
 
 class Section(BaseModel):
-    """A table of the study file: unknown keys, non-finite numbers and quiet conversions are refused."""
+    """A table of the study file: unknown keys, quiet conversions, and numbers that are not finite or that no quantity has are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers(cls, given: object) -> object:
+        if isinstance(given, Mapping):
+            found = (one for key, value in given.items() for one in _beyond(str(key), value))
+            refuse_all(
+                custom_error(
+                    f"is {value:g}, which no quantity is",
+                    f"Numbers are 0 or between {1 / LARGEST_NUMBER:g} and {LARGEST_NUMBER:g} in size. Check the unit.",
+                    key,
+                )
+                for key, value in found
+            )
+        return given
+
+
+def _beyond(key: str, value: object) -> Iterator[tuple[str, float]]:
+    """Yield numbers beyond all quantities, with their places; tables within look at their own."""
+    if isinstance(value, list | tuple):
+        for i, entry in enumerate(value):
+            yield from _beyond(f"{key}[{i}]", entry)
+    elif isinstance(value, float) and value and isfinite(value) and not _is_usual(abs(value)):
+        yield key, value
+
+
+def _is_usual(size: float) -> bool:
+    return 1 / LARGEST_NUMBER <= size <= LARGEST_NUMBER
 
 
 def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomError:
