@@ -8,9 +8,11 @@ from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.harmonic.judging import judging_indices
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
+from stickslip.response.quasi_periodic import in_time
 from stickslip.response.quasi_periodic.find import swept
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
@@ -24,7 +26,8 @@ from stickslip.response.quasi_periodic.tone import (
     solve_free,
 )
 from stickslip.response.stability import stability
-from stickslip.response.time.start import start_from_harmonics
+from stickslip.response.time.marcher import step_work
+from stickslip.response.time.start import rest, start_from_harmonics
 from stickslip.solve.krylov import Krylov
 
 MASS = np.eye(2)
@@ -409,3 +412,42 @@ def test_two_equal_frequencies_are_refused() -> None:
     problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
     with pytest.raises(InputError, match="two different ones"):
         problem.solve((140.0, 140.0))
+
+
+def test_a_load_in_a_high_harmonic_is_judged_by_what_its_own_motion_feeds() -> None:
+    """The first load acts in harmonic 3, and odd friction answers in 9: beyond all sums that were looked at by order."""
+    omegas = 140.0 / 3.0, 1.3152 * 140.0
+    high = ss.HarmonicLoad(np.zeros(2), {3: np.array([30.0, 0.0], dtype=complex)})
+    fed = judging_indices([(3, 0), (0, 1)])
+    assert {(9, 0), (6, 0), (0, 2), (0, 3), (3, 1), (-3, 1), (6, 1), (-3, 2)} <= set(fed)
+    assert len(fed) == len({*fed, *((-j, -k) for j, k in fed)}) // 2
+
+    def solve(wider, start, path):
+        return wider.solve(omegas, start, path)
+
+    problem = two_tones(rubbing_pair(DAMPING), high, tone(0.0, 1e-3), 3)
+    few = with_enough(problem, problem.solve(omegas), 3, 0.01, solve)[1]
+    wide = problem.with_indices((*problem.balance.indices, (9, 0)))
+    more = solve(wide, wide.balance.from_other(problem.balance, few.x), None)
+    assert more.converged
+    missing = change_of(few, more, BOTH)
+    assert missing > 0.002
+    assert few.left_out > 0.5 * missing
+
+
+def test_a_march_takes_as_many_periods_on_a_busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    system, load = rubbing_pair(np.diag([4.0, -3.0])), tone(6.0, 0.0)
+    start = rest(2, system.interface.laws)
+
+    def marched(work: float):
+        own = system.structure, system.interface, load, 135.0, BOTH, start
+        return course(*own, steps=64, work=work, least=256, most=256)
+
+    of_period = 64 * step_work(2, 3)
+    idle = marched(20.5 * of_period)
+    assert idle.periods == 21
+    clock = iter(range(0, 10**9, 1000))
+    monkeypatch.setattr(in_time, "perf_counter", lambda: float(next(clock)))
+    busy = marched(20.5 * of_period)
+    assert np.array_equal(busy.samples, idle.samples)
+    assert busy.seconds >= 1000.0 > idle.seconds

@@ -169,3 +169,21 @@ def test_what_cannot_be_answered_is_refused(tmp_path: Path) -> None:
         InputError, match=r"load\.other_rotor\.frequency_ratio.*cannot stand beside"
     ):
         answered(wrong, tmp_path)
+
+
+def test_an_accuracy_that_is_missed_is_doubtful() -> None:
+    """What fifteen sums of harmonics leave out is enough for 1 %, not for 0.01 %."""
+    second = ss.Load(on="pair.m2", newton=8.0, omega_ratio=1.3152)
+    wake = ss.Load(on="pair.m1", newton=10.0)
+    model = replace(rubbing(-3.0), loads={"wake": wake, "own": second})
+    hz = [140.0 / (2 * np.pi)]
+    rough, fine = (
+        model.quasi_periodic(frequencies_hz=hz, accuracy_percent=a, in_time=True)
+        for a in (1.0, 0.01)
+    )
+    assert {v.level for v in rough.verdicts} == {"trusted"}
+    data = fine["quasi_periodic"]
+    assert data["accuracy"].values.item() == pytest.approx(1e-4)
+    assert 1e-4 < data["left_out"].values.item() < 0.02
+    assert any("more than the 0.01 % that is asked for" in str(v) for v in fine.verdicts)
+    assert {v.level for v in fine.verdicts} == {"doubtful"}

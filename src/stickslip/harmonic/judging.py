@@ -7,6 +7,7 @@ solution is exact if nothing acts on any harmonic of this set; no other set, and
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -36,6 +37,20 @@ def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
         for other in own[i:]:
             fed |= {one + other, other - one}
     return tuple(sorted(fed))
+
+
+def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    """Return the combined frequencies j ω1 + k ω2 that a nonlinear force of driven ones may feed first: 2a, 3a, a ± b, 2a ± b and a ± 2b of any a and b.
+
+    Of (j, k) and (−j, −k) one is returned, as `half_plane` orders them; (0, 0) is not.
+    """
+    own = sorted({*driven} - {(0, 0)})
+    fed: set[tuple[int, int]] = set(own)
+    for one, other in product(own, own):
+        for a, b in ((1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2)):
+            fed.add((a * one[0] + b * other[0], a * one[1] + b * other[1]))
+    upper = {(j, k) if k > 0 or (k == 0 and j > 0) else (-j, -k) for j, k in fed}
+    return tuple(sorted(upper - {(0, 0)}))
 
 
 def driven_by(load: HarmonicLoad) -> Harmonics:

@@ -15,7 +15,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.ladder import at_rest
-from stickslip.response.time.marcher import prepared
+from stickslip.response.time.marcher import prepared, step_work
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.solve.newton_method import newton
@@ -30,7 +30,6 @@ REPEATS = (
     1e-4  # change of the gaps' harmonics from period to period, of their size, that ends the march
 )
 SOLVER_STEP_FLOPS = 3e6  # of a Newton step, however few unknowns it has
-TIME_STEP_FLOPS = 1e4  # of a step in time, however small the structure is
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,5 +164,5 @@ def _affordable(problem: ForcedProblem, solved_points: Sequence[ForcedPoint], st
     if isinstance(structure, TunedWheel) or structure.of_harmonic(1).loss is not None:
         return 0
     spent = sum(p.iterations * (SOLVER_STEP_FLOPS + float(p.unknowns) ** 3) for p in solved_points)
-    step = TIME_STEP_FLOPS + 8.0 * structure.n**2 + float(3 * interface.n_contacts) ** 3
+    step = step_work(structure.n, 3 * interface.n_contacts)
     return min(PERIODS, int(spent / (STEPS * step * max(starts, 1))))

@@ -1,7 +1,7 @@
 """What is not periodic, in time: its envelope, its statistics and its spectrum, and whether these have settled.
 
 A motion that repeats itself never has no amplitude, but windows of it are alike once it has settled: the largest amplitude in a window, its mean
-and root mean square. The march is as long as that needs, or as a budget of time allows; of what it was, the later half counts.
+and root mean square. The march is as long as that needs, or as a budget of work allows; of what it was, the later half counts.
 """
 
 from dataclasses import dataclass, replace
@@ -23,6 +23,7 @@ KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared
 LEAST, MOST = 128, 2048  # periods
 ALIKE = 0.02  # relative spread between windows that counts as none
+WORK = 8e10  # floating point operations of a march, 20 s of them as a rule
 PEAKS = 6  # of a spectrum that are told
 FAINT = 1e-3  # of the largest peak: what is below is not told
 
@@ -46,7 +47,7 @@ class Course:
     overflowed
         Whether it grew beyond all numbers; the periods end before.
     seconds
-        That the march took.
+        That the march took; nothing depends on them.
     steps, angle
         In a period, and by which the fastest contact that opens or closes turns in one of them, rad.
     """
@@ -125,11 +126,11 @@ def course(  # noqa: PLR0913
     start: TransientStart,
     *,
     steps: int = 512,
-    budget: float = 20.0,
+    work: float = WORK,
     least: int = LEAST,
     most: int = MOST,
 ) -> Course:
-    """March until windows of the later half are alike, or the budget is spent.
+    """March until windows of the later half are alike, or the work is done.
 
     Parameters
     ----------
@@ -143,8 +144,8 @@ def course(  # noqa: PLR0913
         State at t = 0.
     steps
         In a period, at least: twice as many, and so on, where contacts open and close that are too stiff for the step.
-    budget
-        Seconds after which no more periods are begun.
+    work
+        Floating point operations, as `step_work` counts them, after which no more periods are begun: the same on an idle machine and a busy one.
     least, most
         Periods, in any case and at most.
     """
@@ -157,7 +158,7 @@ def course(  # noqa: PLR0913
     rows = marcher.modes.basis[outputs].T
     found: list[tuple[FloatArray, ...]] = []
     began, lost, until, angle = perf_counter(), False, least, 0.0
-    while len(found) < most and perf_counter() - began < budget:
+    while len(found) < most and len(found) * marcher.work < work:
         lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
         if lost:
             break

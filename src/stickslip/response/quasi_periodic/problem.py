@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.judging import driven_by, judging_indices
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.torus import (
     MOST_UNKNOWNS,
@@ -264,7 +265,7 @@ def with_enough(
     problem, motion
         What to begin with.
     most
-        Largest sum of harmonics that is taken; what is left out is looked for up to `BEYOND` more.
+        Largest sum of harmonics that is taken; what is left out is looked for up to `BEYOND` more, and in the judging set of the loads.
     tolerance
         Root mean square, relative.
     solve
@@ -275,10 +276,14 @@ def with_enough(
     TwoTones, TorusMotion
         The last that converged, `left_out` telling what is left out.
     """
-    candidates = half_plane(most + BEYOND)
+    side = problem.balance.side
+    own_tones = [(h, 0) for h in driven_by(side.first.load)]
+    own_tones += [(0, h) for h in driven_by(side.second.load)]
+    candidates = tuple(dict.fromkeys((*half_plane(most + BEYOND), *judging_indices(own_tones))))
+    highest = max(abs(j) + abs(k) for j, k in candidates)
     for raised in range(MOST_RAISES + 1):
         ratio = motion.omegas[1] / motion.omegas[0]
-        path = closed_path(ratio, most + BEYOND, 0.5)
+        path = closed_path(ratio, highest, 0.5)
         size = np.sum(np.abs(problem.balance.coefficients(motion.x)[1:]) ** 2)
         own = set(problem.balance.indices[1:])
         more = tuple(i for i in candidates if i not in own)

@@ -26,7 +26,13 @@ from stickslip.response.time.time_step import (
     run_steps,
 )
 
+STEP_FLOPS = 1e4  # of a step, however small the structure is
 LOG_NUMBERS = 4_000_000  # kept of the laws' derivatives before they are used up: 32 MB
+
+
+def step_work(coordinates: int, gaps: int) -> float:
+    """Return about how many floating point operations a step takes: of so many coordinates of a structure, and gaps, three a contact."""
+    return STEP_FLOPS + 8.0 * coordinates**2 + float(gaps) ** 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +109,11 @@ class Marcher:
         """Share that a period leaves of the slowest free motion, all contacts stuck."""
         step = np.linalg.eigvals(self.operators.transfer[: 2 * self.n])
         return float(np.abs(step).max(initial=0.0) ** self.steps)
+
+    @property
+    def work(self) -> float:
+        """Floating point operations of a period, about; see `step_work`."""
+        return self.steps * step_work(self.n, self.k)
 
     def turn(self, record: Record) -> float:
         """Return by how much the fastest contact that opens or closes in a record turns within a step, rad: pace times step.

@@ -33,7 +33,7 @@ from stickslip.study.analyses.forced.examining import (
     neighbours_of,
     with_stable_peak,
 )
-from stickslip.study.analyses.forced.in_time import check_in_time, chosen
+from stickslip.study.analyses.forced.in_time import FLOPS, check_in_time, chosen
 from stickslip.study.analyses.forced.kinematics import motion_at_peak
 from stickslip.study.analyses.forced.known import (
     doubts_of_model,
@@ -283,7 +283,7 @@ def _answer_in_time(
     if notes.get(NOT_PERIODIC) is not None:
         return
     answers = [
-        in_time_instead(question, response, omega, why, question.not_periodic_s, multiplier)
+        in_time_instead(question, response, omega, why, question.not_periodic_s * FLOPS, multiplier)
         for omega, why, multiplier in without_periodic(question, response, examined)
     ]
     for one in answers:

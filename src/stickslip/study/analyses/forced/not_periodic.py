@@ -135,7 +135,7 @@ def _alone(response: Response, examined: Sequence[Examined], one: Examined) -> b
 
 
 def in_time_instead(
-    question: Question, response: Response, omega: float, why: str, budget: float, multiplier: float = np.nan
+    question: Question, response: Response, omega: float, why: str, work: float, multiplier: float = np.nan
 ) -> Answer:  # fmt: skip
     """March at a frequency and say what the motion is like.
 
@@ -147,8 +147,8 @@ def in_time_instead(
         rad/s.
     why
         Why it is asked for.
-    budget
-        Seconds.
+    work
+        Floating point operations of the march, and of what is looked at with half the step.
     multiplier
         Modulus of that of the balance's motion, which says how long its disturbances take to grow; NaN where it is not known.
     """
@@ -156,14 +156,14 @@ def in_time_instead(
     if large := too_large(question):
         return _nothing(omega, why, count, f"not integrated: {large}")
     try:
-        found = _marched(question, response, omega, budget, multiplier)
+        found = _marched(question, response, omega, work, multiplier)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return _nothing(omega, why, count, f"not integrated: {error}")
     return _told(question, response, omega, why, found)
 
 
 def _marched(
-    question: Question, response: Response, omega: float, budget: float, multiplier: float
+    question: Question, response: Response, omega: float, work: float, multiplier: float
 ) -> _March:
     system, load = question.problem.system, question.model.load
     structure, contacts = system.structure, system.interface
@@ -185,10 +185,10 @@ def _marched(
     least = LEAST if np.isinf(needed) else int(np.clip(needed, LEAST, MOST_PERIODS))
     march = partial(course, structure, contacts, load, omega, system.outputs)
     most = max(MOST, min(2 * least, MOST_PERIODS))
-    found = march(start, steps=STEPS, budget=budget, least=least, most=most)
+    found = march(start, steps=STEPS, work=work, least=least, most=most)
     finer = None
     if found.angle > 0.0 and not found.overflowed:  # what opens and closes may depend on the step
-        finer = march(found.final, steps=2 * found.steps, budget=budget, most=LEAST)
+        finer = march(found.final, steps=2 * found.steps, work=work, most=LEAST)
     away = np.nan
     if near is not None and motion is not None and near.point.omega == omega:
         away = _away(found, motion[:, system.outputs])

@@ -66,7 +66,9 @@ class ForcedResponse(Section):
         "peak or the nearest such points to it; off: nothing",
     )
     not_periodic_s: Positive = Field(
-        5.0, description="seconds that each such motion may take, greater than zero"
+        5.0,
+        description="work that each such motion may take, in seconds of 4e9 operations, counted in steps and rows: as many periods on a busy machine "
+        "as on an idle one; greater than zero",
     )
     not_periodic_points: int = Field(
         2,

@@ -14,6 +14,7 @@ from stickslip.units import HZ
 
 ABOUT = {
     "output_name": ("output", "1", "output"),
+    "accuracy": ("", "1", "accuracy that is asked for, of the same measure as left_out"),
     "first_hz": ("point", "Hz", "first frequency"),
     "second_hz": ("point", "Hz", "second frequency; NaN where there is none"),
     "kind": ("point", "1", "two loads, second tone, no second tone or not found"),
@@ -55,6 +56,8 @@ def _of_case(solved: Solved) -> Variables:
     model = dict(solved.notes.get("model", {}))
     names = [str(name) for name in np.atleast_1d(model.pop("output", []))]
     values: dict[str, Any] = {"output_name": np.array(names, dtype=str)}
+    if (accuracy := model.pop("accuracy", None)) is not None:
+        values["accuracy"] = np.float64(accuracy)
     if points:
         values |= _of_points(points)
     return described(ABOUT, values, model)

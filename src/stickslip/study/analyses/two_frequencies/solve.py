@@ -29,7 +29,9 @@ def solve(
     question: Question, done: Sequence[TwoFrequencies], notes: Notes
 ) -> Iterator[TwoFrequencies]:
     """Yield the motions that are not done."""
-    notes.put("model", dict(question.facts) | {"output": list(question.model.output_labels)})
+    own = {"output": list(question.model.output_labels)}
+    asked = {"accuracy": 0.01 * question.asked.accuracy_percent}
+    notes.put("model", dict(question.facts) | own | asked)
     found = list(done)
     wanted = question.asked.first_hz
     for i, hz in enumerate(wanted):

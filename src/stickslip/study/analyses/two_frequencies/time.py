@@ -14,7 +14,6 @@ from stickslip.study.analyses.two_frequencies.question import Question
 STEPS = 256  # in a period of the faster frequency
 SHORT = 40  # turns of the first phase that two loads may take to repeat themselves in a comparison
 LONG = 20  # such repetitions at most
-BUDGET = 20.0  # seconds of a motion with a second tone
 
 
 def compared(
@@ -33,7 +32,7 @@ def compared(
     found = statistics(
         course(
             system.structure, contacts, question.first, motion.omegas[0], np.asarray(system.outputs), start,
-            steps=STEPS, budget=BUDGET,
+            steps=STEPS,
         )
     )  # fmt: skip
     return found.largest, found.least, np.nan

@@ -10,7 +10,7 @@ from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.units import millimetres_between
 
-LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful
+LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful whatever was asked for
 SLIP = 5e-3  # rad a turn, the same
 
 
@@ -36,9 +36,7 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
     if kind == "no second tone":
         return [_without(label, hz, why, str(case["unknown"].values[i]))]
     found = list(_unexamined(label, case, i))
-    if number("left_out") > LARGE:
-        left = f"combined frequencies left out would change the motion by {100 * number('left_out'):.2g} %"
-        found.append(Verdict("doubtful", label, hz, left, "Raise quasi_periodic.most_harmonics."))
+    found += _left_out(label, hz, number("left_out"), float(case.get("accuracy", LARGE)))
     if number("slip") > SLIP:
         off = f"contacts were marched at a ratio by which the second phase is off by {number('slip'):.2g} rad a turn"
         found.append(Verdict("doubtful", label, hz, off, "Take frequencies whose ratio is nearer to one of small numbers."))  # fmt: skip
@@ -54,6 +52,17 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
             told = f"in time the amplitude goes from {millimetres_between(ends[1][1], ends[0][1])}, the balance has {millimetres_between(ends[1][0], size)}"
             found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))  # fmt: skip
     return found
+
+
+def _left_out(label: str, hz: float, share: float, asked: float) -> list[Verdict]:
+    """Return a doubt where combined frequencies left out count, or count more than was asked for."""
+    if share <= min(asked, LARGE):
+        return []
+    left = f"combined frequencies left out would change the motion by {100 * share:.2g} %"
+    if share <= LARGE:
+        left += f", more than the {100 * asked:.3g} % that is asked for"
+    remedy = "Raise quasi_periodic.most_harmonics, or ask for less: accuracy_percent."
+    return [Verdict("doubtful", label, hz, left, remedy)]
 
 
 def _without(label: str, hz: float, why: str, unknown: str) -> Verdict:
