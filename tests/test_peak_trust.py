@@ -121,6 +121,12 @@ def test_half_the_points_of_a_contact_are_as_stiff_together():
     assert few.interface.n_contacts == n - left
     before, after = (s.interface.stuck_stiffness().reshape(-1, 3).sum() for s in (system, few))
     assert after == pytest.approx(before, rel=1e-12)
+    # each point lies between the two that it stands for: a body that turns meets the same moment
+    turned = np.repeat(place[:, 0], 3)
+    forces = [
+        s.interface.stuck_stiffness() * (s.interface.gap_operator @ turned) for s in (system, few)
+    ]
+    assert forces[1].sum() == pytest.approx(forces[0].sum(), rel=1e-12)
     assert halved(system, ["a"] * n, place, np.full(n, np.nan)) is None
 
 

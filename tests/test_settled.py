@@ -92,3 +92,19 @@ def test_solutions_that_disagree_take_the_place_of_what_they_correct():
     (true,) = ss.response.accepted_points(list(ss.forced_response(system, load, many)))
     assert problem.real_error(wrong, true) > 0.2
     assert problem.real_error(right, true) < 0.01
+
+
+def test_a_peak_of_fixed_harmonics_is_compared_with_more():
+    """Harmonics are fixed, the threshold is above all predictions: the peak of one harmonic is solved with more all the same, and replaced where these move it."""
+    system, load = chain(1)
+    sweep = replace(SWEEP, high=5, threshold=0.05)
+    points = solved(sweep)
+    problem = ss.response.forced_problem(system, load, sweep)
+    top = max(ss.response.accepted_points(points), key=problem.amplitude)
+    audits = audits_by_frequency(points)[top.omega]
+    most = max(audits, key=lambda p: p.harmonics.size)
+    assert most.harmonics.size > top.harmonics.size
+    assert top.order <= 5, "no point keeps more than the study allows"
+    assert problem.real_error(top, most) < sweep.threshold
+    again = solved(sweep, points[:-1])
+    assert [(p.stage, p.omega) for p in again] == [(p.stage, p.omega) for p in points]

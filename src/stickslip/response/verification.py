@@ -103,7 +103,7 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     if problem.system.interface.rigid:
         return float("nan")
     own = with_stiffness(problem.balance(point.support))
-    more = judging_balance(_with_waves(problem, own))
+    more = judging_balance(with_waves(problem, own, judging_set_of(own)[-1]))
     if more.harmonics == own.harmonics:
         return float("nan")  # the wheel has no more waves
     x = own.unknowns(point.coefficients)
@@ -112,9 +112,9 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     return found.error if known else max(found.error, UNSEEN)
 
 
-def _with_waves(problem: ForcedProblem, own: HarmonicBalance) -> HarmonicBalance:
-    """Return a problem condensed for its judging set, if the wheel has the waves."""
-    most, top = own.linear.most, judging_set_of(own)[-1]
+def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> HarmonicBalance:
+    """Return a problem condensed for harmonics up to `top`, if the wheel has the waves; else the problem itself."""
+    most = own.linear.most
     if most is None or most >= top:
         return own
     try:

@@ -266,9 +266,16 @@ class ForcedProblem:
 
     def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> float:
         """Return the largest relative difference of two motions (H+1, n_retained) at a frequency, a fraction of the first one."""
-        linear, rows = self.low.linear, self.measure.rows(len(one), len(other))
+        rows = self.measure.rows(len(one), len(other))
+        linear = self._linear_of(rows - 1)
         motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
         return self.measure.change(motion, exact - motion)[0]
+
+    def _linear_of(self, order: int) -> DynamicStiffness:
+        """Return a linear side with matrices for harmonics up to `order`; of a wheel that of a balance that has them."""
+        every = (self.low, self.high, *self.others.values())
+        known = (b.linear for b in every if b.linear.most is None or b.linear.most >= order)
+        return next(known, self.low.linear)
 
     @cached_property
     def driven(self) -> Harmonics:

@@ -9,10 +9,19 @@ from time import perf_counter
 
 import numpy as np
 
+from stickslip.harmonic.judging import REACH, SAMPLES_A_HARMONIC
+from stickslip.harmonic.support import Harmonics, multiples
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.along import AGREE, NEAR, SAFETY, SMALL
-from stickslip.response.forced.choices import Stage
-from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.forced.choices import RUNGS, Stage
+from stickslip.response.forced.problem import (
+    Balance,
+    ForcedPoint,
+    ForcedProblem,
+    forced_point,
+    with_stiffness,
+)
+from stickslip.response.verification import with_waves
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
@@ -55,7 +64,7 @@ def settle(
     ForcedPoint
         Points not in `stored`: ``settled`` (of a peak ``peak``), which takes the place of what it has more harmonics than; ``compared`` (``check``), to compare.
     """
-    if not problem.sweep.auto:
+    if not problem.strategy.verifies:
         return
     stages: tuple[Stage, Stage] = ("peak", "check") if of_peak else ("settled", "compared")
     budget = max(WORK, sum(map(_work, solved)))
@@ -65,17 +74,53 @@ def settle(
         mine = point.converged and (point.stage == "peak") == of_peak
         if mine and _open(problem, point, audits.get(point.omega, [])):
             yield from settling.settle(place)
+    if of_peak and problem.sweep.peak_points and not problem.sweep.auto:
+        yield from settling.settle_highest()
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
     """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
     bound, limit = point.predicted_error, problem.strategy.threshold
-    if bound == 0.0:
+    # nothing is predicted of repeats in the published passages
+    if bound == 0.0 or (np.isnan(bound) and not problem.sweep.auto):
         return False
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
     if most.harmonics.size > point.harmonics.size:
         return problem.real_error(point, most) > limit
     return not bound <= BELIEVED * limit
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Harmonics that a point may have, the fewest first, and more to compare with alone."""
+
+    standing: tuple[Harmonics, ...]
+    beyond: tuple[Harmonics, ...] = ()
+
+
+def _levels(problem: ForcedProblem) -> _Levels:
+    """Return those of a sweep: where the study fixes the repeats, no point keeps more than they do, and more are compared with."""
+    sweep = problem.sweep
+    if sweep.auto:
+        return _Levels(sweep.supports)
+    high = sweep.high_harmonics
+    step = multiples(high, high[-1])[1]
+    beyond = (multiples(high, step * rung) for rung in RUNGS)
+    return _Levels(
+        tuple(dict.fromkeys((sweep.low_harmonics, high))),
+        tuple(b for b in beyond if high[-1] < b[-1] <= REACH * high[-1]),
+    )
+
+
+def _balance(problem: ForcedProblem, support: Harmonics) -> Balance | None:
+    """Return the periodic problem with the harmonics of a level; None where a wheel has no waves for them."""
+    most = problem.low.linear.most
+    if support not in problem.others and most is not None and most < support[-1]:
+        wide = with_waves(problem, with_stiffness(problem.low), support[-1])
+        if wide.linear.most is not None and wide.linear.most < support[-1]:
+            return None
+        problem.others[support] = replace(wide, samples=max(wide.samples, SAMPLES_A_HARMONIC * support[-1])).with_harmonics(support)  # fmt: skip
+    return problem.balance(support)
 
 
 def _work(point: ForcedPoint) -> float:
@@ -90,37 +135,63 @@ class _Settling:
     stored: Iterator[ForcedPoint]
     stages: tuple[Stage, Stage]
     left: float  # work
+    spent: int = 0  # solutions of the point that is being settled
+
+    def settle_highest(self) -> Iterator[ForcedPoint]:
+        """Compare the highest point with more harmonics, and what is highest then, until that has been compared."""
+        seen: set[int] = set()
+        for _ in range(SOLUTIONS):
+            heights = [self.problem.amplitude(p) if p.converged else -np.inf for p in self.known]
+            top = int(np.argmax(heights)) if heights else -1
+            if top < 0 or top in seen or not self.known[top].converged:
+                return
+            seen.add(top)
+            yield from self.settle(top)
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
         """Raise the harmonics of a point until the motion stays, a solution after the other."""
-        problem, spent, lost = self.problem, 0, 0
-        limit = AGREE * problem.strategy.threshold
-        for support in problem.sweep.supports:
+        lost, levels = 0, _levels(self.problem)
+        limit, self.spent = AGREE * self.problem.strategy.threshold, 0
+        for support in (*levels.standing, *levels.beyond):
             here = self.known[place]
             if len(support) <= here.harmonics.size or not set(here.support) <= set(support):
                 continue
-            balance, change = problem.balance(support), np.inf
-            more: ForcedPoint | None = None
-            for make in self._ways(place, balance):
-                if spent == SOLUTIONS or self.left <= 0.0:
-                    return
-                spent += 1
-                found = yield from self._take(make)
-                off = problem.real_error(here, found) if found.converged else np.inf
-                if off < change:
-                    more, change = found, off
-                if change <= NEAR:
-                    break
+            more, change = yield from self._nearest(place, support)
+            if self._exhausted and more is None:
+                return
             if more is None:
                 lost += 1  # what one level does not find the next may
                 if lost == LOST:
                     return
                 continue
-            if change <= limit:
+            if change <= limit or support in levels.beyond:
                 return
-            last = support == problem.sweep.supports[-1]
+            last = not levels.beyond and support == levels.standing[-1]
             bound = CAP_SAFETY * change if last else np.nan
             self.known[place] = yield from self._take(lambda p=more, b=bound: self._raised(p, b))  # type: ignore[misc]
+
+    @property
+    def _exhausted(self) -> bool:
+        return self.spent == SOLUTIONS or self.left <= 0.0
+
+    def _nearest(
+        self, place: int, support: Harmonics
+    ) -> Generator[ForcedPoint, None, tuple[ForcedPoint | None, float]]:
+        """Solve a point with the harmonics of a level, and return what is nearest to it with the change to that; None where nothing is found."""
+        here, balance = self.known[place], _balance(self.problem, support)
+        more: ForcedPoint | None = None
+        change = np.inf
+        for make in self._ways(place, balance) if balance is not None else ():
+            if self._exhausted:
+                return None, np.inf
+            self.spent += 1
+            found = yield from self._take(make)
+            off = self.problem.real_error(here, found) if found.converged else np.inf
+            if off < change:
+                more, change = found, off
+            if change <= NEAR:
+                break
+        return more, change
 
     def _ways(self, place: int, balance: Balance) -> Iterator[Callable[[], ForcedPoint]]:
         """Yield ways to the motion with more harmonics: from that with fewer, then from neighbours that have as many."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from stickslip.response.stability.found import Stability
 from stickslip.response.stability.hill_modes import HillSide
 from stickslip.response.stability.hill_segment import Hill, Keep, not_kept
 from stickslip.response.stability.hill_spectrum import Exponents, exponents, segments_of
-from stickslip.response.stability.missing_harmonics import corrected
+from stickslip.response.stability.missing_harmonics import corrected, more_harmonics
 from stickslip.response.stability.waves import WaveDisturbance
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
@@ -40,6 +41,7 @@ DECIDING, CLOSE = (
     -0.03,
     3e-3,
 )  # real part of exponents that decide; what harmonics beyond may change in these
+FURTHER_MOTIONS = 2  # with more harmonics, where a verdict stays open
 COMPARED = 3  # of them, those that grow most,
 NEAR = 0.95  # and the others count with the largest change of those that are as near to the largest one, or farther from it
 
@@ -117,7 +119,38 @@ def hill_stability(
     elif more is not None:
         solved, _ = _of_point(system, problem, point, hill.order, keep)  # with the same modes
         change = change if solved is None else times * _changes(found, solved)
-    return _judged(found, change, states, hill)
+    first = _judged(found, change, states, hill)
+    if first.missing or more is None or better is point:
+        return first
+    return _climbed(
+        problem,
+        replace(point, coefficients=better.coefficients, harmonics=better.harmonics),
+        hill,
+        found,
+        first,
+        keep,
+    )
+
+
+def _climbed(
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    hill: Hill,
+    found: Exponents,
+    first: HillStability,
+    keep: Keep,
+) -> HillStability:
+    """Return what the motion with about twice the harmonics says, and the one with twice these, where the first leaves the verdict open."""
+    system, best = problem.system.at(point.omega), first
+    for more in islice(more_harmonics(problem, point), FURTHER_MOTIONS):
+        if best.stability.settled:
+            break
+        now, states = _of_point(system, problem, more.point, hill.order, keep)
+        if now is None or states is None:
+            break
+        last, found, hill = found, exponents(now), now
+        best = _judged(found, _distances(found, last, now), states, now)
+    return best
 
 
 @by_one_thread

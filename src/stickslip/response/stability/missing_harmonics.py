@@ -1,5 +1,6 @@
 """What the harmonics that a motion lacks change in it: a Newton step with more of them, or as many as it takes."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,9 @@ FACTOR, MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and
 MOST = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
 FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harmonics beyond it change as much again
 STEP_WORK = 1e6  # floating point operations of a Newton step for each of its unknowns
+MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
+MOST_ROWS = 4500  # and of its unknowns
+SOLUTIONS = 10  # of a point, at most
 LEAST = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
@@ -72,6 +76,23 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
         return None
     work = max(found.iterations, 1) * newton_work(start.size)
     return Corrected(_point(point, high, found.x), work)
+
+
+def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
+    """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
+    reached, order = point, max(FACTOR * point.order + MORE, LEAST)
+    for _ in range(SOLUTIONS):
+        order = min(order, MOST_HARMONICS)
+        if order <= reached.order or problem.system.retained.size * (2 * order + 1) > MOST_ROWS:
+            return
+        more = solved_with(problem, reached, order)
+        if more is None:
+            order = (reached.order + order) // 2
+            continue
+        if more.point.order <= reached.order:
+            return  # a wheel has no more waves
+        yield more
+        reached, order = more.point, FACTOR * order + MORE
 
 
 def newton_work(rows: int) -> float:

@@ -1,6 +1,5 @@
 """The stability of a solved point, asked with more harmonics until it is known on which side of the unit circle its multipliers lie."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,20 +8,10 @@ from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.found import Stability, changes
-from stickslip.response.stability.missing_harmonics import (
-    FACTOR,
-    LEAST,
-    MORE,
-    Corrected,
-    corrected_by_step,
-    solved_with,
-)
+from stickslip.response.stability.missing_harmonics import corrected_by_step, more_harmonics
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
 
-MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
-MOST_ROWS = 4500  # and of its unknowns
-SOLUTIONS = 10  # of a point, at most
 ROUGHLY = 3.0  # times the change by one Newton step that a multiplier may be off
 FIRST = 2.0  # times the change from the motion as it was solved
 OTHER = 2.0  # times more for either where the numbers of transitions differ
@@ -76,7 +65,7 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
         if not found.unknown:
             best = _compared(found, first, ROUGHLY)
     last, times = first, FIRST
-    for more in _solutions(problem, point):
+    for more in more_harmonics(problem, point):
         if best.settled:
             break
         found = of_point(problem, more.point)
@@ -86,23 +75,6 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
         best = _compared(found, last, times)
         last, times = _Rung(more.point, found), 1.0
     return replace(best, work=work)
-
-
-def _solutions(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
-    """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
-    reached, order = point, max(FACTOR * point.order + MORE, LEAST)
-    for _ in range(SOLUTIONS):
-        order = min(order, MOST_HARMONICS)
-        if order <= reached.order or problem.system.retained.size * (2 * order + 1) > MOST_ROWS:
-            return
-        more = solved_with(problem, reached, order)
-        if more is None:
-            order = (reached.order + order) // 2
-            continue
-        if more.point.order <= reached.order:
-            return  # a wheel has no more waves
-        yield more
-        reached, order = more.point, FACTOR * order + MORE
 
 
 def of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:

@@ -7,7 +7,14 @@ import numpy as np
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.response.forced.resonance import peak_from
-from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.forced.response import (
+    ForcedPoint,
+    ForcedProblem,
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
 from stickslip.response.physics.fewer_points import halved
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
@@ -19,6 +26,8 @@ from stickslip.units import HZ
 Change = tuple[float, float]  # relative change of the amplitude, change of the frequency in Hz
 Found = tuple[ForcedProblem, ForcedPoint] | None
 UNKNOWN: Change = (float("nan"), float("nan"))
+BESIDE = 0.03  # half the width of a sweep about a peak, relative to its frequency,
+SWEPT_POINTS = 12  # and its points
 PEAK_POINTS = 4  # that resolve a peak found again
 AT_AN_END = (
     1e-9  # relative distance from an end of the sweep: no resonance, compared at its own frequency
@@ -76,6 +85,21 @@ def _change(response: Response, own: Found, other: Found) -> Change:
     return after / before - 1.0, (other[1].omega - own[1].omega) / HZ
 
 
+def _swept(
+    system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint
+) -> ForcedPoint | None:
+    """Find a peak by a short sweep, where the solution at a point does not lead to that of another model; None where it is an end of that."""
+    around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
+    short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
+    problem = forced_problem(system, load, short)
+    found = [p for p in accepted_points(list(forced_response(system, load, short))) if p.converged]
+    top = max(found, key=problem.amplitude, default=None)
+    inside = top is not None and min(p.omega for p in found) < top.omega < max(
+        p.omega for p in found
+    )
+    return top if inside else None
+
+
 def _found(question: Question, system: System, load: HarmonicLoad, point: ForcedPoint) -> Found:
     """Find the peak of a system near a point; at the frequency of the point where frequencies are listed, or it is the end of the sweep."""
     own = point.support
@@ -84,7 +108,7 @@ def _found(question: Question, system: System, load: HarmonicLoad, point: Forced
     problem = forced_problem(system, load, sweep)
     ends = np.array(question.sweep.omega_range)
     if not np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) and not question.sweep.grid.size:
-        peak = peak_from(problem, point)
+        peak = peak_from(problem, point) or _swept(system, load, sweep, point)
         return None if peak is None else (problem, peak)
     balance = problem.balance(own)
     start = balance.unknowns(point.coefficients)

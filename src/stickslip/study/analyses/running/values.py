@@ -132,7 +132,10 @@ def _of_points(along: Along, response: Response) -> Values:
         "amplitude": np.array([a.amplitudes(outputs) for a in every]).reshape(-1, outputs),
         "converged": np.array([int(a.point.converged) for a in every]),
         "harmonic": np.array([a.point.order for a in every]),
-        "error": np.array([a.own_error for a in every]),
+        # what was solved tells more than a prediction
+        "error": np.array(
+            [a.own_error if np.isnan(a.audit_error) else a.audit_error for a in every]
+        ),
         "dissipated_w": states[:, 0],
         "slipping": states[:, 1],
         "opening": states[:, 2],
