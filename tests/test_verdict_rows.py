@@ -153,6 +153,8 @@ MODE_ROWS: list[Row] = [
     ({"end": ["gross slip"]}, [FOLLOWED]),
     ({"end": ["lift-off at 1 mm"]}, [("note", "mode 3: lift-off at 1 mm", "Beyond it"), FOLLOWED]),
     ({"end": ["the step is too small"]}, [("doubtful", "the step is too small", "more points")]),
+    ({"end": ["amplitude reached; internal resonance of harmonic 3 from 1 to 2 mm"]}, [("warning", "mode 3: internal resonance of harmonic 3 from 1 to 2 mm", "Several motions"), FOLLOWED]),
+    ({"end": ["amplitude reached; stepped over an internal resonance of harmonic 3 from 1 to 2 mm"]}, [("doubtful", "stepped over an internal resonance", "amplitude_mm")]),
     ({"end": ["amplitude reached, taken up again"]}, [("doubtful", "0 of its points are no motions", "another mode")]),
     ({"problem": ["mode 3: no such mode."]}, [("doubtful", "mode 3: no such mode.")]),
     ({"status": [[0, 1, 0]], "change": [[0.0, NAN, 0.0]]}, [("doubtful", "1 of its points are no motions")]),

@@ -17,7 +17,7 @@ IDLE = 2.0  # multiples of the smallest number of points without a step's gain a
 PATIENCE = 80  # points that it is given in any case: a sharp resonance takes some tens of them, however few were asked for
 BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
 
-Kind = Literal["point", "audit", "trial", "found"]
+Kind = Literal["point", "audit", "trial", "found", "between"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Followed:
     kind
         ``point``: a point of the branch; it takes the place of all that had its index or a higher one. ``audit``: the same motion with more harmonics, to
         compare. ``trial``: the same with fewer, from which the branch goes on. ``found``: takes the place of the
-        point of its index alone, which was no solution.
+        point of its index alone, which was no solution. ``between``: stands behind the point of its index, once the branch is at its end.
     index
         Position along the branch.
     level
@@ -276,4 +276,6 @@ def branch_of(every: Iterable[P]) -> list[P]:
             branch[one.index :] = [one]
         elif one.kind == "found":
             branch[one.index] = one
+        elif one.kind == "between":
+            branch.insert(one.index + 1, one)
     return branch

@@ -221,6 +221,8 @@ class ForcedCurve:
 
     def stage_of(self, found: Followed) -> Stage:
         """Return the name under which a solution is written down."""
+        if found.kind == "between":
+            raise ValueError("no response has points between those of its branch")
         return "low" if found.kind == "point" and not self.raises else found.kind
 
     def height(self, found: Followed) -> float:

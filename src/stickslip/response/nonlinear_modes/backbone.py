@@ -18,6 +18,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, Route, branch_of
 from stickslip.response.follow import LEAPS, follow
+from stickslip.response.nonlinear_modes.closer import LOCATED, TAKES_PART, Closer
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.contacts import Contacts, contacts_of, leaving
@@ -26,8 +27,10 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
 from stickslip.solve.status import Status
-from stickslip.units import millimetres
+from stickslip.units import millimetres, millimetres_between
 
+MEETS, OVER = "internal resonance", "stepped over an internal resonance"
+ROUNDED = 1e-9
 Concept = Literal["periodic", "decaying"]
 BEGINS = 0.5  # of the amplitude at which slip begins
 ENDS, GROSS = (
@@ -35,6 +38,7 @@ ENDS, GROSS = (
     1e5,
 )  # times that amplitude: where a curve ends, and where at the latest one to gross slip does
 TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
+CLOSER = 30  # points at least that may be put between those of a curve
 LOST = 3  # points in a row that are not found, after which a curve is at its end
 
 
@@ -181,6 +185,15 @@ class ModeWay:
 
     def follow(self, done: Sequence[Followed] = ()) -> Iterator[Followed]:
         """Yield what is found on the way to the end of the mode, or to where it is lost for good, and is not in `done`, what an interrupted run has yielded."""
+        every = [one for one in done if one.kind != "between"]
+        for one in self._followed(tuple(every)):
+            every.append(one)
+            yield one
+        between = [one for one in done if one.kind == "between"]
+        yield from Closer(self.curve, branch_of(every)).run(max(self.route.points, CLOSER), between)
+
+    def _followed(self, done: Sequence[Followed]) -> Iterator[Followed]:
+        """Yield what is found on the way and is not in `done`."""
         branch: list[Followed] = []
         for i, one in enumerate(chain(done, follow(self.curve, self.route, done))):
             if i >= len(done):
@@ -203,7 +216,20 @@ class ModeWay:
         end += (
             f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
         )
+        end += self._resonances(found, made)
         return Backbone(own.system, own.load, own.mode, own.dof, made, end)
+
+    def _resonances(self, found: Sequence[Followed], made: Sequence[ModePoint]) -> str:
+        """Say where harmonics of the mode meet other modes that take part, or may; empty where none does."""
+        said = []
+        for one in Closer(self.curve, list(found)).crossings():
+            ends = (made[one.first].amplitude, made[one.last].amplitude)
+            at = f"from {millimetres_between(min(ends), max(ends), 5)}"
+            if one.width > LOCATED * (1.0 + ROUNDED):
+                said.append(f"{OVER} of harmonic {one.harmonic} {at}")
+            elif one.share > TAKES_PART:
+                said.append(f"{MEETS} of harmonic {one.harmonic} {at}")
+        return "".join(f"; {text}" for text in dict.fromkeys(said))
 
     def _ends(self, branch: Sequence[Followed], one: Followed) -> bool:
         """Whether a mode is at its end with the latest point."""

@@ -88,7 +88,7 @@ def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> Mode
     """Return what is kept of what was found on the way along a mode of a wave."""
     point, solution = found.point, found.point.solution
     told, moved = np.full(len(NUMBERS), np.nan), _nothing()
-    if found.converged and found.kind in ("point", "found"):
+    if found.converged and found.kind in ("point", "found", "between"):
         motion = mode_point(way.curve, found)
         told[:] = [getattr(motion, name) for name in NUMBERS]
         moved = np.stack([motion.coefficients.real, motion.coefficients.imag], axis=-1)

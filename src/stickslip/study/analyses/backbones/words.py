@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from stickslip.response.nonlinear_modes.backbone import MEETS, OVER
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.cycles.words import branch_name
@@ -55,6 +56,7 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
         found.append(Verdict("trusted", label, None, why, "Beyond it contacts hold nothing together that vibrates periodically in this mode."))  # fmt: skip
     elif not end.startswith(("amplitude reached", "gross slip")):
         found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))  # fmt: skip
+    found += _of_resonances(label, name, end)
     status = case["status"].values[i]
     gaps = int(np.count_nonzero(status > 0))
     solved = np.flatnonzero(status == 0)
@@ -63,6 +65,19 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
         why = f"{name}: it was lost and taken up again further on; {gaps} of its points are no motions"
         found.append(Verdict("doubtful", label, None, why, "What lies beyond may be another mode."))
     return found + _of_harmonics(label, name, case, i)
+
+
+def _of_resonances(label: str, name: str, end: str) -> list[Verdict]:
+    """Return what is to be thought of harmonics that meet other modes."""
+    told = [text for text in end.split("; ") if MEETS in text]
+    over = [text for text in told if text.startswith(OVER)]
+    if over:
+        remedy = "Give nonlinear_mode.amplitude_mm around it, with more points: other motions of the same amplitude exist there."
+        return [Verdict("doubtful", label, None, f"{name}: {'; '.join(over)}", remedy)]
+    if not told:
+        return []
+    remedy = "Several motions of one amplitude may exist there, and a forced response near it has more than one peak."
+    return [Verdict("trusted", label, None, f"{name}: {'; '.join(told)}", remedy, warns=True)]
 
 
 def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:

@@ -1,0 +1,227 @@
+"""Points between those of a nonlinear mode, where these do not tell enough: at knees, at extremes, and where a harmonic passes the frequency of another mode.
+
+A branch that is followed by steps of the shape's change goes past what is narrower than a step. Three tests say where: a point that its neighbours
+do not foretell; the parabola through a largest or least value and its neighbours, whose top is off that value; and the number of negative eigenvalues
+of the symmetric part of the Jacobian's block of a harmonic h above the first, which changes where another mode has the frequency hω.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+from scipy.interpolate import PchipInterpolator
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.factors import as_array
+from stickslip.operators import array_of
+from stickslip.response.branch import Followed
+from stickslip.response.nonlinear_modes.levels import FAINT_RATIO, ModeCurve
+from stickslip.response.self_excited.problem import SelfExcited
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import newton
+
+KNEE = 0.02  # relative difference of frequency or damping ratio from what neighbours foretell
+EXTREME = 1e-3  # relative difference of the top of a parabola from the largest or least value that is known
+LOCATED = 0.01  # of ln a: interval in which a harmonic passes the frequency of another mode
+SILENT = 1e-6  # of the first harmonic: what a harmonic has that no force acts on
+TAKES_PART = 0.03  # of the speed of the first harmonic, by which another mode changes a harmonic as it is passed, from where it takes part
+MOST_ROWS = 400  # of a harmonic's block whose eigenvalues are counted
+SHORTEST = 1e-3  # of ln a: points are not set closer
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a harmonic of a mode passes the frequency of another mode.
+
+    Attributes
+    ----------
+    harmonic
+        Which one.
+    first, last
+        Indices of the points between which it does.
+    share
+        By how much the speed of that harmonic changes between them, over that of the first one: a mode that takes part turns its sign there.
+    width
+        Of the interval, of ln a.
+    """
+
+    harmonic: int
+    first: int
+    last: int
+    share: float
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """What the tests see of a point: ln a, frequency and damping ratio, the motion (H + 1, n) over a, and of each harmonic from 2 on the number of modes below it."""
+
+    p: float
+    numbers: FloatArray
+    motion: ComplexArray
+    negative: tuple[int, ...]
+
+
+@dataclass(eq=False)
+class Closer:
+    """Looks for points between those of a branch.
+
+    Parameters
+    ----------
+    curve
+        The motions.
+    branch
+        Its points, in their order; points between them are put there.
+    """
+
+    curve: ModeCurve
+    branch: list[Followed]
+    _places: dict[int, _Place] = field(default_factory=dict, repr=False)
+    _left: set[tuple[float, float]] = field(default_factory=set, repr=False)
+    _inside: dict[int, FloatArray] = field(default_factory=dict, repr=False)
+
+    def run(self, most: int, done: Sequence[Followed] = ()) -> Iterator[Followed]:
+        """Yield up to `most` points that are not in `done`, each to be put behind the point of its index."""
+        stored, added = list(done), 0
+        while added < most:
+            need, i = max(self._needs(), default=(0.0, -1))
+            if need <= 1.0:
+                return
+            made = stored.pop(0) if stored and stored[0].index == i else self._between(i)
+            if made is None:
+                self._left.add((self.branch[i].p, self.branch[i + 1].p))
+                continue
+            self.branch.insert(i + 1, made)
+            added += 1
+            if not any(made is one for one in done):
+                yield made
+
+    def crossings(self) -> list[Crossing]:
+        """Return where harmonics that move pass frequencies of other modes."""
+        found = []
+        for i, (one, other) in enumerate(self._pairs()):
+            for k, (a, b) in enumerate(zip(one.negative, other.negative, strict=False), 2):
+                if a != b and max(self._speed(k, m.motion[k]) for m in (one, other)) > SILENT:
+                    share = self._speed(k, other.motion[k] - one.motion[k])
+                    found.append(Crossing(k, i, i + 1, share, abs(other.p - one.p)))
+        return found
+
+    # --- where ----------------------------------------------------------------------------------
+
+    def _needs(self) -> Iterator[tuple[float, int]]:
+        """Yield by how much each test asks for a point behind that of an index: above 1 it does."""
+        wanted = [*self._of_knees(), *self._of_extremes()]
+        wanted += [(c.width / LOCATED, c.first) for c in self.crossings()]
+        for need, i in wanted:
+            a, b = self.branch[i].p, self.branch[i + 1].p
+            if abs(a - b) > SHORTEST and (a, b) not in self._left:
+                yield need, i
+
+    def _of_knees(self) -> Iterator[tuple[float, int]]:
+        places = [self._place(f) for f in self.branch if f.converged]
+        if len(places) < len(self.branch) or len(places) < 5:
+            return
+        along = np.append(0.0, np.cumsum(np.abs(np.diff([p.p for p in places]))))
+        numbers = np.array([p.numbers for p in places])
+        size = np.maximum(np.abs(numbers), [0.0, FAINT_RATIO])
+        for i in range(1, len(places) - 1):
+            others = np.delete(np.arange(len(places)), i)
+            if np.any(np.diff(along[others]) <= 0.0):
+                continue
+            foretold = PchipInterpolator(along[others], numbers[others])(along[i])
+            off = float(np.max(np.abs(foretold - numbers[i]) / size[i]))
+            yield off / KNEE, i - 1
+            yield off / KNEE, i
+
+    def _of_extremes(self) -> Iterator[tuple[float, int]]:
+        values = np.array([self._place(f).numbers if f.converged else [np.nan] * 2 for f in self.branch])  # fmt: skip
+        for column, tests in ((1, (1.0,)), (0, (1.0, -1.0))):
+            for sign in tests:
+                own = sign * values[:, column]
+                if not np.any(np.isfinite(own)):
+                    continue
+                i = int(np.nanargmax(own))
+                if not 0 < i < len(own) - 1 or abs(own[i]) < (FAINT_RATIO if column else 0.0):
+                    continue
+                p = np.array([f.p for f in self.branch[i - 1 : i + 2]])
+                yield from _of_top(p, own[i - 1 : i + 2], i)
+
+    # --- what -----------------------------------------------------------------------------------
+
+    def _pairs(self) -> Iterator[tuple[_Place, _Place]]:
+        nothing = _Place(0.0, np.full(2, np.nan), np.zeros((0, 0), dtype=complex), ())
+        every = [self._place(f) if f.converged else nothing for f in self.branch]
+        return pairwise(every)
+
+    def _place(self, found: Followed) -> _Place:
+        if id(found) not in self._places:
+            own, x = self.curve.problems[found.level], found.point.x
+            numbers = np.array(self.curve.frequency_and_damping(found.level, x))
+            omega = own.omega(x)
+            motion = self.curve.linear(found.level, x).recover(omega, own.relative(x))
+            motion = motion / self._speed(1, motion[1])
+            self._places[id(found)] = _Place(found.p, numbers, motion, self._negative(found))
+        return self._places[id(found)]
+
+    def _speed(self, harmonic: int, moving: ComplexArray) -> float:
+        """Return the root of X^H M X of a harmonic (n,), times its number."""
+        mass = self.curve.problems[0].system.structure.of_harmonic(harmonic).mass
+        return harmonic * float(np.sqrt(max(np.vdot(moving, mass @ moving).real, 0.0)))
+
+    def _negative(self, found: Followed) -> tuple[int, ...]:
+        """Return the number of modes below the frequency of each harmonic from 2 on: of the condensed block and, by Haynsworth's rule, of the interior."""
+        own = self.curve.problems[found.level]
+        n, omega = own.balance.linear.n, own.omega(found.point.x)
+        if max(2 * n, own.system.structure.n) > MOST_ROWS:
+            return ()
+        whole = array_of(self.curve.problem(found.level).linearise(found.point.x, found.p).jac)
+        if whole is None:
+            return ()
+        counts = []
+        for h in range(2, own.balance.order + 1):
+            place = n * (2 * h - 1)
+            block = whole[place : place + 2 * n, place : place + 2 * n]
+            below = np.linalg.eigvalsh(block + block.T) < 0.0
+            inside = (h * omega) ** 2 * self._interior(own, h) > 1.0
+            counts.append(int(np.sum(below)) // 2 + int(np.sum(inside)))
+        return tuple(counts)
+
+    def _interior(self, own: SelfExcited, harmonic: int) -> FloatArray:
+        """Return one over the squares of the frequencies, s²/rad², that the condensed coordinates have with the retained ones at rest."""
+        if harmonic not in self._inside:
+            side = own.system.structure.of_harmonic(harmonic)
+            inner = np.setdiff1d(np.arange(own.system.structure.n), own.balance.linear.retained)
+            K, M = (as_array(m)[np.ix_(inner, inner)] for m in (side.stiffness, side.mass))
+            squares = scipy.linalg.eigvalsh(M, K) if inner.size else np.zeros(0)
+            self._inside[harmonic] = np.asarray(squares, dtype=float)
+        return self._inside[harmonic]
+
+    def _between(self, i: int) -> Followed | None:
+        """Return the motion in the middle behind a point; None where none is near both."""
+        one, other = self.branch[i], self.branch[i + 1]
+        level, p = max(one.level, other.level), 0.5 * (one.p + other.p)
+        problem = self.curve.problems[level]
+        latest = Latest(self.curve.problem(level))
+        ends = [self.curve.lifted(f.point.x, f.level, level) for f in (one, other)]
+        solution = newton(lambda y: latest.linearise(y, p), 0.5 * (ends[0] + ends[1]), problem.how.newton)  # fmt: skip
+        if not solution.status.converged:
+            return None
+        point = Point(solution.x, p, np.zeros(solution.x.size + 1), 0.0, solution, 0.0)
+        made = Followed("between", i, level, point, self.curve.judge(level, point, latest), 0.0)
+        return made if all(self.curve.near(f, made) for f in (one, other)) else None
+
+
+def _of_top(p: FloatArray, values: FloatArray, i: int) -> Iterator[tuple[float, int]]:
+    """Yield by how much the top of the parabola through the largest value, that of index `i`, and its neighbours is off it, behind which point."""
+    if not np.all(np.isfinite(values)) or not (p[0] < p[1] < p[2] or p[0] > p[1] > p[2]):
+        return
+    a, b, c = np.polyfit(p - p[1], values, 2)
+    if a >= 0.0:
+        return
+    top = c - 0.25 * b * b / a
+    place = -0.5 * b / a
+    need = float(abs(top - values[1]) / max(abs(values[1]), 1e-300)) / EXTREME
+    yield need, i if place * (p[2] - p[1]) > 0.0 else i - 1
