@@ -59,6 +59,26 @@ def test_the_middle_branch_of_a_hardening_oscillator_is_unstable() -> None:
     assert max(largest[0], largest[2]) < 0.99
 
 
+def test_the_turn_of_a_branch_is_found_beside_its_frequency() -> None:
+    """Just beyond a turn no motion of the branch has the told frequency: the nearest is the turn's own, and farther off none of it counts."""
+    machine = one_mass(Contact("cubic", ONE, 0 * ONE, stiffness=1.0), 0.3, damping=0.1)
+    omega, step = 1.7796, 2e-5
+    motion = np.array([[0j], [-0.08 - 1.67j]])
+    while step > 2e-7:
+        found = Judge(machine, omega + step).orbit(motion)
+        if found is not None and found.shift == 0.0:
+            omega, motion = omega + step, found.motion
+        else:
+            step /= 10
+    beyond = Judge(machine, omega * (1 + 4e-6)).orbit(motion)
+    assert beyond is not None
+    assert 1e-6 < beyond.shift < 1e-5
+    assert beyond.motion[1, 0] == pytest.approx(motion[1, 0], rel=0.01)
+    assert abs(beyond.multiplier - 1.0) <= beyond.multiplier_error
+    far = Judge(machine, omega * (1 + 1e-3)).orbit(motion)
+    assert far is None or abs(far.motion[1, 0] / motion[1, 0] - 1.0) > 0.5
+
+
 def test_machines_are_the_same_whenever_they_are_drawn() -> None:
     """A seed and a number are enough; all families are drawn, and all structures are held."""
     families = set()

@@ -2,6 +2,9 @@
 
 The march is the classical Runge-Kutta method with steps of the same length. A slider's place is part of the state and moves at the end of each step as
 far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
+
+Newton's method at the told frequency may leave for another motion, or find none, where the branch turns: there the motion and the frequency of the
+branch's nearest point are solved for together (Gauss-Newton steps of least length). It counts where its frequency is that of the point within `NEARBY`.
 """
 
 from dataclasses import dataclass
@@ -23,6 +26,9 @@ NEWTON = 25  # iterations
 CLOSED = 1e-8  # residual of a period over the size of the motion
 NUDGE = 1e-6  # difference step over the size of the motion
 HARMONICS = 6  # that are compared
+NEARBY = 1e-5  # relative difference of frequencies: at most 2 % of an amplitude with a damping ratio of 5e-4
+ALIKE = 0.05  # of the largest amplitude: what is farther from the told motion is looked for beside the told frequency
+TURN = 1e-3  # relative change of the frequency that counts as much as a change of the motion by its amplitude
 
 
 @numba.njit(cache=True)
@@ -108,12 +114,23 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
 
 @dataclass(frozen=True)
 class Orbit:
-    """A periodic motion: Fourier coefficients (harmonics, n), largest modulus of its multipliers, and the judge's own errors of both."""
+    """A periodic motion: Fourier coefficients (harmonics, n), largest modulus of its multipliers, the judge's own errors of both, and its frequency's relative distance."""
 
     motion: npt.NDArray[np.complex128]
     motion_error: float
     multiplier: float
     multiplier_error: float
+    shift: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Closed:
+    """A motion that closes: state at t = 0, rad/s, Fourier coefficients, largest modulus of its multipliers."""
+
+    state: Array
+    omega: float
+    motion: npt.NDArray[np.complex128]
+    multiplier: float
 
 
 class Judge:
@@ -144,7 +161,7 @@ class Judge:
         fastest = float(np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stuck)))))
         self.steps = int(np.clip(2 * np.pi * fastest / omega / ANGLE, LEAST_STEPS, MOST_STEPS))
 
-    def flow(self, state: Array, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_]]:  # fmt: skip
+    def flow(self, state: Array, omega: float, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_]]:  # fmt: skip
         """Return the state (2n + contacts,) after a period, the motion's Fourier coefficients, and which sliders moved."""
         n = len(self.machine.mass)
         q, v, place = state[:n].copy(), state[n : 2 * n].copy(), state[2 * n :].copy()
@@ -153,7 +170,7 @@ class Judge:
         m = self.machine
         period(
             self.inverse, m.damping, m.stiffness, self.kind, self.tangent, self.normal, self.number,
-            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, self.omega, steps, q, v, place, moved, sums,
+            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, omega, steps, q, v, place, moved, sums,
         )  # fmt: skip
         return np.concatenate([q, v, place]), sums[0] + 1j * sums[1], moved
 
@@ -171,41 +188,75 @@ class Judge:
         return np.concatenate([q, v, place])
 
     def orbit(self, motion: npt.NDArray[np.complex128]) -> Orbit | None:
-        """Return the periodic motion that Newton's method finds from a motion (H+1, n); None where it finds none."""
+        """Return the periodic motion beside a motion (H+1, n), at its frequency or where the branch passes nearest to it; None where none is found."""
         begin = self.start(motion)
-        one = self._shoot(begin, self.steps)
-        two = None if one is None else self._shoot(one[0], 2 * self.steps)
+        own = self._orbit(begin, free=False)
+        if own is not None and self._apart(own, motion) <= ALIKE:
+            return own
+        near = self._orbit(begin, free=True)
+        if near is not None and near.shift <= NEARBY and self._apart(near, motion) <= ALIKE:
+            return near
+        return own
+
+    def _apart(self, orbit: Orbit, motion: npt.NDArray[np.complex128]) -> float:
+        driven = self.machine.harmonic
+        size = float(np.max(np.abs(orbit.motion[driven])))
+        return float(np.max(np.abs(orbit.motion[driven] - motion[driven]))) / size
+
+    def _orbit(self, begin: Array, free: bool) -> Orbit | None:
+        one = self._shoot(begin, self.omega, self.steps, free)
+        two = None if one is None else self._shoot(one.state, one.omega, 2 * self.steps, free)
         if one is None or two is None:
             return None
-        size = float(np.max(np.abs(two[1][1:])))
-        off = float(np.max(np.abs(two[1] - one[1]))) / size
-        return Orbit(two[1], off, two[2], abs(two[2] - one[2]))
+        size = float(np.max(np.abs(two.motion[1:])))
+        off = float(np.max(np.abs(two.motion - one.motion))) / size
+        error = abs(two.multiplier - one.multiplier)
+        if free:  # on either side of a turn a multiplier lies on another side of 1
+            error += abs(two.multiplier - 1.0)
+        return Orbit(two.motion, off, two.multiplier, error, abs(two.omega / self.omega - 1.0))
 
-    def _shoot(self, state: Array, steps: int) -> tuple[Array, npt.NDArray[np.complex128], float] | None:  # fmt: skip
-        scale = self._scale(state, steps)
+    def _shoot(self, state: Array, omega: float, steps: int, free: bool) -> _Closed | None:
+        """Return a motion that closes, at the frequency given or, `free`, at one beside it."""
+        scale = self._scale(state, omega, steps)
         for _ in range(NEWTON):
-            end, found, moved = self.flow(state, steps)
+            end, found, moved = self.flow(state, omega, steps)
             off = (end - state) / scale
-            jac = self._jacobian(state, steps, scale)
+            jac = self._jacobian(state, omega, steps, scale)
             if np.max(np.abs(off)) < CLOSED:
-                return state, found, self._largest(jac, moved)
-            step = np.linalg.lstsq(np.eye(len(off)) - jac, off, rcond=1e-7)[0]
+                return _Closed(state, omega, found, self._largest(jac, moved))
+            matrix = np.eye(len(off)) - jac
+            if free:
+                matrix = np.column_stack([matrix, -self._by_frequency(state, omega, steps, scale)])
+            step = np.linalg.lstsq(matrix, off, rcond=1e-7)[0]
             size = np.max(np.abs(step))
-            state = state + scale * step * min(1.0, 0.5 / size if size > 0.5 else 1.0)
+            step *= min(1.0, 0.5 / size if size > 0.5 else 1.0)
+            state = state + scale * step[: len(state)]
+            if free:
+                omega *= 1.0 + TURN * float(step[-1])
         return None
 
-    def _scale(self, state: Array, steps: int) -> Array:
+    def _by_frequency(self, state: Array, omega: float, steps: int, scale: Array) -> Array:
+        """Return how the end of a period changes with the frequency, by `TURN` of it."""
+        nudge = NUDGE * TURN
+        ahead = self.flow(state, omega * (1.0 + nudge), steps)[0]
+        behind = self.flow(state, omega * (1.0 - nudge), steps)[0]
+        return np.asarray((ahead - behind) / scale / (2 * NUDGE))
+
+    def _scale(self, state: Array, omega: float, steps: int) -> Array:
         n = len(self.machine.mass)
-        amplitude = float(np.max(np.abs(self.flow(state, steps)[1][1:]))) or 1.0
-        speed = amplitude * self.omega * self.machine.harmonic
+        amplitude = float(np.max(np.abs(self.flow(state, omega, steps)[1][1:]))) or 1.0
+        speed = amplitude * omega * self.machine.harmonic
         return np.concatenate([np.full(n, amplitude), np.full(n, speed), np.full(self.kind.size, amplitude)])  # fmt: skip
 
-    def _jacobian(self, state: Array, steps: int, scale: Array) -> Array:
+    def _jacobian(self, state: Array, omega: float, steps: int, scale: Array) -> Array:
         columns = []
         for i in range(len(state)):
             nudge = np.zeros_like(state)
             nudge[i] = NUDGE * scale[i]
-            ahead, behind = self.flow(state + nudge, steps)[0], self.flow(state - nudge, steps)[0]
+            ahead, behind = (
+                self.flow(state + nudge, omega, steps)[0],
+                self.flow(state - nudge, omega, steps)[0],
+            )
             columns.append((ahead - behind) / scale / (2 * NUDGE))
         return np.array(columns).T
 
