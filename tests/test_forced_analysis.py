@@ -36,7 +36,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.response.recovery import equivalent_damping, fields
+from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Status
@@ -101,6 +101,10 @@ def test_equivalent_damping_is_that_of_a_linear_oscillator_and_counts_what_frict
     found, sticks = equivalent_damping(problem, top), limit > 1.0
     if sticks:  # ζ = c / 2√(km), where the frequency is that of resonance
         assert found == pytest.approx(dashpot / (2 * np.sqrt(1.5)), rel=5e-3)
+        # what a ratio takes over what the load can give: 4πζ k|x|²/2 over πF|x|, everywhere
+        for p in points:
+            share = 2 * 1e-4 * 1.5 * abs(p.coefficients[1, 0]) / 0.2
+            assert damped_share(problem, p, 1e-4) == pytest.approx(share, rel=1e-9)
     moved, energy = fields(problem, top).outputs[:, 0], fields(problem, top).energy.sum()
     h = np.arange(moved.size)
     lost = energy + np.pi * dashpot * top.omega * np.sum(h**2 * np.abs(moved) ** 2)

@@ -165,6 +165,31 @@ def test_a_peak_that_nothing_damps_is_wrong():
     assert "nothing damps" not in "\n".join(map(str, damped.verdicts)).lower()
 
 
+def test_stiffness_alone_bounds_an_undamped_hardening_oscillator():
+    """Far up its backbone x'' + x + x³ = 0.1 cos(ωt) has one size at a frequency, with damping or without: neutral, not without a finite value."""
+    size = {}
+    for damping in (0.0, 2e-5):
+        body = ss.model.lumped(np.eye(1), np.eye(1), damping * np.eye(1), names=("x",))
+        spring = ss.Contact(
+            between=("p.x", "ground"), law=ss.CubicSpring(cubic_t=1.0), acts="tangential"
+        )
+        model = ss.Model(
+            parts={"p": ss.Part(structure=body)},
+            contacts={"s": spring},
+            loads={"f": ss.Load(on="p.x", newton=0.1)},
+            outputs=(ss.Output(name="o", on="p.x"),),
+        )
+        rad = 2 * np.pi
+        result = model.forced_response(hz=(0.8 / rad, 1.6 / rad), points=20, high=7)
+        told = "\n".join(map(str, result.verdicts))
+        assert "nothing damps" not in told.lower()
+        assert "WRONG" not in told
+        size[damping] = float(result["forced_response"].peak_amplitude[0])
+        if not damping:
+            assert "neutral" in told
+    assert size[0.0] == pytest.approx(size[2e-5], rel=1e-3)
+
+
 def test_check_says_before_any_response_that_nothing_damps_a_mode(tmp_path):
     text = (EXAMPLES / "four_masses" / "study.toml").read_text()
     told = {}

@@ -515,3 +515,26 @@ def test_harmonic_that_the_amplitude_leaves_out_is_told(third: float, word: str)
         whole = 1.9 * np.ptp(np.cos(angle) - third * np.cos(3 * angle)) / 2
         assert f"half of peak to peak is {1e3 * whole:.4g} mm" in told[0].why
         assert "harmonic 3" in told[0].why
+
+
+def test_points_that_share_a_frequency_keep_their_own_stability() -> None:
+    """A row belongs to the point of its own frequency, and among equal ones to that which has its word: not to the peak for being near."""
+    hz = np.array([10.0, 11.0, 13.0 * (1 - 1e-11), 13.0, 13.0, 15.0])
+    word = {"stable": 0, "unstable": 1, "neutral": 4}
+    said = ["neutral", "stable", "unstable"]
+    data = response(
+        frequency_hz=hz,
+        motion_stability=np.array([0, 0, word["neutral"], word["stable"], word["unstable"], 0]),
+        stability_case=[0, 0, 0],
+        stability_frequency_hz=hz[[2, 3, 4]],
+        stability_verdict=said,
+        stability_sentence=said,
+    )
+    own = Curve(data, 0)
+    found = {
+        point: str(row["stability_verdict"]) for point, row in own.examined("stability_verdict")
+    }
+    assert found == {2: "neutral", 3: "stable", 4: "unstable"}
+    assert own.peak == TOP == 3
+    assert own.peak_stability == "stable"
+    assert judged(data)[1] == "trusted"

@@ -75,17 +75,30 @@ def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
     ``ζ = W / (4π U)`` with the work W of the harmonic loads in a cycle, which at a steady motion is all that friction, structure and fluid
     take, and the largest energy U that structure and contacts store of the vibration: twice its mean. NaN where nothing vibrates.
     """
+    work, _, stored = _work_and_energy(problem, point)
+    return work / (4.0 * np.pi * stored) if stored > 0.0 else float("nan")
+
+
+def damped_share(problem: ForcedProblem, point: ForcedPoint, ratio: float) -> float:
+    """Return the energy that a damping `ratio` would take in a cycle, over the most that the loads could give to the motion at any phase.
+
+    Far below 1 the loads balance stiffness and inertia, and so small a damping turns the motion by this angle, rad, without changing its
+    size. Near 1 or above damping alone decides the size. NaN where no load moves.
+    """
+    _, most, stored = _work_and_energy(problem, point)
+    return 4.0 * np.pi * ratio * stored / most if most > 0.0 else float("nan")
+
+
+def _work_and_energy(problem: ForcedProblem, point: ForcedPoint) -> tuple[float, float, float]:
+    """Return the work of the harmonic loads in a cycle, the most that it would be with other phases, and the largest energy of the vibration, J."""
     linear, every = problem.low.linear, fields(problem, point)
     order = len(point.coefficients) - 1
     moved = linear.recover(point.omega, point.coefficients)
     load = linear.load_at(point.omega).coefficients(order)
-    work = np.pi * np.sum(
-        np.imag(load * np.conj(moved))[1:]
-    )  # of each harmonic in a cycle of its own
+    each = np.pi * np.sum(load * np.conj(moved), axis=1)[1:]  # of a harmonic in its own cycle
     strain = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
     springs = 0.25 * np.real(np.conj(every.gaps[1:]) * every.forces[1:]).sum()
-    stored = 2.0 * (strain + springs)
-    return float(work / (4.0 * np.pi * stored)) if stored > 0.0 else float("nan")
+    return float(each.imag.sum()), float(np.abs(each).sum()), float(2.0 * (strain + springs))
 
 
 def signals(problem: ForcedProblem, point: ForcedPoint) -> Signals:

@@ -321,9 +321,13 @@ class Curve:
         for k in np.flatnonzero(self.data[f"{word}_case"].values == self.case):
             said = {str(n): self.data[n].values[k] for n in own}
             off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
-            # where a fold passes a frequency twice the peak is meant, else the first
-            near = [int(i) for i in np.flatnonzero(self.converged & (off <= SAME))]
-            for point in sorted(near, key=lambda i: i != self.peak)[:1]:
+            near = np.flatnonzero(self.converged & (off <= SAME))
+            # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
+            told = MOTION.get(str(said.get("stability_verdict")), -1)
+            other = self.floats("motion_stability") != told
+            for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[
+                :1
+            ]:
                 yield point, said
 
     def rows(self, word: str) -> Iterator[dict[str, Any]]:

@@ -17,7 +17,7 @@ from stickslip.response.physics.modes import (
     range_modes,
     springs_of,
 )
-from stickslip.response.recovery import equivalent_damping, signals
+from stickslip.response.recovery import damped_share, equivalent_damping, signals
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.values import Values
@@ -135,7 +135,7 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
     if top is None or not physics.undamped:
         return
     known = _damping(question, top)
-    if known < UNDAMPED_RATIO:
+    if known < UNDAMPED_RATIO and _decided_by_damping(question, top):
         why = (
             f"nothing damps {_modes(physics.undamped)} while contacts stick, and at the peak nothing slips enough to (equivalent damping "
             f"{_plain(known)} of critical): the peak has no finite value, the number tells how near to it a frequency was solved"
@@ -148,7 +148,12 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         low, high = sorted((physics.ends(mode), mode.omega))
         low, high = low * (1 - BESIDE), high * (1 + BESIDE)
         near = [a for a in response.accepted if a.fields and low <= a.point.omega <= high]
-        if near and _damping(question, max(near, key=response.amplitude)) < UNDAMPED_RATIO:
+        if not near:
+            continue
+        most = max(near, key=response.amplitude)
+        # a branch that was followed passes no resonance unseen, one that contacts stiffen or soften is finite there
+        missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
+        if missed and _damping(question, most) < UNDAMPED_RATIO:
             why = f"nothing damps the mode at {mode.hz:.2f} Hz while contacts stick, and nothing slips where it was solved: a larger peak may stand there"
             remedy = (
                 f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
@@ -158,6 +163,12 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
 
 def _damping(question: Question, accepted: Accepted) -> float:
     return equivalent_damping(question.problem, accepted.point)
+
+
+def _decided_by_damping(question: Question, accepted: Accepted) -> bool:
+    """Whether the damping that counts as none would change a motion by more than the threshold: else stiffness and inertia decide its size."""
+    share = damped_share(question.problem, accepted.point, UNDAMPED_RATIO)
+    return not share <= question.limit
 
 
 def _of_bounds(physics: Physics) -> Iterator[Verdict]:

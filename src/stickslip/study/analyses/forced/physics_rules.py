@@ -61,7 +61,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
         size, hz = float(said["another_amplitude"]), float(said["another_frequency_hz"])
         larger = size > (1.0 + LARGER) * float(np.nan_to_num(case.number("peak_amplitude")))
         word = str(said["another_stability"])
-        state = {"stable": ", which is stable", "undecided": ", of which nobody knows whether it is stable"}.get(word, ", whose stability was not examined")  # fmt: skip
+        state = {"stable": ", which is stable", "undecided": ", of which nobody knows whether it is stable", "neutral": ", which is neutral"}.get(word, ", whose stability was not examined")  # fmt: skip
         why = (
             f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said['another_known']))}: "
             f"found from {said['another_start']}{state}"
