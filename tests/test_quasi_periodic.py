@@ -139,6 +139,41 @@ def test_a_slow_beat_is_one_characteristic(ratio: float) -> None:
         assert motion.coefficients[0, 0].real == pytest.approx(3e-4, rel=0.03)
 
 
+@pytest.mark.parametrize("ratio", [1.5, 4 / 3, np.sqrt(2.0)])
+def test_a_cubic_spring_has_the_harmonics_of_the_closed_form(ratio: float) -> None:
+    """κ (a cos θ1 + b cos θ2)³, on any number of characteristics, and with a share of the contact's area."""
+    cubic, share, a, b = 2e8, 0.7, 2e-3, 3e-3
+    operator = np.zeros((3, 1))
+    operator[0] = 1.0
+    interface = ss.Interface(("joint",), (ss.CubicSpring(cubic_t=cubic),), operator, np.array([share]))  # fmt: skip
+    system = ss.System(lumped(np.eye(1), np.array([[1e4]]), np.array([[6.0]])), interface, BOTH[:1])
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
+    balance = two_tones(system, load, load, 1).balance
+    more = ((0, 0), (3, 0), (2, 1), (-1, 2), (0, 3))
+    path = closed_path(ratio, 3)
+    assert (path.ways > 1) == (ratio in (1.5, 4 / 3))
+    motion = np.array([[0.0], [a], [b]], dtype=complex)
+    found = balance.forces(balance.unknowns(motion), (100.0, 100.0 * ratio), path, more)
+    k = share * cubic
+    # rows: static, cosine and sine of each
+    own = [0.75 * a**3 + 1.5 * a * b**2, 0.75 * b**3 + 1.5 * a**2 * b]
+    far = [a**3 / 4, 0.75 * a**2 * b, 0.75 * a * b**2, b**3 / 4]
+    size = k * (a + b) ** 3
+    np.testing.assert_allclose(found.coefficients[:, 0], k * np.array([0, own[0], 0, own[1], 0]), atol=1e-12 * size)  # fmt: skip
+    cosines = found.beyond[1::2, 0]
+    np.testing.assert_allclose(cosines, k * np.array(far), atol=1e-12 * size)
+    assert np.abs(found.beyond[[0, 2, 4, 6, 8], 0]).max() < 1e-12 * size
+    # derivatives: 3 κ x² against the basis
+    by_first, by_second = 2.25 * a**2 + 1.5 * b**2, 2.25 * b**2 + 1.5 * a**2
+    sines = 0.75 * a**2 + 1.5 * b**2, 0.75 * b**2 + 1.5 * a**2
+    mean = 1.5 * (a**2 + b**2)
+    block = np.diag([mean, by_first, sines[0], by_second, sines[1]])
+    block[1, 3] = block[3, 1] = 3 * a * b
+    np.testing.assert_allclose(found.blocks[0, 0], k * block, atol=1e-12 * k * (a + b) ** 2)
+    assert found.unsettled == 0
+    assert not found.rates
+
+
 def test_two_loads_are_what_a_march_by_hand_comes_to() -> None:
     omegas = 140.0, 140.0 * 0.93 * np.sqrt(2.0)
     problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
