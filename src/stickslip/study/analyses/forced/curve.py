@@ -19,6 +19,7 @@ DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
 ATTAINED = 1.0  # percent between a settled time integration and the balance
 HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
 UNSTABLE = MOTION["unstable"]
+CHECKS = ("verify", "stability")  # whose rows speak of single points
 CARRIED = 2  # the number of motion_stability_basis
 SAME = 1e-9  # relative difference of frequencies that are one
 
@@ -313,13 +314,16 @@ class Curve:
         name
             A variable of the check, such as ``verify_settled``: the first word begins the names of all.
         """
-        word = name.partition("_")[0]
-        if not self.has(name) or not self.at.size:
-            return
-        rows = self.data[name].dims[0]
-        own = [n for n, v in self.data.data_vars.items() if v.dims == (rows,)]
-        for k in np.flatnonzero(self.data[f"{word}_case"].values == self.case):
-            said = {str(n): self.data[n].values[k] for n in own}
+        yield from self._looked_at.get(name.partition("_")[0], ()) if self.has(name) else ()
+
+    @cached_property
+    def _looked_at(self) -> dict[str, list[tuple[int, dict[str, Any]]]]:
+        """What `examined` yields, by the first word: rules ask for it again and again, and the dataset makes an array at each look."""
+        words = [w for w in CHECKS if self.at.size and self.has(f"{w}_case")]
+        return {word: list(self._points_of(word)) for word in words}
+
+    def _points_of(self, word: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        for said in self.rows(word):
             off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
             near = np.flatnonzero(self.converged & (off <= SAME))
             # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
@@ -334,9 +338,10 @@ class Curve:
         """Yield what is told of the case along the dimension `word`, whose variables begin with it."""
         if f"{word}_case" not in self.data:
             return
-        own = [n for n, v in self.data.data_vars.items() if v.dims == (word,)]
-        for k in np.flatnonzero(self.data[f"{word}_case"].values == self.case):
-            yield {str(n): self.data[n].values[k] for n in own}
+        own = self.data[f"{word}_case"].dims
+        columns = {str(n): v.values for n, v in self.data.data_vars.items() if v.dims == own}
+        for k in np.flatnonzero(columns[f"{word}_case"] == self.case):
+            yield {name: column[k] for name, column in columns.items()}
 
     @cached_property
     def attained(self) -> BoolArray:
