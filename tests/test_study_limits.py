@@ -1,5 +1,6 @@
 """Study files that no one means: refused in a moment, in few words, and all that is wrong of others is told at once."""
 
+import gzip
 import time
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from small_v2 import write_four_masses
 
 from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.toml import read_toml
+from stickslip.study.models.cost import file_nodes
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
@@ -119,3 +121,22 @@ def test_numbers_at_the_limits_run_without_a_fault(tmp_path: Path) -> None:
     outcome = run_study(read_study(write_four_masses(tmp_path, few | extreme)))
     assert outcome.tree.attrs["complete"] == 1
     assert any(verdict.rank for verdict in outcome.verdicts)  # and nobody is told to trust it
+
+
+@pytest.mark.parametrize(
+    "deck", ["calculix_wheel/wheel.inp", "own_blades/blade.inp", "sector_deck/sector.inp"]
+)
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_size_of_a_deck_tells_about_how_many_nodes_it_has(
+    deck: str, packed: bool, tmp_path: Path
+) -> None:
+    text = (Path(__file__).parent.parent / "examples" / deck).read_bytes()
+    keyword, nodes = b"", 0
+    for line in text.splitlines():
+        keyword = line.upper() if line.startswith(b"*") else keyword
+        nodes += (
+            keyword.startswith(b"*NODE") and not line.startswith(b"*") and b"PRINT" not in keyword
+        )
+    path = tmp_path / ("deck.inp.gz" if packed else "deck.INP")
+    path.write_bytes(gzip.compress(text) if packed else text)
+    assert 0.7 < file_nodes(path) / nodes < 1.4  # decks with other columns are off by so much
