@@ -32,7 +32,7 @@ from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import motion_stability, stability
-from stickslip.response.stability.missing_harmonics import FARTHER, LEAST, corrected
+from stickslip.response.stability.missing_harmonics import FARTHER, LEAST, corrected, solved_with
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
@@ -486,3 +486,17 @@ def test_laws_without_finite_tangents_leave_the_verdict_undecided(monkeypatch):
     found = motion_stability(structure, Interface(("a",), (law,), operator), gaps, 1.1)
     assert found.verdict == "undecided"
     assert found.error == np.inf
+
+
+def test_a_known_motion_with_more_harmonics_takes_the_place_of_a_newton_step():
+    problem, points = stopped(3)
+    worked = []
+    for point in points[2::5]:
+        more = solved_with(problem, point, 15)
+        assert more is not None
+        known, alone = stability(problem, point, more.point), stability(problem, point)
+        assert known.verdict == alone.verdict
+        apart = abs(known.multiplier - alone.multiplier)
+        assert apart <= known.multiplier_error + alone.multiplier_error
+        worked.append(known.work < alone.work)
+    assert any(worked)

@@ -89,8 +89,8 @@ def undecided(monkeypatch: pytest.MonkeyPatch) -> Question:
     """The flank above a fold, whose multipliers are given an error that reaches the unit circle."""
     known = stable.stability
 
-    def rough(problem: object, point: object) -> Stability:
-        found = known(problem, point)  # type: ignore[arg-type]
+    def rough(problem: object, point: object, more: object) -> Stability:
+        found = known(problem, point, more)  # type: ignore[arg-type]
         return replace(found, errors=np.full_like(found.errors, 0.5), moduli=None)
 
     monkeypatch.setattr(stable, "stability", rough)

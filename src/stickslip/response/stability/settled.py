@@ -26,7 +26,9 @@ class _Rung:
 
 
 @by_one_thread
-def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+def stability(
+    problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
+) -> Stability:
     """Return the stability of a solved point of a forced response.
 
     The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them, times `ROUGHLY`, is
@@ -39,6 +41,8 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
         The forced response that the point belongs to.
     point
         A converged one.
+    more
+        The same motion solved with more harmonics, if that is known: it takes the place of the Newton step.
 
     Raises
     ------
@@ -52,20 +56,33 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
             "Ask for the stability of solutions only.",
         )
     first = _Rung(point, of_point(problem, point))
+    if more is not None:
+        found = of_point(problem, more)
+        best = _unsure(first) if found.unknown else _compared(found, first, FIRST)
+        return _settled(problem, _Rung(more, found), 1.0, best, first.stability.work + found.work)
     step = corrected_by_step(problem, point)
     if step is not None and step.point is point:
         return first.stability
-    work = first.stability.work
-    best = replace(
-        first.stability, errors=np.full_like(first.stability.errors, np.inf), moduli=None
-    )
+    work, best = first.stability.work, _unsure(first)
     if step is not None:
         found = of_point(problem, step.point)
         work += found.work + step.work
         if not found.unknown:
             best = _compared(found, first, ROUGHLY)
-    last, times = first, FIRST
-    for more in more_harmonics(problem, point):
+    return _settled(problem, first, FIRST, best, work)
+
+
+def _unsure(rung: _Rung) -> Stability:
+    """Return the stability of a motion of which nothing says what more harmonics change."""
+    own = rung.stability
+    return replace(own, errors=np.full_like(own.errors, np.inf), moduli=None)
+
+
+def _settled(
+    problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
+) -> Stability:
+    """Return the stability with more and more harmonics, until more would tell nothing else: errors are so many `times` the change from the last rung."""
+    for more in more_harmonics(problem, last.point):
         if best.settled:
             break
         found = of_point(problem, more.point)

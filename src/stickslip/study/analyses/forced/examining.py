@@ -135,9 +135,13 @@ class _Search:
     def all_points(self) -> list[Examined]:
         """Return what is known of every point: examined, carried along, by the sign of the determinant, or nothing."""
         own = dict(self.found)
+        for k, position in enumerate(self.course.order):
+            linear = None if k in own else self._linear(k)
+            if linear is not None:
+                own[k] = replace(linear, position=position)
         for a, b in pairwise(sorted(self.found)):
             if b > a + 1 and self._carries(a, b):
-                own |= {k: self._carried(k, a, b) for k in range(a + 1, b)}
+                own = {k: self._carried(k, a, b) for k in range(a + 1, b)} | own
         for k in range(len(self.course.order)):
             # beside a fold Newton's method may find the stable motion from the unstable one
             open_ = k not in own or own[k].verdict in ("stable", "undecided")

@@ -42,6 +42,8 @@ class Accepted:
         Bound of its own error, a fraction: 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
     audit_error
         Difference from the same motion solved with more harmonics to compare, a fraction; NaN where it was not.
+    audit
+        That solution.
     """
 
     point: ForcedPoint
@@ -53,6 +55,7 @@ class Accepted:
     amplitude_of: AmplitudeOf = "first"
     own_error: float = float("nan")
     audit_error: float = float("nan")
+    audit: ForcedPoint | None = None
 
     @property
     def exact(self) -> bool:
@@ -183,11 +186,19 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     accepted = []
     for point, low in accepted_pairs(points):
         own = _own_error(problem, point)
-        audit = _audit_error(problem, point, audits.get(point.omega, []))
+        more = _audit(point, audits.get(point.omega, []))
+        audit = float("nan") if more is None else problem.real_error(point, more)
         made = _accept(problem, point, low)
         of = problem.sweep.amplitude_of
         accepted.append(
-            replace(made, driven=problem.driven, amplitude_of=of, own_error=own, audit_error=audit)
+            replace(
+                made,
+                driven=problem.driven,
+                amplitude_of=of,
+                own_error=own,
+                audit_error=audit,
+                audit=more,
+            )
         )
     some = problem.system.peak_of
     if some is not None and any(a.fields for a in accepted):
@@ -231,15 +242,10 @@ def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     return own_error(problem, point)
 
 
-def _audit_error(
-    problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]
-) -> float:
-    """Return by how much a solution differs from that with most harmonics at its frequency; NaN where there is none with more."""
-    if not point.converged:
-        return float("nan")
+def _audit(point: ForcedPoint, audits: Sequence[ForcedPoint]) -> ForcedPoint | None:
+    """Return the solution with most harmonics at the frequency of a point; None where there is none with more than its own."""
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
-    more = most.harmonics.size > point.harmonics.size
-    return problem.real_error(point, most) if more else float("nan")
+    return most if point.converged and most.harmonics.size > point.harmonics.size else None
 
 
 def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:

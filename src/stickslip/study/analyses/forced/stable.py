@@ -110,7 +110,7 @@ def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Ex
     try:
         if hill:
             return _by_hill(question, accepted, keep)
-        found = stability(question.problem, accepted.point)
+        found = stability(question.problem, accepted.point, accepted.audit)
         wave = _of_wave(question, accepted, found)
     except InputError as error:
         return Examined(omega, "not examined", np.nan, np.nan, error.problem, basis="not examined")
