@@ -103,6 +103,17 @@ def test_units_are_converted_once():
     np.testing.assert_allclose(mm.dofs.position, 1e-3 * si.dofs.position, rtol=1e-15)
 
 
+def test_a_results_file_is_converted_once_in_every_unit_of_time():
+    """Modes in mm, kg and ms beside the same numbers in SI: frequencies by 1/ms, mass-normalised shapes by 1/sqrt(mass)."""
+    own = Units(1e-3, 4.0, 1e-3, "mm-4kg-ms")
+    plain, found = (read_frd(DATA / "brick.frd.gz", units=u) for u in (Units.si(), own))
+    np.testing.assert_allclose(found.nodes.points, 1e-3 * plain.nodes.points, rtol=1e-15)
+    for a, b in zip(plain.fields, found.fields, strict=True):
+        assert b.frequency_hz == pytest.approx(1e3 * a.frequency_hz, rel=1e-14)
+        assert (a.name, a.nodes.tolist()) == (b.name, b.nodes.tolist())
+        np.testing.assert_allclose(b.values, a.values / 2.0, rtol=1e-15)
+
+
 def test_wrong_units_are_named():
     with pytest.raises(InputError, match=r"in SI its mass .* that looks like mm-t-s\."):
         read_calculix_matrices(DATA / "brick_matrix")
