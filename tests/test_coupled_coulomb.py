@@ -1,6 +1,8 @@
 """Planar friction: the step of second order against the judge, its derivatives from every state to every other, and one big step."""
 
 from collections import Counter
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import scipy
 
 import stickslip as ss
 from evidence.judges.planar_contact import Contact, growing, judged
-from stickslip.assembly.frames import told_apart
+from stickslip.assembly.frames import direction, told_apart
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.law import OPEN, PAIRS, SLIP, STICK
 from stickslip.contact.planar_slip import turned
@@ -222,3 +224,22 @@ def test_a_march_over_samples_where_contacts_touch_is_finite():
         period = contact_forces(gaps, compile_contacts([law], evaluator="march"), 64)
         assert np.all(np.isfinite(period.coefficients))
         assert np.all(np.isfinite(period.blocks))
+
+
+@pytest.mark.parametrize("turn", range(3))
+def test_the_tangent_of_a_curved_surface_is_an_axis_along_no_normal(turn: int) -> None:
+    """Normals along two axes: the third one lies in the contact plane everywhere. Where each axis is near a normal the farthest one counts."""
+    around = np.roll(np.eye(3), turn, axis=1)  # rows: the axes from `turn` on
+
+    def chosen(*normals: np.ndarray) -> list[float]:
+        surface: Any = SimpleNamespace(used=np.arange(len(normals)), node_normals=lambda: np.array(normals))  # fmt: skip
+        anything: Any = SimpleNamespace(tangent=None, share="point", frame=None)
+        law = ss.ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5)
+        return list(direction("contact.c", anything, law, anything, surface, None, None))
+
+    assert chosen(around[0], around[1]) == around[2].tolist()
+    tilted = [np.array([0.04, 1.0, 0.0]), np.array([1.0, 0.01, 0.0]), np.array([0.0, 0.02, 1.0])]
+    normals = [own[np.argsort(np.roll(range(3), turn))] / np.linalg.norm(own) for own in tilted]
+    sines = [min(float(np.linalg.norm(np.cross(n, axis))) for n in normals) for axis in np.eye(3)]
+    assert max(sines) < 0.05
+    assert chosen(*normals) == np.eye(3)[int(np.argmax(sines))].tolist()
