@@ -403,7 +403,7 @@ def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
     def point(rpm: float, energy: float | None, stage: str = "sweep") -> Any:
         fields = None if energy is None else SimpleNamespace(energy=np.array([energy, 2 * energy]))
         own = SimpleNamespace(omega=rpm * RPM * 3, stage=stage, converged=energy is not None, order=int(rpm / 100))  # fmt: skip
-        return SimpleNamespace(point=own, fields=fields, own_error=rpm * 1e-5, amplitudes=lambda n: rpm * np.arange(1.0, n + 1))  # fmt: skip
+        return SimpleNamespace(point=own, fields=fields, own_error=rpm * 1e-5, audit_error=np.nan, amplitudes=lambda n: rpm * np.arange(1.0, n + 1))  # fmt: skip
 
     line: Any = SimpleNamespace(order=3, problem=None, model=SimpleNamespace(output_labels=("a.x", "b.x")))  # fmt: skip
     response: Any = SimpleNamespace(accepted=[point(1000.0, 0.5), point(1200.0, None), point(1100.0, 0.25, OF_PEAK[0])])  # fmt: skip

@@ -24,7 +24,7 @@ class Card:
     name
         Upper case, without the star of large fields.
     fields
-        Data fields, filled up to those of whole lines; none of a card whose fields nobody asked for.
+        Data fields, filled up to lines of eight; none of a card whose fields nobody asked for.
     place
         File and line, for messages.
     """
@@ -59,7 +59,7 @@ def bulk_cards(path: Path, read: Collection[str]) -> Iterator[Card]:
         large = first.endswith("*") or first.startswith("*")
         if first and first[0] not in "+*":
             if name:
-                yield Card(name, tuple(fields), place)
+                yield Card(name, _filled(fields), place)
             name, place = _name(first, here), here
             fields, awaited = _fields(text, large=large, place=here) if name in read else ([], "")
         elif name in read:
@@ -69,7 +69,12 @@ def bulk_cards(path: Path, read: Collection[str]) -> Iterator[Card]:
         elif not name:
             raise input_error(here, "continues no card", CUT_SHORT)
     if name:
-        yield Card(name, tuple(fields), place)
+        yield Card(name, _filled(fields), place)
+
+
+def _filled(fields: list[str]) -> tuple[str, ...]:
+    """Return fields filled up to lines of eight, as a card of small fields has them: one line of large fields has four."""
+    return (*fields, *[""] * (-len(fields) % 8))
 
 
 def _bulk_lines(path: Path) -> Iterator[tuple[int, str]]:

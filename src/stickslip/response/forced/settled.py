@@ -70,19 +70,20 @@ def settle(
     budget = max(WORK, sum(map(_work, solved)))
     settling = _Settling(problem, list(accepted), stored, stages, budget)
     audits = audits_by_frequency(solved)
+    if not problem.sweep.auto:  # what a study fixes stands along the branch; its peak is compared
+        if of_peak and problem.sweep.peak_points:
+            yield from settling.settle_highest()
+        return
     for place, point in enumerate(accepted):
         mine = point.converged and (point.stage == "peak") == of_peak
         if mine and _open(problem, point, audits.get(point.omega, [])):
             yield from settling.settle(place)
-    if of_peak and problem.sweep.peak_points and not problem.sweep.auto:
-        yield from settling.settle_highest()
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
     """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
     bound, limit = point.predicted_error, problem.strategy.threshold
-    # nothing is predicted of repeats in the published passages
-    if bound == 0.0 or (np.isnan(bound) and not problem.sweep.auto):
+    if bound == 0.0:
         return False
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
     if most.harmonics.size > point.harmonics.size:
