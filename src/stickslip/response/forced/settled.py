@@ -69,11 +69,11 @@ def settle(
     stages: tuple[Stage, Stage] = ("peak", "check") if of_peak else ("settled", "compared")
     budget = max(WORK, sum(map(_work, solved)))
     settling = _Settling(problem, list(accepted), stored, stages, budget)
-    audits = audits_by_frequency(solved)
     if not problem.sweep.auto:  # what a study fixes stands along the branch; its peak is compared
         if of_peak and problem.sweep.peak_points:
             yield from settling.settle_highest()
         return
+    audits = audits_by_frequency(solved)
     for place, point in enumerate(accepted):
         mine = point.converged and (point.stage == "peak") == of_peak
         if mine and _open(problem, point, audits.get(point.omega, [])):
@@ -100,7 +100,7 @@ class _Levels:
 
 
 def _levels(problem: ForcedProblem) -> _Levels:
-    """Return those of a sweep: where the study fixes the repeats, no point keeps more than they do, and more are compared with."""
+    """Return the levels of a sweep. Where a study fixes its harmonics, no point keeps more; higher levels serve to compare."""
     sweep = problem.sweep
     if sweep.auto:
         return _Levels(sweep.supports)
