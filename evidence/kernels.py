@@ -4,7 +4,8 @@
     python -m evidence.kernels --marked    # tests marked `kernel`, on the processor's own kernel and on Haswell (`make test-kernels`)
 
 OpenBLAS chooses its kernels by the processor, and ``OPENBLAS_CORETYPE`` chooses others. Their last digits differ. Names that stand for the
-same kernel run once.
+same kernel run once; the processor's own with one thread is what `make test` runs. Tests that stop a run and go on compare a kernel with
+itself, bit for bit, and are left out.
 """
 
 import argparse
@@ -13,6 +14,8 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
 
 from evidence.pytest_run import ROOT, counted
@@ -24,6 +27,7 @@ MARKED = (OWN, "Haswell")
 THREADS = (1, 2)
 OTHERS = re.compile(r"stickslip\.(cli|report)\b|\bsubprocess\b|\btest_cli\b|\bbrowser\b")
 MARK = "mark.kernel"
+STOPPED = "interrupted or resum or goes_on"  # tests that go on after a stop
 
 LOADED = """
 import ctypes, pathlib, numpy, scipy.linalg
@@ -64,20 +68,24 @@ def processor() -> set[str]:
     return set(flags[1].split()) if flags else set()
 
 
+@cache
 def to_run(kernels: tuple[str, ...]) -> tuple[list[str], list[str]]:
     """Return the kernels that are to run, and a line for each that is not."""
-    able, seen, chosen, told = processor(), {}, [], []
+    able = processor()
+    seen: dict[str, str] = {}
+    chosen: list[str] = []
+    left: list[str] = []
     for kernel in kernels:
         if KERNELS[kernel] and KERNELS[kernel] not in able:
-            told.append(f"{kernel}: this processor lacks {KERNELS[kernel]}")
+            left.append(f"{kernel}: this processor lacks {KERNELS[kernel]}")
             continue
         name = loaded(kernel)
         if kernel and name in seen:
-            told.append(f"{kernel}: {name or 'no OpenBLAS'}, as {seen[name] or 'without a choice'}")
+            left.append(f"{kernel}: {name or 'no OpenBLAS'}, as {seen[name] or 'without a choice'}")
             continue
         seen[name] = kernel
         chosen.append(kernel)
-    return chosen, told
+    return chosen, left
 
 
 def numeric_files() -> list[Path]:
@@ -90,28 +98,40 @@ def numeric_files() -> list[Path]:
     return found
 
 
-def run(workers: int, *, marked: bool = False) -> Counter[str]:
-    """Run the tests on each kernel, those of the processor's own with two threads, too; return the counts of all runs."""
-    kernels, told = to_run(MARKED if marked else tuple(KERNELS))
-    print(*told, sep="\n", flush=True)
-    files = (
-        [path for path in numeric_files() if MARK in path.read_text(encoding="utf-8")]
-        if marked
-        else numeric_files()
-    )
-    mark = "kernel and not validation" if marked else "not validation"
-    total: Counter[str] = Counter(left_out=len(told))
+def pieces() -> list[tuple[str, Callable[[int], Counter[str]]]]:
+    """Return what runs the numeric half, with a name of each: on each other kernel, and on the processor's own with two threads."""
+    kernels, _ = to_run(tuple(KERNELS))
+    found = [(f"{kernel}, one thread", partial(_numeric, kernel, 1)) for kernel in kernels if kernel != OWN]  # fmt: skip
+    return [*found, ("own kernel, two threads", partial(_numeric, OWN, 2))]
+
+
+def told() -> list[str]:
+    """Return what this processor's own kernel is, and a line for each kernel that does not run."""
+    return [f"the processor's own kernel is {loaded(OWN)}", *to_run(tuple(KERNELS))[1]]
+
+
+def _numeric(kernel: str, threads: int, workers: int) -> Counter[str]:
+    return _counted(kernel, threads, workers, ["-m", "not validation", "-k", f"not ({STOPPED})", *numeric_files()])  # fmt: skip
+
+
+def marked(workers: int) -> Counter[str]:
+    """Run the tests marked `kernel` on the processor's own kernel and on Haswell; return the counts of both."""
+    kernels, same = to_run(MARKED)
+    print(*same, sep="\n", flush=True)
+    files = [path for path in numeric_files() if MARK in path.read_text(encoding="utf-8")]
+    words = ["-m", "kernel and not validation", *files]
+    total: Counter[str] = Counter(left_out=len(same))
     for kernel in kernels:
-        for threads in THREADS if kernel == OWN and not marked else THREADS[:1]:
-            name = (
-                f"{kernel or 'own kernel'} ({loaded(kernel)}), {threads} thread{'s'[: threads - 1]}"
-            )
-            print(f"--- {name}", flush=True)
-            own = ["-q", "-n", max(1, workers // threads), "-m", mark, *files]
-            found = counted(own, environment(kernel, threads))
-            print(f"--- {name}: {found['passed']} passed, {found['failed']} failed", flush=True)
-            total += found
+        total += _counted(kernel, 1, workers, words)
     return total
+
+
+def _counted(kernel: str, threads: int, workers: int, words: Sequence[object]) -> Counter[str]:
+    name = f"{kernel or 'own kernel'} ({loaded(kernel)}), {threads} thread{'s'[: threads - 1]}"
+    print(f"--- {name}", flush=True)
+    found = counted(["-q", "-n", workers, *words], environment(kernel, threads))
+    print(f"--- {name}: {found['passed']} passed, {found['failed']} failed", flush=True)
+    return found
 
 
 def main() -> int:
@@ -120,7 +140,9 @@ def main() -> int:
     parser.add_argument("--marked", action="store_true", help="tests marked `kernel` alone")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
-    return 1 if run(options.workers, marked=options.marked)["failed"] else 0
+    print(*told(), sep="\n", flush=True)
+    runs = [marked] if options.marked else [run for _, run in pieces()]
+    return 1 if sum(run(options.workers)["failed"] for run in runs) else 0
 
 
 if __name__ == "__main__":
