@@ -57,11 +57,8 @@ def lanczos(
     size = mass.shape[0]
     random = np.random.default_rng(0)  # the same in every run
 
-    def operate(block: Matrix) -> Matrix:
-        return solve(mass @ block)
-
     def fresh(count: int) -> Matrix:
-        block = operate(random.standard_normal((size, count)).astype(kind))
+        block = solve(mass @ random.standard_normal((size, count)).astype(kind))
         length = np.sqrt(np.sum((block.conj() * (mass @ block)).real, axis=0))
         return block / np.where(length > 0, length, 1.0)
 
@@ -69,29 +66,30 @@ def lanczos(
     projected: Matrix = np.zeros((0, 0), dtype=kind)
     known, turn = basis[:, :0], np.zeros((0, 0))
     largest: FloatArray = np.zeros(0)
-    block = _orthonormal(mass, fresh(min(BLOCK, size)), known, fresh)
+    block, heavy = _orthonormal(mass, fresh(min(BLOCK, size)), known, fresh)[:2]
     before, pause = largest, 0
     while block.shape[1]:
         basis, known = _appended(basis, len(projected), block)
-        image = operate(block)
+        image = solve(heavy)
         column = known.conj().T @ (mass @ image)
         image -= known @ column
         projected = _bordered(projected, column)
-        block = _orthonormal(mass, image, known, fresh)
+        block, heavy, remainder = _orthonormal(mass, image, known, fresh)
         pause -= 1
         if (len(projected) < n or pause > 0) and block.shape[1]:
             continue
         largest, turn = _largest(projected, n)
-        rest = np.linalg.norm((block.conj().T @ (mass @ image)) @ turn[-image.shape[1] :], axis=0)
+        rest = np.linalg.norm((block.conj().T @ remainder) @ turn[-image.shape[1] :], axis=0)
         found = before.size and np.any(abs(largest - before) > KNOWN * abs(largest))
         if np.all(rest <= np.maximum(CONVERGED * abs(largest), ROUNDING * abs(largest[0]))):
             if before.size and not found:
                 break
             before, pause = largest, STEPS
-            block = _orthonormal(mass, _without(mass, fresh(min(PROBE, size)), known), known, fresh)
+            probe = _without(mass, fresh(min(PROBE, size)), known)
+            block, heavy = _orthonormal(mass, probe, known, fresh)[:2]
         elif found and block.shape[1] < BLOCK:  # there may be many more
             more = _without(mass, fresh(BLOCK - block.shape[1]), known)
-            block = _orthonormal(mass, np.hstack([block, more]), known, fresh)
+            block, heavy = _orthonormal(mass, np.hstack([block, more]), known, fresh)[:2]
     rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
     if rank < n:
         raise input_error(
@@ -136,24 +134,26 @@ def _bordered(projected: Matrix, column: Matrix) -> Matrix:
 
 def _orthonormal(
     mass: Matrix, image: Matrix, known: Matrix, fresh: Callable[[int], Matrix]
-) -> Matrix:
-    """Return M-orthonormal columns of `image`, which was made M-orthogonal to `known` once.
+) -> tuple[Matrix, Matrix, Matrix]:
+    """Return M-orthonormal columns of `image`, which was made M-orthogonal to `known` once, their products with M, and ``M @ image``.
 
     That left rounding errors of the size of what was removed, hence once more. Columns of nothing
     but such errors give way to new directions, as long as there are any.
     """
     block, added = image, False
+    heavy = of_image = mass @ block
     for again in (False, True, True):
-        heavy = mass @ block
         reference = np.max(np.sum((block.conj() * heavy).real, axis=0), initial=0.0)
         if again:
             block = block - known @ (known.conj().T @ heavy)
             heavy = mass @ block
         squares, turn = np.linalg.eigh(block.conj().T @ heavy)
         weak = squares <= NOTHING[again] * reference
-        block = (block @ turn[:, ~weak]) / np.sqrt(squares[~weak])
+        turn = turn[:, ~weak] / np.sqrt(squares[~weak])
+        block, heavy = block @ turn, heavy @ turn
         if np.any(weak) and not again:
-            block, added = np.hstack([block, fresh(int(np.count_nonzero(weak)))]), True
+            new = fresh(int(np.count_nonzero(weak)))
+            block, heavy, added = np.hstack([block, new]), np.hstack([heavy, mass @ new]), True
         elif again and not added:
             break
-    return block
+    return block, heavy, of_image
