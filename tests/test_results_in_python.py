@@ -46,6 +46,15 @@ def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_f
         result.to_dataframe("modes")
 
 
+def test_a_result_is_walked_through_by_the_names_of_its_analyses() -> None:
+    result = ss.Result(tree_of(modes=xr.Dataset(), forced_response=xr.Dataset()))
+    assert list(result) == ["modes", "forced_response"]
+    assert {name: result[name] for name in result}.keys() == {"modes", "forced_response"}
+    assert "modes" in result
+    assert "safe" not in result
+    assert list(ss.Result(tree_of())) == []
+
+
 def test_points_beyond_the_end_of_a_curve_are_no_rows_but_unsolved_points_are() -> None:
     data = xr.Dataset({
         "amplitude": (("case", "branch", "point"), [[[1.0, np.nan, np.nan]]]),

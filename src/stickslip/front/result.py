@@ -1,5 +1,6 @@
 """What a Python user holds of a result: its data, its figures, its peaks, its page."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -73,11 +74,14 @@ class Result:
             If the result has none of that name.
         """
         if name not in self.data.children:
-            known = [str(child) for child in self.data.children]
             raise input_error(
-                f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, known)
+                f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, list(self))
             )
         return self.data[name].to_dataset()
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the analyses, in the order of the file, as over the keys of a dictionary."""
+        return (str(name) for name in self.data.children)
 
     def to_dataframe(self, name: str = "", of: str = "") -> pd.DataFrame:
         """Return an analysis as a table of pandas, in Hz and SI units, which `DataFrame.attrs` names.
@@ -94,7 +98,7 @@ class Result:
         InputError
             If there is no such analysis or variable.
         """
-        name = name or next(iter(self.data.children), "")
+        name = name or next(iter(self), "")
         return dataframe(self[name], name, of)
 
     def save(self, path: str | Path) -> Path:
