@@ -380,3 +380,28 @@ def test_a_component_that_appears_twice_is_named():
     dofs = Dofs(np.array([3, 3]), ("x", "x"), np.zeros((2, 3)))
     with pytest.raises(InputError, match=r"node3.x appears twice"):
         dof_rotation(dofs, np.eye(3), "test")
+
+
+@pytest.mark.parametrize("wave_number", [0, 1, 3])
+@pytest.mark.parametrize("hub", [0, 1])
+@pytest.mark.parametrize("sparse", [True, False])
+def test_a_wave_is_the_projection_on_its_tie(wave_number, hub, sparse):
+    """Symmetric matrices, Hermitian ones and one that is neither; what is Hermitian to rounding becomes it to the last digit."""
+    sector = cyclic_sector(random_sector(6, hub=hub, sparse=sparse), 6)
+    rng = np.random.default_rng(7)
+    skew = rng.standard_normal((sector.structure.n,) * 2)
+    rounding = 1 + 1e-15 * rng.standard_normal(skew.shape)
+    kind = scipy.sparse.csr_array if sparse else np.asarray
+    uneven, symmetric = kind(skew), kind(dense(sector.structure.stiffness) * rounding)
+    hermitian = kind(dense(sector.structure.mass) + 0.1j * (skew - skew.T))
+    own = replace(sector.structure, damping=uneven, stiffness=symmetric, mass=hermitian)
+    sector = replace(sector, structure=own)
+    tie = sector.wave_tie(wave_number).toarray()
+    found = travelling_wave(sector, wave_number)
+    for name in ("mass", "damping", "stiffness"):
+        matrix, expected = getattr(found, name), tie.conj().T @ dense(getattr(own, name)) @ tie
+        assert scipy.sparse.issparse(matrix) == sparse
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(dense(matrix), expected, atol=1e-14 * size, rtol=0)
+        if name != "damping":
+            np.testing.assert_array_equal(dense(matrix), dense(matrix).conj().T)

@@ -67,10 +67,18 @@ def in_coordinates(
 
 def is_hermitian(matrix: Matrix) -> bool:
     """Whether a matrix equals its conjugate transpose to rounding."""
-    difference = abs(matrix - matrix.conj().T)
+    return even_part(matrix) is not None
+
+
+def even_part(matrix: Matrix) -> Matrix | None:
+    """Return ``(A + Aᴴ) / 2`` of a matrix that equals its conjugate transpose to rounding; None of another."""
     if not min(matrix.shape):
-        return True
-    return bool(difference.max() <= SYMMETRY * abs(matrix).max())
+        return matrix
+    difference = matrix - matrix.conj().T
+    largest = abs(difference).max()
+    if largest > SYMMETRY * abs(matrix).max():
+        return None
+    return matrix - difference / 2 if largest else matrix
 
 
 def _dense_product(matrix: Matrix, basis: Matrix) -> Matrix:

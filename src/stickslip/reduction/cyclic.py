@@ -6,6 +6,7 @@ Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import scipy
@@ -15,7 +16,7 @@ from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import is_hermitian, ones_at, surviving_sets
+from stickslip.reduction.basis import even_part, ones_at, surviving_sets
 from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
 from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import check_sectors, wave
@@ -247,26 +248,42 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
     tie = sector.wave_tie(wave_number)
     structure = sector.structure
     free = sector.independent
+    project = partial(_projected, tie=tie, free=free)
     return Structure(
-        _evenly_projected(structure.mass, tie),
-        _projected(structure.damping, tie),
-        _evenly_projected(structure.stiffness, tie),
+        project(structure.mass),
+        project(structure.damping, evened=False),
+        project(structure.stiffness),
         _wave_dofs(structure.dofs, free, tie[:, free.size :]),
         surviving_sets(structure, free),
         structure.expand(tie),
-        None if structure.loss is None else _evenly_projected(structure.loss, tie),
+        None if structure.loss is None else project(structure.loss),
     )
 
 
-def _projected(matrix: Matrix, tie: Matrix) -> Matrix:
-    product = tie.conj().T @ matrix @ tie
-    return scipy.sparse.csr_array(product) if scipy.sparse.issparse(matrix) else np.asarray(product)
+def _projected(matrix: Matrix, tie: Matrix, free: IntArray, *, evened: bool = True) -> Matrix:
+    """Return ``tieᴴ A tie``, Hermitian to the last digit if `evened` and A is Hermitian to rounding.
 
-
-def _evenly_projected(matrix: Matrix, tie: Matrix) -> Matrix:
-    """Return the projection, Hermitian to the last digit where the matrix is Hermitian to rounding."""
-    product = _projected(matrix, tie)
-    return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
+    The dofs `free` are the first coordinates; W leads to the others. So it is ``A_ff + A_fo W + Wᴴ A_of + Wᴴ A_oo W``, of which the
+    first, by far the largest, is real where A is.
+    """
+    even = even_part(matrix) if evened else None
+    if not scipy.sparse.issparse(matrix):
+        product = np.asarray(tie.conj().T @ matrix @ tie)
+        return product if even is None else (product + product.conj().T) / 2
+    sparse = scipy.sparse.csr_array(matrix if even is None else even)
+    other = np.setdiff1d(np.arange(tie.shape[0]), free)
+    way, size = tie[other], (tie.shape[1],) * 2
+    of_free, of_other = sparse[free], sparse[other]
+    own, right, corner = of_free[:, free], of_free[:, other] @ way, way.conj().T @ of_other[:, other] @ way  # fmt: skip
+    left = right.conj().T if even is not None else way.conj().T @ of_other[:, free]
+    if even is not None:
+        corner = (corner + corner.conj().T) / 2
+    parts = []
+    for part in (own, right, left, corner):
+        resized = scipy.sparse.csr_array(part)
+        resized.resize(size)
+        parts.append(resized)
+    return scipy.sparse.csr_array(parts[0] + ((parts[1] + parts[2]) + parts[3]))
 
 
 def _wave_dofs(dofs: Dofs, free: IntArray, whirl: Matrix) -> Dofs:
