@@ -743,6 +743,23 @@ def test_products_pay_from_some_three_hundred_unknowns():
     assert pay(300, 5)  # 3300
 
 
+def test_costs_grow_as_the_work_does():
+    """Entries of a matrix are the square of the coordinates, its factors the cube; harmonics count once each, unknowns of an array cubed."""
+    small, large = (linear_costs(n, 1, 0) for n in (20_000, 40_000))
+    assert large.product / small.product == pytest.approx(4, rel=0.01)
+    assert large.factors / small.factors == pytest.approx(8, rel=0.1)
+    assert large.array / small.array == pytest.approx(8, rel=0.1)
+    shared = [linear_costs(n, 1, 0, shared=True).factors for n in (20_000, 40_000)]
+    assert shared[1] / shared[0] == pytest.approx(8, rel=0.2)
+    once, twice = (linear_costs(20_000, h, 0) for h in (50, 100))
+    assert twice.factors / once.factors == pytest.approx(2, rel=1e-12)
+    assert twice.array / once.array == pytest.approx((199 / 99) ** 3, rel=1e-3)
+    sparse = [linear_costs(100, 4, 0, entries).product for entries in (10**9, 2 * 10**9)]
+    assert sparse[1] / sparse[0] == pytest.approx(2, rel=1e-3)
+    derivatives = [linear_costs(100, 4, n).product for n in (10**9, 2 * 10**9)]
+    assert derivatives[1] / derivatives[0] == pytest.approx(2, rel=1e-3)
+
+
 def priced(monkeypatch, product: float, array: float) -> None:
     """Let systems cost what a test wants."""
     costs = Costs(product, 0.0, array)

@@ -218,6 +218,10 @@ FILES = {
     "far.csv": ONE + "0,1000000000000,90",
     "later.csv": "blade,mode,frequency_hz\n" + "".join(f"{n + 1},1,{90 + n}\n" for n in range(6)),
     "late.csv": ONE.replace("0,1,90\n", ""),
+    "zeroth.csv": ONE + "0,0,90",
+    "half.csv": ONE + "0,1.5,90",
+    "twice.csv": ONE + "3,1,90",
+    "still.csv": ONE.replace("2,1,92", "2,1,0"),
     "five.csv": ONE.replace("5,1,95", ""),
 }
 TWO = FILE.replace("one", "two")
@@ -242,6 +246,10 @@ def test_six_blades_that_differ_are_no_mistake(tmp_path: Path, more: str) -> Non
         (TWO, "mistuning.b.file: has 2 modes, and the model's blade has 1"),
         (TWO + 'relative_to = "model"', "mistuning.b.file: has 2 modes, .* blade has 1"),
         (FILE.replace("one", "far"), "far.csv: line 8: mode: is above 200.* '1000000000000'"),
+        (FILE.replace("one", "zeroth"), "line 8: mode: is no number of a mode.* '0'.*lowest .* 1"),
+        (FILE.replace("one", "half"), "line 8: mode: is no number of a mode.* '1.5'"),
+        (FILE.replace("one", "twice"), "line 8: mode: stands there twice for blade 3"),
+        (FILE.replace("one", "still"), "line 4: frequency_hz: is no frequency"),
         (FILE.replace("one", "five"), "five.csv: has no frequency of blade 5, mode 1"),
         (
             FILE.replace("one", "later"),

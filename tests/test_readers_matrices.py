@@ -23,6 +23,7 @@ from stickslip.model import (
 )
 from stickslip.model.readers.abaqus import read_coordinate_matrix
 from stickslip.model.readers.matrix_market import read_matrix_market
+from stickslip.model.readers.node_table import NodeTable
 
 DATA = Path(__file__).parent / "data" / "calculix"
 MM = Units.mm_t_s()
@@ -458,3 +459,13 @@ def test_what_cannot_be_opened_is_asked_for(tmp_path, name, message):
     np.savez(tmp_path / "K.npz", np.eye(3))
     with pytest.raises(InputError, match=message):
         read_model(tmp_path / name)
+
+
+def test_the_dofs_of_nodes_are_wide_whatever_a_file_has():
+    """Readers of binary files have numbers of 32 bits and positions in whole millimetres."""
+    table = NodeTable(
+        np.array([3, 7], dtype=np.int32), np.array([[1, 2, 3], [4, 5, 6]]), {}, "a.inp"
+    )
+    dofs = table.dofs(np.array([7, 7, 3], dtype=np.int32), ("x", "y", "x"))
+    assert (dofs.node.dtype, dofs.position.dtype) == (np.int64, np.float64)
+    np.testing.assert_array_equal(dofs.position, [[4, 5, 6], [4, 5, 6], [1, 2, 3]])

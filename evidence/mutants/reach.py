@@ -1,7 +1,7 @@
 """Which tests reach a line: recorded once, read for any later state of the sources.
 
 Test files that were not recorded as they are now are taken whole, where they name what is mutated or import its module.
-Lines of compiled functions are reached by the tests that reach a line which names the function, and so are lines that run at import:
+Lines that run at import are looked at by the tests of all pages and tables as well, before others. Lines of compiled functions are reached by the tests that reach a line which names the function, and so are lines that run at import:
 what they define is what is named. A line that is new since the recording is reached by the tests of its neighbours.
 """
 
@@ -30,6 +30,10 @@ from evidence.mutants.recorder import WHERE
 PIECE = 8  # test files a process
 PER_PIECE_S = 3000.0  # of the clock
 FILE_S = 10.0  # CPU that a test file takes of which nothing is known
+WHOLE = (
+    "tests/test_pages_from_code.py",
+    "tests/test_study_tables.py::test_the_schema",
+)  # beginnings of tests that read every table
 NAMED = 8  # letters of a name that says which function it is
 
 
@@ -277,8 +281,10 @@ class Reach:
         here: set[str] = set().union(*(self.lines(path).get(i, ()) for i in range(first, last + 1)))
         if here:
             return here
-        defined = self.names.defined.get((path, mutant.line)) or mutant.where.rpartition(".")[2]
-        return self._naming(defined, path, set()) if defined else set()
+        at_import = self.names.defined.get((path, mutant.line))
+        defined = at_import or mutant.where.rpartition(".")[2]
+        found = self._naming(defined, path, set()) if defined else set()
+        return found | {t for t in self.cpu_s if t.startswith(WHOLE)} if at_import else found
 
     def _naming(self, name: str, path: str, seen: set[str]) -> set[str]:
         """Return the tests that reach a line which names something: in its own file, where its name is private."""
@@ -303,8 +309,8 @@ class Reach:
         return self.cpu_s.get(test, FILE_S if "::" not in test else 0.0)
 
     def in_order(self, tests: Iterable[str]) -> list[str]:
-        """Return tests, cheapest first."""
-        return sorted(tests, key=lambda t: (self.cost_s(t), t))
+        """Return tests: those that read every table, then the cheapest first."""
+        return sorted(tests, key=lambda t: (not t.startswith(WHOLE), self.cost_s(t), t))
 
 
 def _moved(found: Mapping[int, set[str]], old: str, new: str) -> dict[int, set[str]]:
