@@ -24,7 +24,7 @@ from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analyses import forced_response as analysis
-from stickslip.study.analyses.forced import examination, stable
+from stickslip.study.analyses.forced import examination, looked, stable
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.examining import (
     CARRIED,
@@ -191,7 +191,7 @@ def test_nothing_is_examined_or_integrated_twice(monkeypatch: pytest.MonkeyPatch
     whole = solved(asked)
     first = dataset(whole)
     times: list[str] = []
-    monkeypatch.setattr(analysis, "examine", lambda *_: times.append("examined"))
+    monkeypatch.setattr(looked, "examine", lambda *_: times.append("examined"))
     monkeypatch.setattr(analysis, "check_in_time", lambda *_: times.append("integrated"))
 
     class Kept:

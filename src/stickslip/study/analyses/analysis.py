@@ -137,18 +137,22 @@ class Pieces:
         On the clock: pieces that are made faster are made again.
     places
         Of the pieces that are kept.
+    taken
+        Number of pieces that a stopped job had made.
     """
 
     notes: Notes
     name: str
     seconds: float = 0.5
     places: set[str] = field(default_factory=set)
+    taken: int = 0
 
     def keep(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
         """Return what `make` makes, or what it made before the job was stopped; `content` is all that this depends on."""
         place = f"{self.name} {sha256(content.encode()).hexdigest()}"
         known = self.notes.get(place)
         if known is not None:
+            self.taken += place not in self.places
             self.places.add(place)
             return known
         began = perf_counter()

@@ -16,7 +16,7 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
-from stickslip.study.analyses.analysis import Case, Notes, Pieces, Solved, TextTable
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced.bifurcating import (
     bifurcations_line,
     followed,
@@ -44,6 +44,7 @@ from stickslip.study.analyses.forced.known import (
     nothing_pressed,
     off_engine_order,
 )
+from stickslip.study.analyses.forced.looked import Looked
 from stickslip.study.analyses.forced.model_change import model_changes
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.not_periodic import (
@@ -67,7 +68,6 @@ from stickslip.study.analyses.forced.section import ForcedResponse
 from stickslip.study.analyses.forced.stable import (
     Examined,
     cost_line,
-    examine,
     to_integrate,
     with_motion,
 )
@@ -310,18 +310,9 @@ def _examined(question: Question, response: Response, notes: Notes) -> list[Exam
 
     Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
     """
-    count = 0
-
-    def look(accepted: Accepted) -> Examined:
-        nonlocal count
-        name, count = f"{STABLE}.{count}", count + 1
-        known, pieces = notes.get(name), Pieces(notes, name)
-        one = Examined(**known) if known else examine(question, accepted, pieces.keep)
-        notes.put(name, asdict(one))
-        pieces.give_up()
-        return one
-
+    look = Looked(question, notes)
     found = examined_points(question, response, look)
+    look.tell()
     for _ in range(MOST_PEAKS):
         peak = with_stable_peak(response, found)
         if not to_integrate(question, peak, found) or peak.top is None:

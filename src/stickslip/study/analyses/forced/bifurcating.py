@@ -13,7 +13,7 @@ from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability import Stability, hill_stability, stability
 from stickslip.response.time.floquet import Floquet
-from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.analysis import Notes, Pieces
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import (
     FLOPS,
@@ -41,7 +41,7 @@ NOT_FOLLOWED = (
 
 @dataclass(eq=False)
 class Remembered:
-    """Multipliers in the order in which they are asked for; what an interrupted run has asked for is not done again."""
+    """Multipliers in the order in which they are asked for; what an interrupted run has asked for is not done again, nor pieces of Hill's method."""
 
     notes: Notes
     hill: bool = False
@@ -53,7 +53,8 @@ class Remembered:
         name = f"bifurcations.{self.count}"
         known = self.notes.get(name)
         if known is None or known["omega"] != point.omega:
-            found = _by_hill(problem, point) if self.hill else stability(problem, point)
+            pieces = Pieces(self.notes, name)
+            found = _by_hill(problem, point, pieces) if self.hill else stability(problem, point)
             values = found.floquet.multipliers
             known = {
                 "omega": point.omega,
@@ -63,6 +64,7 @@ class Remembered:
                 "moduli": found.errors if found.moduli is None else found.moduli,
             }
             self.notes.put(name, known | {word: getattr(found, word) for word in COUNTS})
+            pieces.give_up()
             return found
         floquet = Floquet(np.asarray(known["re"]) + 1j * np.asarray(known["im"]))
         moduli = np.asarray(known.get("moduli", known["errors"]))
@@ -87,9 +89,9 @@ def located(question: Question, response: Response, notes: Notes) -> Bifurcation
         return replace(found, unseen=(*found.unseen, (min(omega), max(omega), f"{error}")))
 
 
-def _by_hill(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+def _by_hill(problem: ForcedProblem, point: ForcedPoint, pieces: Pieces) -> Stability:
     """Return the multipliers of a motion by Hill's method; none where it did not find all that it counted."""
-    found = hill_stability(problem, point)
+    found = hill_stability(problem, point, pieces.keep)
     if found.missing == 0:
         return found.stability
     none = np.array([np.nan + 0j])

@@ -1,0 +1,52 @@
+"""Examinations of a job that may be stopped: what it has examined, and pieces of what it was at, are taken over by the next run."""
+
+from dataclasses import asdict, dataclass
+
+from stickslip.study.analyses.analysis import Notes, Pieces
+from stickslip.study.analyses.forced.points import Accepted
+from stickslip.study.analyses.forced.question import STABLE, Question
+from stickslip.study.analyses.forced.stable import Examined, examine
+from stickslip.study.keep.progress import LOG
+from stickslip.units import HZ
+
+
+@dataclass(eq=False)
+class Looked:
+    """Examines points in the order in which they are asked for.
+
+    Parameters
+    ----------
+    question
+        Of the case.
+    notes
+        Of the job.
+    count
+        Points that were asked for.
+    taken
+        Those of them that a stopped run had examined.
+    """
+
+    question: Question
+    notes: Notes
+    count: int = 0
+    taken: int = 0
+
+    def __call__(self, accepted: Accepted) -> Examined:
+        """Return what is found of the stability of a point."""
+        name, self.count = f"{STABLE}.{self.count}", self.count + 1
+        known, pieces = self.notes.get(name), Pieces(self.notes, name)
+        one = Examined(**known) if known else examine(self.question, accepted, pieces.keep)
+        self.taken += bool(known)
+        self.notes.put(name, asdict(one))
+        pieces.give_up()
+        if pieces.taken:
+            self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")  # fmt: skip
+        return one
+
+    def tell(self) -> None:
+        """Say how many points were known."""
+        if self.taken:
+            self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")  # fmt: skip
+
+    def _say(self, text: str) -> None:
+        LOG.info(f"stability: {self.question.said(text)}")
