@@ -10,14 +10,20 @@ from stickslip.assembly.more_modes import with_more_modes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import Damping
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.part import solid_part
 from stickslip.model.structure import Structure
 from stickslip.reduction.choice import Reduction
+from stickslip.response.forced import other_motions
+from stickslip.response.forced.problem import forced_problem
+from stickslip.response.forced.response import accepted_points, forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.physics.fewer_points import halved
 from stickslip.response.system import System
+from stickslip.response.time.marcher import step_work
 from tests.solid_models import box
 
 LENGTH, THICKNESS = 0.1, 0.004
@@ -153,3 +159,63 @@ def test_another_motion_beside_the_response_is_named():
     # first harmonic of the amplitude equation; the third moves it by less than 1 % on the lower branch
     left = np.hypot(1e4 - omega**2 + 0.75e8 * size**2, 4.0 * omega) * size
     assert left == pytest.approx(100.0, rel=0.01)
+
+
+def stop_at(hz: list[float]) -> dict[float, tuple[int, int]]:
+    """Return verdict and stability of a mass that meets a stop, by frequency."""
+    body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), np.eye(1), names=("m",))
+    stop = ss.Contact(
+        between=("b.m", "ground"), law=ss.UnilateralSpring(k_n=5e3, initial_gap=1e-3), acts="normal"
+    )
+    model = ss.Model(
+        parts={"b": ss.Part(structure=body)},
+        contacts={"stop": stop},
+        loads={"f": ss.Load(on="b.m", newton=2.0)},
+        outputs=(ss.Output(name="m", on="b.m"),),
+    )
+    data = model.forced_response(hz=hz, peak_points=0)["forced_response"]
+    words = zip(data.verdict.values.tolist(), data.motion_stability.values.tolist(), strict=True)
+    return dict(zip(data.frequency_hz.values.tolist(), words, strict=True))
+
+
+def test_verdict_and_stability_depend_on_no_other_frequencies():
+    """Lists of 9 and 129 frequencies up to the jump of a stop say the same at those that they share."""
+    few, many = (stop_at(np.linspace(15.0, 17.0, n).tolist()) for n in (9, 129))
+    assert len(few) == 9
+    assert {hz: many[hz] for hz in few} == few
+
+
+def duffing_points():
+    """A problem of one mass with a cubic spring, and points of its response."""
+    structure = Structure(np.eye(1), 4.0 * np.eye(1), 1e4 * np.eye(1), numbered_dofs(1))
+    contact = Interface(("c",), (CubicSpring(cubic_t=1e8),), np.array([[1.0], [0.0], [0.0]]))
+    system = System(structure, contact, np.array([0]))
+    load = HarmonicLoad(np.zeros(1), {1: np.array([100.0 + 0j])})
+    sweep = Sweep(omega_range=(50.0, 90.0), points=5, peak_points=0)
+    return (
+        forced_problem(system, load, sweep),
+        accepted_points(list(forced_response(system, load, sweep))),
+    )
+
+
+def test_a_search_for_other_motions_marches_within_the_work_of_the_response(monkeypatch):
+    """Where the solutions took no work no motion is marched from rest; else at most as many periods as it pays for."""
+    problem, points = duffing_points()
+    marched = []
+
+    def marching(*given):
+        marched.append(given[-1])
+        return None, given[-1]
+
+    monkeypatch.setattr(other_motions, "_from_rest", marching)
+    assert not list(other_motions.other_motions(problem, points[:2], [], 0))
+    assert not marched
+    each = replace(points[0], iterations=1)
+    few = [each] * 40
+    list(other_motions.other_motions(problem, points[:3], few, 0))
+    work = (1 + other_motions.JUDGED) * (
+        other_motions.NEWTON_FLOPS + other_motions.FLOPS_AN_UNKNOWN * each.unknowns
+    )
+    period = other_motions.STEPS * other_motions.LONGER * step_work(1, 3)
+    assert marched
+    assert sum(marched) * period <= other_motions.MARCHED * 40 * work

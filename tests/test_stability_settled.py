@@ -15,7 +15,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.stability import stability
+from stickslip.response.stability import settled, stability
 from stickslip.response.stability.course import course_of, sign_of
 from stickslip.response.stability.cycle import cycle_of, has_transitions
 from stickslip.response.stability.found import NEUTRAL, Stability, changes
@@ -53,6 +53,31 @@ def test_a_pair_of_one_damped_mass_has_the_modulus_of_its_damping_whatever_its_c
             assert abs(found.multiplier - exact) <= found.multiplier_error + 1e-9
         moved += found.transitions > 0
     assert moved > 3
+
+
+def test_no_motion_is_solved_without_need(monkeypatch):
+    """Each motion that is solved with more harmonics has its multipliers taken: none is solved when the verdict is known."""
+    problem, points = stopped(
+        Sweep(omega_range=(0.85, 1.35), points=12, peak_points=0, low=1, high=3)
+    )
+    solved, taken = [], []
+    more_harmonics, of_point = settled.more_harmonics, settled.of_point
+
+    def solving(*given):
+        for more in more_harmonics(*given):
+            solved.append(more.point)
+            yield more
+
+    def taking(problem, point):
+        taken.append(point)
+        return of_point(problem, point)
+
+    monkeypatch.setattr(settled, "more_harmonics", solving)
+    monkeypatch.setattr(settled, "of_point", taking)
+    for point in points:
+        stability(problem, point)
+    assert solved
+    assert {id(p) for p in solved} <= {id(p) for p in taken}
 
 
 def test_what_nothing_damps_is_neutral_and_not_integrated_for_long():

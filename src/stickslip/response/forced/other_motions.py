@@ -18,18 +18,24 @@ from stickslip.response.ladder import at_rest
 from stickslip.response.time.marcher import prepared, step_work
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import start_from_harmonics
-from stickslip.solve.newton_method import newton
+from stickslip.solve.newton_method import Newton, Solution, newton
 
 NO_MOTION = (StickslipError, np.linalg.LinAlgError, FloatingPointError)
 ANOTHER = 0.01  # relative difference of amplitudes of two motions
 NEWTON_STEPS = 30  # from each start
+FEW = 3  # harmonics with which a start is tried first: most lead back to the motion that is known, or nowhere
+SAME = 1e-3  # relative difference of two motions with few harmonics that are one
 STEPS = 256  # of a period in time: Newton's method makes the motion exact
 PERIODS = 60  # marched from rest, at most
 FEWEST_PERIODS = 12  # fewer lead nowhere
 REPEATS = (
     1e-4  # change of the gaps' harmonics from period to period, of their size, that ends the march
 )
-SOLVER_STEP_FLOPS = 3e6  # of a Newton step, however few unknowns it has
+MARCHED = 0.4  # work of all marches over that of the solutions of the response
+# of a Newton step, and more for each of its unknowns: with contacts, as measured from 200 to 2200 unknowns
+NEWTON_FLOPS, FLOPS_AN_UNKNOWN = 3e6, 2e5
+JUDGED = 6  # Newton steps that the judgement of a solution takes as long as
+LONGER = 6.0  # a step in time lasts so many times longer than its operations do in a Newton step: with 734 coordinates six, with 140 two
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +79,19 @@ def other_motions(
     """
     if problem.system.interface.rigid or isinstance(problem.system.structure, Unreduced):
         return
-    periods = _affordable(problem, solved_points, len(points))
+    allowed = _allowed(problem, solved_points)
+    options = replace(problem.sweep.newton, max_iterations=NEWTON_STEPS)
     for point in points:
         seen: list[float] = [problem.amplitude(point, output)]
         balance = problem.balance(point.support)
-        for start, x in _starts(problem, balance, point, periods):
-            options = replace(problem.sweep.newton, max_iterations=NEWTON_STEPS)
-            found = newton(lambda v: balance.linearise(v, point.omega), x, options)  # noqa: B023
+        periods = _affordable(problem, allowed)
+        starts = [*_linear_starts(problem, point, options)]
+        if periods >= FEWEST_PERIODS:
+            marched, taken = _from_rest(problem, balance, point.omega, periods)
+            allowed -= taken * _period_work(problem)
+            starts += [] if marched is None else [("rest", marched)]
+        for start, x in starts:
+            found = _solved(balance, point.omega, x, options)
             if not found.status.converged:
                 continue
             made = forced_point(balance, found, "point", point.index, point.omega, 0.0)
@@ -89,25 +101,36 @@ def other_motions(
                 yield OtherMotion(start, made, size, seen[0])
 
 
-def _starts(
-    problem: ForcedProblem, balance: AnyBalance, point: ForcedPoint, periods: int
+def _linear_starts(
+    problem: ForcedProblem, point: ForcedPoint, options: Newton
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield what each start is and its scaled unknowns; what cannot be had is left out."""
-    for name, make in (
-        ("contacts stuck", _stuck),
-        ("contacts open", _open),
-    ):
+    """Yield the starts from linear vibrations that may lead to another motion, as scaled unknowns of the point's harmonics.
+
+    Each is solved with few harmonics first. What leads nowhere then, or to the motion of the point with as few, is left out.
+    """
+    whole = problem.balance(point.support)
+    few = problem.balance(tuple(h for h in point.support if h <= max(FEW, *problem.driven)))
+    known = None
+    if len(few.harmonics) < len(whole.harmonics):
+        own = _solved(few, point.omega, few.unknowns(point.coefficients), options)
+        known = few.coefficients(own.x) if own.status.converged else None
+    for name, make in (("contacts stuck", _stuck), ("contacts open", _open)):
         try:
-            yield name, make(problem, balance, point.omega)
+            x = make(problem, few, point.omega)
         except NO_MOTION:
             continue
-    if periods >= FEWEST_PERIODS:
-        try:
-            start = _from_rest(problem, balance, point.omega, periods)
-        except NO_MOTION:
-            return
-        if start is not None:
-            yield "rest", start
+        if known is not None:
+            found = _solved(few, point.omega, x, options)
+            motion = few.coefficients(found.x)
+            apart = np.linalg.norm(motion - known) > SAME * np.linalg.norm(known)
+            if not (found.status.converged and apart):
+                continue
+            x = found.x
+        yield name, whole.unknowns(few.coefficients(x))
+
+
+def _solved(balance: AnyBalance, omega: float, x: FloatArray, options: Newton) -> Solution:
+    return newton(lambda v: balance.linearise(v, omega), x, options)
 
 
 def _stuck(problem: ForcedProblem, balance: AnyBalance, omega: float) -> FloatArray:
@@ -132,21 +155,31 @@ def _open(problem: ForcedProblem, balance: AnyBalance, omega: float) -> FloatArr
 
 def _from_rest(
     problem: ForcedProblem, balance: AnyBalance, omega: float, periods: int
-) -> FloatArray | None:
-    """Return the harmonics of the last period of a march from rest under the static loads; None where it grows beyond all numbers."""
+) -> tuple[FloatArray | None, int]:
+    """March from rest under the static loads.
+
+    Returns
+    -------
+    tuple
+        Unknowns of the harmonics of the last period, None where the motion grows beyond all numbers or cannot be begun; and how many
+        periods were marched.
+    """
     system, linear = problem.system.at(omega), balance.linear
     interface = system.interface
-    still = linear.recover(omega, at_rest(problem.system, balance, omega))
+    try:
+        still = linear.recover(omega, at_rest(problem.system, balance, omega))
+    except NO_MOTION:
+        return None, 0
     start = start_from_harmonics(still, omega, interface.gap_operator, interface.laws)
     marcher = prepared(
         system.structure, interface.gap_operator, interface.laws, linear.load_at(omega), omega,
         STEPS, interface.weights,
     )  # fmt: skip
     state, record = marcher.begun(start), marcher.record()
-    before = None
-    for _ in range(periods):
+    before, taken = None, 0
+    for taken in range(1, periods + 1):
         if marcher.march(state, record) < 0 or overflowed(state.x, record.motion):
-            return None
+            return None, taken
         gaps = record.gap.reshape(marcher.steps, -1)
         now = period_harmonics(gaps[-1], gaps, balance.order)
         size = float(np.linalg.norm(now[1:]))
@@ -155,14 +188,25 @@ def _from_rest(
         before = now
     motion = record.motion @ marcher.modes.basis.T
     every = period_harmonics(motion[-1], motion, balance.order)
-    return balance.unknowns(np.asarray(every[:, linear.retained]))
+    return balance.unknowns(np.asarray(every[:, linear.retained])), taken
 
 
-def _affordable(problem: ForcedProblem, solved_points: Sequence[ForcedPoint], starts: int) -> int:
-    """Return how many periods may be marched from each start: all together no more work than the points took."""
-    structure, interface = problem.system.structure, problem.system.interface
+def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> float:
+    """Return the operations that all marches may take together; none where the structure is not marched."""
+    structure = problem.system.structure
     if isinstance(structure, TunedWheel) or structure.of_harmonic(1).loss is not None:
-        return 0
-    spent = sum(p.iterations * (SOLVER_STEP_FLOPS + float(p.unknowns) ** 3) for p in solved_points)
-    step = step_work(structure.n, 3 * interface.n_contacts)
-    return min(PERIODS, int(spent / (STEPS * step * max(starts, 1))))
+        return 0.0
+    return MARCHED * sum(
+        (p.iterations + JUDGED) * (NEWTON_FLOPS + FLOPS_AN_UNKNOWN * p.unknowns)
+        for p in solved_points
+    )
+
+
+def _affordable(problem: ForcedProblem, allowed: float) -> int:
+    """Return how many periods may be marched."""
+    return min(PERIODS, int(allowed / _period_work(problem)))
+
+
+def _period_work(problem: ForcedProblem) -> float:
+    structure, interface = problem.system.structure, problem.system.interface
+    return STEPS * LONGER * step_work(structure.n, 3 * interface.n_contacts)

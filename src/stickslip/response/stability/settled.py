@@ -82,9 +82,8 @@ def _settled(
     problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
 ) -> Stability:
     """Return the stability with more and more harmonics, until more would tell nothing else: errors are so many `times` the change from the last rung."""
-    for more in more_harmonics(problem, last.point):
-        if best.settled:
-            break
+    rungs = more_harmonics(problem, last.point)
+    while not best.settled and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)
         work += found.work + more.work
         if found.unknown:
