@@ -15,7 +15,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.stability import settled, stability
+from stickslip.response.stability import settled, settled_stability, stability
 from stickslip.response.stability.course import course_of, sign_of
 from stickslip.response.stability.cycle import cycle_of, has_transitions
 from stickslip.response.stability.found import NEUTRAL, Stability, changes
@@ -186,3 +186,58 @@ def test_an_unstable_stretch_is_an_answer_and_marks_no_case(tmp_path):
     drawn = result.plot("response")
     dashes = [t.line.dash for t in drawn.data if isinstance(t, go.Scatter) and t.line.dash]
     assert "dash" in dashes
+
+
+def with_another_verdict(monkeypatch, order: int, size: float) -> None:
+    """Let motions with harmonics up to `order` have a multiplier of modulus `size`, and those with more one of 0.9."""
+
+    def told(_, point):
+        pair = np.full(2, size if point.order <= order else 0.9, dtype=complex)
+        return Stability(Floquet(pair), np.zeros(2), 0, 0, 4)
+
+    monkeypatch.setattr("stickslip.response.stability.settled.of_point", told)
+
+
+@pytest.mark.parametrize(("size", "another"), [(1.2, True), (0.95, False)])
+def test_a_motion_on_the_other_side_of_the_circle_comes_with_its_verdict(
+    monkeypatch, size, another
+):
+    problem, points = stopped(Sweep(omega_range=(0.95, 1.1), points=4, peak_points=0))
+    point = points[-1]
+    with_another_verdict(monkeypatch, point.order, size)
+    found = settled_stability(problem, point)
+    assert found.stability.verdict == "stable"
+    assert (found.motion is not None) == another
+    if found.motion is not None:
+        assert found.motion.order > point.order
+        assert problem.real_error(point, found.motion) < 0.05
+        # nothing is known of a point from a motion that is farther away than the threshold
+        monkeypatch.setattr(type(problem), "real_error", lambda *_: 0.06)
+        far = settled_stability(problem, point)
+        assert far.motion is None
+        assert far.stability.verdict == "undecided"
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_a_point_is_told_by_the_motion_whose_stability_is_told(monkeypatch, fixed):
+    """With ``high = "auto"`` that motion takes its place; where a study fixes fewer harmonics the multipliers leave it undecided."""
+    body = ss.model.lumped(np.eye(1), np.eye(1), DAMPING * np.eye(1), names=("x",))
+    stop = ss.Contact(between=("body.x", "ground"), law=ss.UnilateralSpring(k_n=20.0, initial_gap=1.0), acts="normal")  # fmt: skip
+    model = ss.Model(
+        parts={"body": ss.Part(structure=body)}, contacts={"stop": stop}, loads={"shaker": ss.Load(on="body.x", newton=0.15)},
+    )  # fmt: skip
+    keys = {"hz": [h / (2 * np.pi) for h in (0.95, 1.0, 1.05)]} | ({"high": 3} if fixed else {})
+    before = model.forced_response(**keys)["forced_response"]
+    most = int(before.order.values.max())
+    with_another_verdict(monkeypatch, most, 1.2)
+    after = model.forced_response(**keys)["forced_response"]
+    assert after.sizes["point"] == before.sizes["point"]
+    said = [str(t) for t in after.stability_sentence.values]
+    if fixed:
+        assert np.array_equal(after.order.values, before.order.values)
+        assert any("the harmonics asked for are too few for its stability" in t for t in said)
+    else:
+        own = before.order.values == most
+        assert np.all(after.order.values[own] > most)
+        assert set(after.motion_stability.values[own]) == {0}
+    assert after.amplitude.values == pytest.approx(before.amplitude.values, rel=0.05)

@@ -20,11 +20,11 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
+from stickslip.response.stability.settled import Settled
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
-from stickslip.study.analyses import forced_response as analysis
-from stickslip.study.analyses.forced import examination, looked, stable
+from stickslip.study.analyses.forced import examination, looked, stable, with_stability
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.examining import (
     CARRIED,
@@ -87,13 +87,13 @@ def at_peak(data: xr.Dataset) -> int:
 
 def undecided(monkeypatch: pytest.MonkeyPatch) -> Question:
     """The flank above a fold, whose multipliers are given an error that reaches the unit circle."""
-    known = stable.stability
+    known = stable.settled_stability
 
-    def rough(problem: object, point: object, more: object) -> Stability:
-        found = known(problem, point, more)  # type: ignore[arg-type]
-        return replace(found, errors=np.full_like(found.errors, 0.5), moduli=None)
+    def rough(problem: object, point: object, more: object) -> Settled:
+        found = known(problem, point, more).stability  # type: ignore[arg-type]
+        return Settled(replace(found, errors=np.full_like(found.errors, 0.5), moduli=None))
 
-    monkeypatch.setattr(stable, "stability", rough)
+    monkeypatch.setattr(stable, "settled_stability", rough)
     return lifted(omega_range=(1.29, 1.6), direction="down", low=1, high=1, points=12)
 
 
@@ -192,7 +192,7 @@ def test_nothing_is_examined_or_integrated_twice(monkeypatch: pytest.MonkeyPatch
     first = dataset(whole)
     times: list[str] = []
     monkeypatch.setattr(looked, "examine", lambda *_: times.append("examined"))
-    monkeypatch.setattr(analysis, "check_in_time", lambda *_: times.append("integrated"))
+    monkeypatch.setattr(with_stability, "check_in_time", lambda *_: times.append("integrated"))
 
     class Kept:
         def __init__(self) -> None:
@@ -320,7 +320,7 @@ def test_a_large_wheel_is_not_examined_whatever_waves_it_has(
     asked = on_a_wheel(small, n, contacts, every=every)
     wheel = asked.model.system
     assert wheel.structure.has_every_wave == every
-    monkeypatch.setattr(stable, "stability", lambda *_: pytest.fail("it was examined"))
+    monkeypatch.setattr(stable, "settled_stability", lambda *_: pytest.fail("it was examined"))
     assert f"not examined, against every wave all 12 sectors count, {12 * n} " in cost_line(asked)
     assert examine(asked, point).verdict == "not examined"
     assert not examination.examines_every_wave(wheel)
@@ -336,7 +336,9 @@ def test_a_large_wheel_is_examined_by_hills_method_at_its_peak(
     response = response_of(small)
     asked = on_a_wheel(small, 200, 20, every=True)
     vars(asked)["problem"] = small.problem  # that of a wheel without gaps cannot be set up
-    monkeypatch.setattr(stable, "stability", lambda *_: pytest.fail("the monodromy was begun"))
+    monkeypatch.setattr(
+        stable, "settled_stability", lambda *_: pytest.fail("the monodromy was begun")
+    )
     outside = Floquet(np.array([1.2 + 0.0j]))
     grown = Stability(outside, np.array([1e-3]), 0, 0, 4)
     wave = WaveDisturbance(1.2 + 0.0j, 9, 1.0, 50.0 * HZ)

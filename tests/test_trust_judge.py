@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from evidence.trust.ask import model_of
 from evidence.trust.draw import Contact, Machine, draw
 from evidence.trust.march import Judge
 
@@ -77,6 +78,49 @@ def test_the_turn_of_a_branch_is_found_beside_its_frequency() -> None:
     assert abs(beyond.multiplier - 1.0) <= beyond.multiplier_error
     far = Judge(machine, omega * (1 + 1e-3)).orbit(motion)
     assert far is None or abs(far.motion[1, 0] / motion[1, 0] - 1.0) > 0.5
+
+
+def lifting_pad(omega: float) -> tuple[Machine, np.ndarray]:
+    """Return two coupled dofs on a pad that opens once in a cycle, and the motion that they settle on."""
+    stiffness = np.array([[1.0, 0.3], [0.3, 2.0]])
+    pad = Contact(
+        "pad", np.array([1.0, 0.0]), np.array([0.0, 1.0]), stiffness=5.0, normal_stiffness=20.0, friction=0.4, preload=0.1,
+    )  # fmt: skip
+    machine = Machine(
+        0, "pad", np.eye(2), 0.08 * np.eye(2), stiffness, (1, 1), ("x", "z"), (pad,), np.array([0.2 + 0j, 0.3 + 0.1j]),
+        np.array([0.0, 0.1]), 1, (0.9 * omega / (2 * np.pi), 1.1 * omega / (2 * np.pi)),
+    )  # fmt: skip
+    judge, state = Judge(machine, omega), np.zeros(5)
+    for _ in range(200):
+        state, motion, _ = judge.flow(state, omega, judge.steps)
+    return machine, motion
+
+
+def test_a_landing_that_moves_in_time_counts_in_the_multipliers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A slider holds where its pad touches: the map of a period knows this from disturbances within a step as from those over many."""
+    machine, motion = lifting_pad(1.7)
+    narrow = Judge(machine, 1.7).orbit(motion)
+    monkeypatch.setattr("evidence.trust.march.NUDGE", 1e-3)
+    wide = Judge(machine, 1.7).orbit(motion)
+    assert narrow is not None
+    assert wide is not None
+    assert narrow.multiplier == pytest.approx(wide.multiplier, abs=5e-3)  # 0.13 apart without
+
+
+def test_the_package_tells_the_multiplier_of_a_pad_that_lifts() -> None:
+    """Two programs, one by balance and transitions, one by marching."""
+    machine, motion = lifting_pad(1.7)
+    found = Judge(machine, 1.7).orbit(motion)
+    assert found is not None
+    hz = 1.7 / (2 * np.pi)
+    data = model_of(machine).forced_response(hz=[hz, 1.01 * hz, 1.02 * hz])["forced_response"]
+    own = int(np.argmin(np.abs(data.stability_frequency_hz.values - hz)))
+    assert data.stability_frequency_hz.values[own] == hz
+    error = float(data.stability_multiplier_error[own]) + 3 * found.multiplier_error
+    assert error < 0.03  # a landing that does not move in time takes 0.036 off
+    assert abs(float(data.stability_multiplier[own]) - found.multiplier) <= error
 
 
 def test_machines_are_the_same_whenever_they_are_drawn() -> None:

@@ -11,8 +11,7 @@ from small_v2 import changed, write_four_masses, write_shrouded_sector, write_tw
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult
-from stickslip.study.analyses import forced_response as analysis
-from stickslip.study.analyses.forced import in_time
+from stickslip.study.analyses.forced import in_time, with_stability
 from stickslip.study.analyses.forced.comparison import STEPS, Check
 from stickslip.study.analyses.forced.in_time import check_in_time, chosen, refined
 from stickslip.study.analyses.forced.points import Response, collect
@@ -74,7 +73,7 @@ def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
         journal.put("finished", {"points": len(response.solved)})
         found = solve(journal, response.solved)
         # a model that cannot be integrated: the second time everything comes from the journal
-        monkeypatch.setattr(analysis, "check_in_time", None)
+        monkeypatch.setattr(with_stability, "check_in_time", None)
         again = solve(journal, response.solved)
     assert list(again["verify_sentence"]) == list(found["verify_sentence"])
     # a linear motion: exact but for the start from few harmonics, tolerance of settling 1e-5

@@ -3,11 +3,13 @@
 The march is the classical Runge-Kutta method with steps of the same length. A slider's place is part of the state and moves at the end of each step as
 far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
 
-Newton's method at the told frequency may leave for another motion, or find none, where the branch turns: there the motion and the frequency of the
-branch's nearest point are solved for together (Gauss-Newton steps of least length). It counts where its frequency is that of the point within `NEARBY`.
+Newton's method at the told frequency may leave for another motion. What is farther from the told one than `CLOSE` is looked for again, with steps
+that are cut, and from the told motion at other times of its period; the nearest counts. Where the branch turns there may
+be none at that frequency: there the motion and the frequency of the branch's nearest point are solved for together (Gauss-Newton steps of least length).
+It counts where its frequency is that of the point within `NEARBY`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -27,6 +29,9 @@ CLOSED = 1e-8  # residual of a period over the size of the motion
 NUDGE = 1e-6  # difference step over the size of the motion
 HARMONICS = 6  # that are compared
 NEARBY = 1e-5  # relative difference of frequencies: at most 2 % of an amplitude with a damping ratio of 5e-4
+CLOSE = 5e-3  # of the largest amplitude: a balance is nearer to its motion as a rule
+LATER = (0.25, 0.5, 0.75)  # of a period
+CUT, CUT_STEPS = 0.3, 12  # share of a step that is taken, and how often, where whole steps leave
 ALIKE = 0.05  # of the largest amplitude: what is farther from the told motion is looked for beside the told frequency
 TURN = 1e-3  # relative change of the frequency that counts as much as a change of the motion by its amplitude
 
@@ -61,6 +66,23 @@ def _forces(kind, tangent, normal, number, q, place, out, moved, move):  # type:
             along = -spring
         for i in range(n):
             out[i] += tangent[c, i] * along + normal[c, i] * across
+
+
+@numba.njit(cache=True)
+def _landed(kind, tangent, normal, number, q, step, place):  # type: ignore[no-untyped-def]
+    """Put the sliders of pads that close within a step where they touch: else the map of a period would not know that a landing moves in time."""
+    for c in range(kind.size):
+        if kind[c] != PAD:
+            continue
+        t, z, along, across = 0.0, 0.0, 0.0, 0.0
+        for i in range(q.size):
+            t += tangent[c, i] * q[i]
+            z += normal[c, i] * q[i]
+            along += tangent[c, i] * step[i]
+            across += normal[c, i] * step[i]
+        gap = -(z + number[c, 4] / number[c, 2])
+        if gap > 0.0 and across > gap:
+            place[c] = t + along * gap / across
 
 
 @numba.njit(cache=True)
@@ -107,6 +129,7 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
         qd, vd = q + h * vc, v + h * c
         _forces(kind, tangent, normal, number, qd, place, contact, moved, False)
         _rate(inverse, damping, stiffness, load, qd, vd, contact, d)
+        _landed(kind, tangent, normal, number, q, h / 6 * (v + 2 * vb + 2 * vc + vd), place)
         q += h / 6 * (v + 2 * vb + 2 * vc + vd)
         v += h / 6 * (a + 2 * b + 2 * c + d)
         _forces(kind, tangent, normal, number, q, place, contact, moved, True)
@@ -191,6 +214,8 @@ class Judge:
         """Return the periodic motion beside a motion (H+1, n), at its frequency or where the branch passes nearest to it; None where none is found."""
         begin = self.start(motion)
         own = self._orbit(begin, free=False)
+        if own is None or self._apart(own, motion) > CLOSE:
+            own = self._nearest(begin, motion, own)
         if own is not None and self._apart(own, motion) <= ALIKE:
             return own
         near = self._orbit(begin, free=True)
@@ -198,13 +223,31 @@ class Judge:
             return near
         return own
 
+    def _nearest(
+        self, begin: Array, motion: npt.NDArray[np.complex128], own: Orbit | None
+    ) -> Orbit | None:
+        """Return the nearest of the motions that are found in other ways, and of that which was found."""
+        found = [own, self._orbit(begin, free=False, cut=CUT)]
+        found += [self._later(motion, share) for share in LATER]
+        return min(
+            (o for o in found if o is not None), key=lambda o: self._apart(o, motion), default=None
+        )
+
+    def _later(self, motion: npt.NDArray[np.complex128], share: float) -> Orbit | None:
+        """Return the motion that is found from the told one at a later time: that of the machine whose load is ahead, turned back."""
+        turn = np.exp(2j * np.pi * share * np.arange(max(len(motion), HARMONICS)))[:, None]
+        ahead = replace(self.machine, force=self.machine.force * turn[self.machine.harmonic, 0])
+        later = Judge(ahead, self.omega)
+        found = later._orbit(later.start(motion * turn[: len(motion)]), free=False)
+        return None if found is None else replace(found, motion=found.motion / turn[:HARMONICS])
+
     def _apart(self, orbit: Orbit, motion: npt.NDArray[np.complex128]) -> float:
         driven = self.machine.harmonic
         size = float(np.max(np.abs(orbit.motion[driven])))
         return float(np.max(np.abs(orbit.motion[driven] - motion[driven]))) / size
 
-    def _orbit(self, begin: Array, free: bool) -> Orbit | None:
-        one = self._shoot(begin, self.omega, self.steps, free)
+    def _orbit(self, begin: Array, free: bool, cut: float = 1.0) -> Orbit | None:
+        one = self._shoot(begin, self.omega, self.steps, free, cut)
         two = None if one is None else self._shoot(one.state, one.omega, 2 * self.steps, free)
         if one is None or two is None:
             return None
@@ -215,10 +258,12 @@ class Judge:
             error += abs(two.multiplier - 1.0)
         return Orbit(two.motion, off, two.multiplier, error, abs(two.omega / self.omega - 1.0))
 
-    def _shoot(self, state: Array, omega: float, steps: int, free: bool) -> _Closed | None:
+    def _shoot(
+        self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0
+    ) -> _Closed | None:
         """Return a motion that closes, at the frequency given or, `free`, at one beside it."""
         scale = self._scale(state, omega, steps)
-        for _ in range(NEWTON):
+        for number in range(NEWTON):
             end, found, moved = self.flow(state, omega, steps)
             off = (end - state) / scale
             jac = self._jacobian(state, omega, steps, scale)
@@ -230,6 +275,7 @@ class Judge:
             step = np.linalg.lstsq(matrix, off, rcond=1e-7)[0]
             size = np.max(np.abs(step))
             step *= min(1.0, 0.5 / size if size > 0.5 else 1.0)
+            step *= cut if number < CUT_STEPS else 1.0
             state = state + scale * step[: len(state)]
             if free:
                 omega *= 1.0 + TURN * float(step[-1])

@@ -81,8 +81,8 @@ def course_of(
     """
     branch = [i for i in range(along) if points[i].converged]
     others = [i for i in range(along, len(points)) if points[i].converged]
-    if not branch:
-        branch, others = sorted(others, key=lambda i: points[i].omega), []
+    if len(branch) < 2:  # nothing to find a place on
+        branch, others = sorted([*branch, *others], key=lambda i: points[i].omega), []
     steps = np.diff([points[i].omega for i in branch])
     back = steps[1:] * steps[:-1] < 0.0
     turned = np.zeros(max(len(branch) - 1, 0), dtype=bool)
@@ -124,7 +124,7 @@ def _inserted(
     points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]
 ) -> dict[int, list[int]]:
     """Return the points that lie within each step of a branch: where they make its way the least longer."""
-    if len(branch) < 2 or not others:
+    if not others:
         return {}
     rows = _scaled([points[i] for i in (*branch, *others)])
     own, rest = rows[: len(branch)], rows[len(branch) :]

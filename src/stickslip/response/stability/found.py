@@ -115,6 +115,12 @@ class Stability:
         }[self.verdict]
 
     @property
+    def grows(self) -> bool:
+        """Whether a multiplier lies outside the unit circle, errors apart."""
+        size, _ = self._judged
+        return bool(np.any(size > 1.0 + UNIT_TOLERANCE))
+
+    @property
     def _judged(self) -> tuple[FloatArray, FloatArray]:
         """Moduli of the multipliers that are judged, and their errors."""
         off = np.abs(self.floquet.multipliers - 1.0) > UNIT_TOLERANCE

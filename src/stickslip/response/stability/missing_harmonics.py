@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.judging import judging_set_of
 from stickslip.harmonic.selection.alert import silent
@@ -98,6 +98,17 @@ def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corre
 def newton_work(rows: int) -> float:
     """Return about the floating point operations of a Newton step, contacts and all: in proportion to its rows, from 99 to 3000 in cases measured."""
     return STEP_WORK * rows
+
+
+def with_more(
+    point: ForcedPoint, coefficients: ComplexArray, harmonics: IntArray, error: float
+) -> ForcedPoint:
+    """Return the motion of a point with more harmonics, and its predicted error, as a point on its own."""
+    none = np.zeros(0)
+    return replace(
+        point, coefficients=coefficients, harmonics=harmonics, predicted_error=error, iterations=0, tangent=none, step=0.0,
+        orientation=0.0, kept=np.zeros((0, 0), dtype=np.int64), seconds_contact=0.0, seconds_linear=0.0, seconds_total=0.0,
+    )  # fmt: skip
 
 
 def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPoint:

@@ -6,9 +6,14 @@ import numpy as np
 
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.forced.along import SAFETY
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.found import Stability, changes
-from stickslip.response.stability.missing_harmonics import corrected_by_step, more_harmonics
+from stickslip.response.stability.missing_harmonics import (
+    corrected_by_step,
+    more_harmonics,
+    with_more,
+)
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
 
@@ -19,21 +24,50 @@ OTHER = 2.0  # times more for either where the numbers of transitions differ
 
 @dataclass(frozen=True, eq=False)
 class _Rung:
-    """A motion on the way to one with all harmonics."""
+    """A motion on the way to one with all harmonics, and its relative difference from the one before."""
 
     point: ForcedPoint
     stability: Stability
+    change: float = float("nan")
 
 
-@by_one_thread
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """The stability of a point, and the motion that has it where the point as it was solved has another.
+
+    Parameters
+    ----------
+    stability
+        Of the motion with more harmonics.
+    motion
+        That motion, where the point as it was solved lies on the other side of the unit circle; its predicted error is its change from
+        fewer harmonics. None where both lie on the same side.
+    """
+
+    stability: Stability
+    motion: ForcedPoint | None = None
+
+
 def stability(
     problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
 ) -> Stability:
+    """Return the stability of a solved point of a forced response; see `settled_stability`, which returns the motion beside it."""
+    return settled_stability(problem, point, more).stability
+
+
+@by_one_thread
+def settled_stability(
+    problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
+) -> Settled:
     """Return the stability of a solved point of a forced response.
 
     The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them, times `ROUGHLY`, is
     their error. Where that leaves the verdict open the motion is solved, with about twice the harmonics each time, and the change from one
     solution to the next is the error: few harmonics give the times of transitions less well than amplitudes.
+
+    Beside a fold, or where contacts bounce, several motions lie within a few percent of each other, and more harmonics may lead to another
+    one. The verdict is then that of the motion that it comes with. One that is farther from the point than the threshold of the strategy
+    says nothing of it.
 
     Parameters
     ----------
@@ -59,17 +93,31 @@ def stability(
     if more is not None:
         found = of_point(problem, more)
         best = _unsure(first) if found.unknown else _compared(found, first, FIRST)
-        return _settled(problem, _Rung(more, found), 1.0, best, first.stability.work + found.work)
+        rung = _Rung(more, found, problem.real_error(point, more))
+        settled = _settled(problem, rung, 1.0, best, first.stability.work + found.work)
+        return _beside(problem, first, *settled)
     step = corrected_by_step(problem, point)
     if step is not None and step.point is point:
-        return first.stability
+        return Settled(first.stability)
     work, best = first.stability.work, _unsure(first)
     if step is not None:
         found = of_point(problem, step.point)
         work += found.work + step.work
         if not found.unknown:
             best = _compared(found, first, ROUGHLY)
-    return _settled(problem, first, FIRST, best, work)
+    return _beside(problem, first, *_settled(problem, first, FIRST, best, work))
+
+
+def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
+    """Return a verdict with its motion, where the point as it was solved has another; that nothing is known where that motion is no neighbour."""
+    grows = first.stability.grows
+    if last is first or found.verdict not in ("stable", "unstable") or grows == (found.verdict == "unstable"):  # fmt: skip
+        return Settled(found)
+    if problem.real_error(first.point, last.point) > problem.strategy.threshold:
+        return Settled(replace(_unsure(first), work=found.work))
+    bound = SAFETY[1] * last.change
+    own = last.point
+    return Settled(found, with_more(first.point, own.coefficients, own.harmonics, bound))
 
 
 def _unsure(rung: _Rung) -> Stability:
@@ -80,8 +128,8 @@ def _unsure(rung: _Rung) -> Stability:
 
 def _settled(
     problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
-) -> Stability:
-    """Return the stability with more and more harmonics, until more would tell nothing else: errors are so many `times` the change from the last rung."""
+) -> tuple[Stability, _Rung]:
+    """Return the stability with more and more harmonics, until more would tell nothing else, and the last motion: errors are so many `times` the change from it."""
     rungs = more_harmonics(problem, last.point)
     while not best.settled and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)
@@ -89,8 +137,9 @@ def _settled(
         if found.unknown:
             continue
         best = _compared(found, last, times)
-        last, times = _Rung(more.point, found), 1.0
-    return replace(best, work=work)
+        last = _Rung(more.point, found, problem.real_error(last.point, more.point))
+        times = 1.0
+    return replace(best, work=work), last
 
 
 def of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:

@@ -1,7 +1,6 @@
 """The steady vibration under harmonic loads, friction and all: branches, peaks, and how far its harmonics are to be trusted."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from time import perf_counter
 
 import numpy as np
@@ -28,12 +27,8 @@ from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.elsewhere import motions_elsewhere
 from stickslip.study.analyses.forced.estimate import estimate
-from stickslip.study.analyses.forced.examining import (
-    examined_points,
-    neighbours_of,
-    with_stable_peak,
-)
-from stickslip.study.analyses.forced.in_time import FLOPS, check_in_time, chosen
+from stickslip.study.analyses.forced.examining import neighbours_of
+from stickslip.study.analyses.forced.in_time import FLOPS, chosen
 from stickslip.study.analyses.forced.kinematics import motion_at_peak
 from stickslip.study.analyses.forced.known import (
     doubts_of_model,
@@ -44,7 +39,6 @@ from stickslip.study.analyses.forced.known import (
     nothing_pressed,
     off_engine_order,
 )
-from stickslip.study.analyses.forced.looked import Looked
 from stickslip.study.analyses.forced.model_change import model_changes
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.not_periodic import (
@@ -53,7 +47,7 @@ from stickslip.study.analyses.forced.not_periodic import (
     without_periodic,
 )
 from stickslip.study.analyses.forced.physics import PHYSICS, beforehand, of_physics, physics_of
-from stickslip.study.analyses.forced.points import Accepted, Response, collect, lost_point
+from stickslip.study.analyses.forced.points import Response, lost_point
 from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
     HARMONICS,
@@ -68,7 +62,6 @@ from stickslip.study.analyses.forced.section import ForcedResponse
 from stickslip.study.analyses.forced.stable import (
     Examined,
     cost_line,
-    to_integrate,
     with_motion,
 )
 from stickslip.study.analyses.forced.stable_words import peak_word, point_of, stability_log
@@ -82,13 +75,13 @@ from stickslip.study.analyses.forced.values import (
     of_response,
 )
 from stickslip.study.analyses.forced.verdicts import verdicts
+from stickslip.study.analyses.forced.with_stability import integrated, with_stability
 from stickslip.study.analyses.verdict import Verdict, to_json
 from stickslip.study.keep.progress import LOG, advance, sum_up
 from stickslip.units import HZ, millimetres
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
-MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
 BLADES = "blades"  # of a wheel whose sectors differ
 BIFURCATIONS = "bifurcations"
 NOT_PERIODIC = "not_periodic"
@@ -139,10 +132,7 @@ class ForcedResponseAnalysis:
             if not points:
                 points.append(lost_point(inputs.problem, error))
                 yield points[-1]
-        notes.put("finished", {"points": len(points)})
-        response = collect(inputs.problem, points, inputs.model.peak_output)
-        examined = _examined(inputs, response, notes)
-        response = with_stable_peak(response, examined)
+        response, examined = yield from with_stability(inputs, points, notes)
         _put_down(inputs, response, examined, notes)
         if inputs.model.blades is not None and notes.get(BLADES) is None:
             notes.put(BLADES, of_blades(inputs, response))
@@ -258,7 +248,7 @@ def _judge(
 ) -> list[Examined]:
     """Integrate in time what was asked for, and return what is known of the stability then."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
-    checks = {a.point.omega: _checked(question, response, a, examined, notes) for a in chosen_points}  # fmt: skip
+    checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}  # fmt: skip
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
     for one in told:
         known = notes.get(f"{IN_TIME}.{one.omega!r}")
@@ -303,44 +293,6 @@ def _bifurcations(
     for begin, side in sides:
         LOG.info(f"from {begin.omega / HZ:.6g} Hz: {question.said(side.sentence)}")
     return of_bifurcations(question, response, found, sides, examined)
-
-
-def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:
-    """Examine the stability; what an interrupted run has examined is not done again.
-
-    Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
-    """
-    look = Looked(question, notes)
-    found = examined_points(question, response, look)
-    look.tell()
-    for _ in range(MOST_PEAKS):
-        peak = with_stable_peak(response, found)
-        if not to_integrate(question, peak, found) or peak.top is None:
-            break
-        check = _checked(question, peak, peak.top, found, notes)
-        found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
-    return found
-
-
-def _checked(
-    question: Question,
-    response: Response,
-    accepted: Accepted,
-    examined: Sequence[Examined],
-    notes: Notes,
-) -> Check:
-    """Integrate in time; what an interrupted run has integrated is not done again."""
-    omega = accepted.point.omega
-    name = f"{IN_TIME}.{omega!r}"
-    known = notes.get(name)
-    if known:
-        check = Check(**known)
-    else:
-        doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
-        check = check_in_time(question, response, accepted, *doubted)
-    notes.put(name, asdict(check))
-    LOG.info(f"time integration: {question.said(check.sentence)}")
-    return check
 
 
 def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:

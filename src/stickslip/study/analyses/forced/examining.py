@@ -13,6 +13,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.course import Course, course_of
 from stickslip.response.stability.cycle import has_transitions
+from stickslip.response.stability.found import changes
 from stickslip.response.stability.missing_harmonics import newton_work
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import by_hill
@@ -157,15 +158,15 @@ class _Search:
             return False
         ends = (self.found[a], self.found[b])
         far = all(e.verdict == "stable" and e.multiplier + e.error < CARRIED for e in ends)
-        return far and self.course.like(a, b)
+        return far and self.course.like(a, b) and _inside_between(*ends)
 
     def _carried(self, place: int, a: int, b: int) -> Examined:
         ends = (self.found[a], self.found[b])
         larger = max(ends, key=lambda e: e.multiplier)
         low, high = sorted(e.omega / HZ for e in ends)
         said = (
-            f"carried along between {low:.3f} and {high:.3f} Hz: at both ends all multipliers are below {CARRIED:g}, and between them the "
-            "transitions in the cycle are the same and the branch does not turn"
+            f"carried along between {low:.3f} and {high:.3f} Hz: at both ends all multipliers are below {CARRIED:g}, none of them moves so far "
+            "between them that it may pass the unit circle, the transitions in the cycle are the same and the branch does not turn"
         )
         return Examined(
             self._omega(place), "stable", larger.multiplier, larger.error, said, basis="carried",
@@ -235,6 +236,18 @@ class _Search:
         for steps in (course.fold | course.turns, course.changes & ~course.fold):
             beside = {int(k) + d for k in np.flatnonzero(steps) for d in (0, 1)}
             yield from sorted(beside, key=lambda k: abs(k - peak))
+
+
+def _inside_between(one: Examined, other: Examined) -> bool:
+    """Whether no multiplier moves so far from one point to another that it may pass the unit circle between them.
+
+    A pair keeps the modulus of its damping while it moves along its circle, until it meets on the real axis: there one of the two may leave.
+    """
+    for a, b in ((one, other), (other, one)):
+        _, moduli = changes(a.multipliers, b.multipliers)
+        if not np.all(np.abs(a.multipliers) + moduli < 1.0):
+            return False
+    return True
 
 
 def largest(response: Response, known: list[Examined]) -> int:

@@ -1,11 +1,11 @@
 """Examinations of a job that may be stopped: what it has examined, and pieces of what it was at, are taken over by the next run."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from stickslip.study.analyses.analysis import Notes, Pieces
 from stickslip.study.analyses.forced.points import Accepted
 from stickslip.study.analyses.forced.question import STABLE, Question
-from stickslip.study.analyses.forced.stable import Examined, examine
+from stickslip.study.analyses.forced.stable import Examined, as_note, examine, from_note
 from stickslip.study.keep.progress import LOG
 from stickslip.units import HZ
 
@@ -35,9 +35,13 @@ class Looked:
         """Return what is found of the stability of a point."""
         name, self.count = f"{STABLE}.{self.count}", self.count + 1
         known, pieces = self.notes.get(name), Pieces(self.notes, name)
-        one = Examined(**known) if known else examine(self.question, accepted, pieces.keep)
+        one = (
+            from_note(known, accepted.point)
+            if known
+            else examine(self.question, accepted, pieces.keep)
+        )
         self.taken += bool(known)
-        self.notes.put(name, asdict(one))
+        self.notes.put(name, as_note(one))
         pieces.give_up()
         if pieces.taken:
             self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")  # fmt: skip

@@ -1,14 +1,19 @@
 """Whether a motion of a response is stable: what its multipliers say, and what a motion in time adds."""
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
+from stickslip.arrays import ComplexArray
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.stability import Stability, hill_stability, stability
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.problem import ForcedPoint
+from stickslip.response.stability import Stability, hill_stability, settled_stability
 from stickslip.response.stability.hill_segment import Keep, not_kept
+from stickslip.response.stability.missing_harmonics import with_more
 from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.stability.waves import (
     WaveDisturbance,
@@ -38,7 +43,7 @@ ONE_SECTOR = (
 BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not periodic": "unstable"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Examined:
     """What was found of the stability of a point.
 
@@ -63,6 +68,10 @@ class Examined:
         Of the point in the response.
     work
         Floating point operations that the examination took.
+    multipliers
+        All that are known, so that it can be said whether one may pass the unit circle on the way to another point.
+    raised
+        The motion with more harmonics that the verdict is of, where the point as it was solved has another one; else None.
     """
 
     omega: float
@@ -75,6 +84,8 @@ class Examined:
     basis: Basis = "examined"
     position: int = -1
     work: float = 0.0
+    multipliers: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    raised: ForcedPoint | None = None
 
     @property
     def doubted(self) -> bool:
@@ -110,14 +121,75 @@ def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Ex
     try:
         if hill:
             return _by_hill(question, accepted, keep)
-        found = stability(question.problem, accepted.point, accepted.audit)
+        settled = settled_stability(question.problem, accepted.point, accepted.audit)
+        found = settled.stability
         wave = _of_wave(question, accepted, found)
     except InputError as error:
         return Examined(omega, "not examined", np.nan, np.nan, error.problem, basis="not examined")
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         why = f"no multipliers ({error})"
         return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
-    return _seen(question, accepted, found, f"{found.reason}{wave}")
+    seen = _seen(question, accepted, found, f"{found.reason}{wave}")
+    return seen if settled.motion is None else _of_motion(question, seen, settled.motion)
+
+
+def _of_motion(question: Question, seen: Examined, motion: ForcedPoint) -> Examined:
+    """Return what was found with the motion that it was found of; undecided where a study fixes fewer harmonics than that has."""
+    if question.sweep.auto and question.problem.strategy.verifies:
+        return replace(seen, raised=motion)
+    more = f"with H = {motion.order} it is {seen.verdict}; the harmonics asked for are too few for its stability"
+    return replace(seen, verdict="undecided", reason=f"{seen.reason}: {more}")
+
+
+def with_raised(points: Sequence[ForcedPoint], examined: Sequence[Examined]) -> list[ForcedPoint]:
+    """Return the motions whose stability is told, where the points as they were solved have another: points that take their places.
+
+    Parameters
+    ----------
+    points
+        That stand in the response, by position.
+    examined
+        What is known of them.
+    """
+    raised = []
+    for one in examined:
+        if one.raised is not None:
+            own = points[one.position]
+            stage: Stage = "peak" if own.stage == "peak" else "settled"
+            raised.append(replace(one.raised, stage=stage, index=own.index))
+    return raised
+
+
+def as_note(examined: Examined) -> dict[str, Any]:
+    """Return what a job puts down of an examined point."""
+    note = asdict(replace(examined, raised=None))
+    del note["raised"], note["multipliers"]
+    note |= {"re": examined.multipliers.real, "im": examined.multipliers.imag}
+    more = examined.raised
+    if more is None:
+        return note
+    motion = {
+        "raised_re": more.coefficients.real,
+        "raised_im": more.coefficients.imag,
+        "raised_harmonics": more.harmonics,
+        "raised_error": more.predicted_error,
+    }
+    return note | motion
+
+
+def from_note(note: Mapping[str, Any], point: ForcedPoint) -> Examined:
+    """Return an examined point from what a job has put down of it."""
+    apart = ("re", "im", "raised_re", "raised_im", "raised_harmonics", "raised_error")
+    own = Examined(**{name: value for name, value in note.items() if name not in apart})
+    own = replace(own, multipliers=_complex(note, ""))
+    if "raised_re" not in note:
+        return own
+    harmonics, error = np.asarray(note["raised_harmonics"]), float(note["raised_error"])
+    return replace(own, raised=with_more(point, _complex(note, "raised_"), harmonics, error))
+
+
+def _complex(note: Mapping[str, Any], of: str) -> ComplexArray:
+    return np.asarray(note[f"{of}re"]) + 1j * np.asarray(note[f"{of}im"])
 
 
 def _by_hill(question: Question, accepted: Accepted, keep: Keep) -> Examined:
@@ -139,6 +211,7 @@ def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -
         said,
         large=too_large(question),
         work=hill_work(question.model.system) if by_hill(question.model.system) else found.work,
+        multipliers=found.floquet.multipliers,
     )
 
 
