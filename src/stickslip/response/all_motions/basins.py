@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.linear import one_structure
@@ -56,8 +56,8 @@ class Basins:
 def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Return the binomial interval of Clopper and Pearson (1934) for `count` of so many `starts`; (0, 1) without any."""
     rest_of = 0.5 * (1.0 - confidence)
-    low = float(beta.ppf(rest_of, count, starts - count + 1)) if count > 0 else 0.0
-    high = float(beta.ppf(1.0 - rest_of, count + 1, starts - count)) if count < starts else 1.0
+    low = float(betaincinv(count, starts - count + 1, rest_of)) if count > 0 else 0.0
+    high = float(betaincinv(count + 1, starts - count, 1.0 - rest_of)) if count < starts else 1.0
     return low, high
 
 
