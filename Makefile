@@ -48,7 +48,7 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 test: $(INSTALLED)  ## run the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20
 
-test-kernels: $(INSTALLED)  ## run the tests marked `kernel` with the processor's own LAPACK kernels and with those of Haswell
+test-kernels: $(INSTALLED)  ## run the tests marked `kernel` with the LAPACK kernels of Haswell, which `make test` does not have
 	$(ONE_THREAD) $(BIN)/python -m evidence.kernels --marked --workers $(WORKERS)
 
 coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
