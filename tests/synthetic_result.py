@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.study.keep.netcdf import write_tree
 
 CENTRIFUGAL = 400.0  # N
 MODAL_MASS = 2.0  # kg
@@ -399,5 +400,5 @@ def tree_of(root: dict[str, object] | None = None, **nodes: xr.Dataset) -> xr.Da
 
 def write_result(tree: xr.DataTree, path: Path) -> Path:
     """Write a result as netCDF-4 and return the path."""
-    tree.to_netcdf(path, engine="h5netcdf")
+    write_tree(tree, path)
     return path

@@ -19,6 +19,7 @@ from small_v2 import write_four_masses
 
 from stickslip.errors import InputError
 from stickslip.front.result import Result
+from stickslip.study.keep import netcdf
 from stickslip.study.keep.folder import locked_folder
 from stickslip.study.keep.netcdf import read_tree, write_tree
 from stickslip.study.models.study import read_study
@@ -246,15 +247,15 @@ def test_an_interrupt_waits_until_a_result_is_written(
 ) -> None:
     # HDF5 calls back while it writes, and what is raised there is lost
     tree = xr.DataTree(xr.Dataset({"x": ("i", np.arange(3.0))}))
-    made = xr.DataTree.to_netcdf
+    made = netcdf.to_bytes
     after = []
 
-    def interrupted(*words: object, **named: object) -> object:
+    def interrupted(tree: xr.DataTree) -> bytes:
         os.kill(os.getpid(), signal.SIGINT)
         after.append("goes on")
-        return made(*words, **named)  # type: ignore[arg-type]
+        return made(tree)
 
-    monkeypatch.setattr(xr.DataTree, "to_netcdf", interrupted)
+    monkeypatch.setattr(netcdf, "to_bytes", interrupted)
     before = signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # jobs in the background ignore it

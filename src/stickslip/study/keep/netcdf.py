@@ -10,6 +10,7 @@ import xarray as xr
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.checksum import Cut, check_file, with_checksum
+from stickslip.study.keep.netcdf4_file import of_file, root_attributes, to_bytes
 from stickslip.study.keep.whole import interrupted_later, write_whole
 
 _AGAIN = (
@@ -32,8 +33,7 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
     """
     # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
     with interrupted_later():
-        content = bytes(tree.to_netcdf(format="NETCDF4", engine="h5netcdf"))
-        write_whole(path, with_checksum(content))
+        write_whole(path, with_checksum(to_bytes(tree)))
 
 
 def read_tree(path: Path) -> xr.DataTree:
@@ -49,6 +49,9 @@ def read_tree(path: Path) -> xr.DataTree:
     except ValueError as error:
         raise input_error(str(path), str(error), _AGAIN) from None
     try:
+        own = of_file(path)
+        if own is not None:
+            return own
         with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
             return tree.load()
     except MemoryError:
@@ -69,8 +72,7 @@ def attributes_there(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     try:
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as root:
-            return dict(root.attrs)
+        return root_attributes(path)
     except Exception:  # noqa: BLE001  as in `read_tree`
         return {}
 
