@@ -39,7 +39,7 @@ from stickslip.study.analyses.forced.known import (
     nothing_pressed,
     off_engine_order,
 )
-from stickslip.study.analyses.forced.model_change import model_changes
+from stickslip.study.analyses.forced.model_change import model_changes, stiffness_changes
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.not_periodic import (
     in_time_instead,
@@ -220,6 +220,7 @@ def _of_physics(question: Question, response: Response) -> Values:
         of_physics(question, response)
         | motion_at_peak(question, response)
         | model_changes(question, response)
+        | stiffness_changes(question, response)
         | motions_elsewhere(question, response)
     )
 

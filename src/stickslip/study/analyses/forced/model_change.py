@@ -1,4 +1,4 @@
-"""How far a peak depends on the reduction and on the points of its contacts: both refined or made coarser, the peak found again."""
+"""How far a peak depends on the reduction, on the points of its contacts, and on their stiffness: the first two refined or made coarser, the peak found again."""
 
 from dataclasses import replace
 
@@ -15,6 +15,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
+from stickslip.response.physics.contact_stiffness import stiffness_slope
 from stickslip.response.physics.fewer_points import halved
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
@@ -56,6 +57,25 @@ def model_changes(question: Question, response: Response) -> Values:
         "points_frequency_change_hz": fewer[1],
         "points_left_out": left_out,
     }
+
+
+def stiffness_changes(question: Question, response: Response) -> Values:
+    """Return by how much the peak changes with the stiffness of all contacts; NaN where that is not known."""
+    top, slope = response.top, None
+    if top is not None and top.point.converged:
+        resonance = _at_resonance(question, top.point)
+        slope = stiffness_slope(question.problem, top.point, response.output, resonance=resonance)
+    unknown = float("nan")
+    return {
+        "stiffness_peak_slope": unknown if slope is None else slope.amplitude,
+        "stiffness_frequency_slope_hz": unknown if slope is None else slope.omega / HZ,
+    }
+
+
+def _at_resonance(question: Question, point: ForcedPoint) -> bool:
+    """Whether a peak was resolved there: no frequencies are listed, and it is no end of the sweep."""
+    ends = np.array(question.sweep.omega_range)
+    return not (np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) or question.sweep.grid.size)
 
 
 def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
@@ -106,8 +126,7 @@ def _found(question: Question, system: System, load: HarmonicLoad, point: Forced
     few = min(question.sweep.peak_points, PEAK_POINTS)
     sweep = replace(question.sweep, low=own, high=own, selection="always_high", peak_points=few)
     problem = forced_problem(system, load, sweep)
-    ends = np.array(question.sweep.omega_range)
-    if not np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) and not question.sweep.grid.size:
+    if _at_resonance(question, point):
         peak = peak_from(problem, point) or _swept(system, load, sweep, point)
         return None if peak is None else (problem, peak)
     balance = problem.balance(own)

@@ -12,6 +12,9 @@ from stickslip.units import millimetres
 LARGEST_ROTATION_RAD = 0.1  # that linear kinematics describes
 LARGEST_STRAIN = 3e-3
 LARGER = 0.01  # relative, than the peak
+SOFTER = 0.1  # relative change of the contact stiffness that sentences are about
+DECIDED = 0.05  # relative change of a peak by it above which a note says so
+LEAST_PERCENT, LEAST_HZ = 1e-3, 1e-6  # changes of a peak that are told as numbers
 LARGEST_SLIP_FACETS = 0.5  # of a facet: contact points stay opposite each other
 
 
@@ -72,8 +75,31 @@ def other_motions(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful" if larger else "trusted", why, remedy, size=size)
 
 
+def contact_stiffness(case: Curve) -> Iterator[Finding]:
+    """Tell of a peak that contacts a tenth softer would move by more than `DECIDED`: no doubt, the number is only as good as its stiffness."""
+    if abs(SOFTER * case.number("stiffness_peak_slope")) > DECIDED:
+        yield Finding(
+            "trusted",
+            f"the contact stiffness decides the peak: {_softer(case)}",
+            "Know it to a few per cent, from a measured stuck frequency for example, or vary it ([vary]).",
+        )
+
+
+def _softer(case: Curve) -> str:
+    """Return what softer contacts do to a peak, to first order; empty where that is not known."""
+    slope, hertz = (case.number(f"stiffness_{own}") for own in ("peak_slope", "frequency_slope_hz"))
+    if not np.isfinite(slope):
+        return ""
+    percent = -100 * SOFTER * slope
+    size = (
+        f"{percent:+.2g} %" if abs(percent) >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
+    )
+    moved = f" and {-SOFTER * hertz:+.2g} Hz" if abs(hertz) >= LEAST_HZ else ""
+    return f"contacts {100 * SOFTER:g} % softer change it by {size}{moved}"
+
+
 def told_of_model(case: Curve) -> list[str]:
-    """Return what the modes and the contact points of a model change at a peak that is trusted."""
+    """Return what the modes, the contact points and the contact stiffness of a model change at a peak that is trusted."""
     told = []
     for name, what in (
         ("modes", "half again as many modes"),
@@ -82,7 +108,13 @@ def told_of_model(case: Curve) -> list[str]:
         change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))  # fmt: skip
         if np.isfinite(change):
             told.append(f"{what} change it by {100 * change:+.2g} % and {hertz:+.2g} Hz")
-    return told
+    return told + [said for said in (_softer(case),) if said]
 
 
-PHYSICS_RULES: tuple[Rule, ...] = (physics, small_motions, model_itself, other_motions)
+PHYSICS_RULES: tuple[Rule, ...] = (
+    physics,
+    small_motions,
+    model_itself,
+    contact_stiffness,
+    other_motions,
+)

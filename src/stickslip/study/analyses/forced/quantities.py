@@ -72,6 +72,8 @@ _OF = {
         "points_peak_change": ("1", "relative change of the peak amplitude with half the points of meshed contacts, NaN where there are none or it was not found"),
         "points_frequency_change_hz": ("Hz", "change of the peak frequency with half the points of meshed contacts"),
         "points_left_out": ("1", "contact points that were left out for it"),
+        "stiffness_peak_slope": ("1", "relative change of the peak amplitude over that of the stiffness of all contacts, by one linear solution at the peak; at listed frequencies and at an end of the range at that frequency; NaN where no contact has a stiffness, or one is rigid"),
+        "stiffness_frequency_slope_hz": ("Hz", "change of the peak frequency over the relative change of the stiffness of all contacts; NaN where no peak was resolved"),
         "case_verdict": ("1", "whether the peak is to be trusted"),
         "largest_blade": ("1", "sector of the blade with the largest amplitude"),
         "tuned_peak_amplitude": ("m", "largest amplitude of the wheel with all sectors alike"),

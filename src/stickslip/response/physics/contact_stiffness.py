@@ -1,0 +1,155 @@
+"""How a resonance peak depends on the stiffness of its contacts, by linear solutions with the Jacobian of the balance.
+
+A solution of ``R(x, ω, κ) = 0``, with κ the logarithm of a factor on all contact stiffnesses, moves by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
+forces depend on κ; their derivative is a difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak
+amplitude changes as the amplitude at a fixed frequency does. Solved points stand beside the peak. Two of them, a little apart, give the
+slopes of ``∂A/∂ω`` and of ``∂A/∂κ``, from these the place of the peak, ``dω/dκ = -A_κω / A_ωω`` there, and ``∂A/∂κ`` at it.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import ContactLaw
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.solve.newton_method import newton
+
+STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields of laws, N/m and N/m³
+STEP = 1e-5  # relative step of stiffness, and of the motion for the amplitude: central differences
+APART = 1e-4  # relative distance of two frequencies whose slopes are compared
+TINY = float(np.finfo(float).tiny)
+NEAR = 0.005  # relative distance from a solved point within which its peak lies
+
+
+@dataclass(frozen=True)
+class StiffnessSlope:
+    """What a relative change of all contact stiffnesses does to a peak.
+
+    Attributes
+    ----------
+    amplitude
+        Relative change of the amplitude over that of the stiffness.
+    omega
+        Change of the frequency over the relative change of the stiffness, rad/s; NaN at a fixed frequency.
+    """
+
+    amplitude: float
+    omega: float
+
+
+def stiffer(interface: Interface, factor: float) -> Interface:
+    """Return the same contacts with all their stiffnesses times a factor: friction, preloads and initial gaps stay.
+
+    Parameters
+    ----------
+    interface
+        Contacts.
+    factor
+        On the stiffnesses along t, w and n; a negative preload, which is a gap, is one on the gap's stiffness.
+    """
+    return replace(interface, laws=tuple(_stiffer(law, factor) for law in interface.laws))
+
+
+def _stiffer(law: ContactLaw, factor: float) -> ContactLaw:
+    own: Any = law
+    names = [f.name for f in fields(own)]
+    values = {name: getattr(own, name) for name in STIFFNESSES if name in names}
+    changed = {name: factor * value for name, value in values.items() if value}
+    if "preload" in names and own.preload < 0.0:
+        changed["preload"] = factor * own.preload
+    return law if not changed else replace(own, **changed)
+
+
+def stiffness_slope(
+    problem: ForcedProblem, point: ForcedPoint, output: int, *, resonance: bool
+) -> StiffnessSlope | None:
+    """Return how a solved point, or the peak beside it, depends on the stiffness of all contacts.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    point
+        A converged point of it.
+    output
+        Number of the output whose amplitude counts.
+    resonance
+        Whether a peak lies beside the point; else the slope is that at its frequency.
+
+    Returns
+    -------
+    StiffnessSlope or None
+        None where contacts are rigid or none has a stiffness, or the Jacobian is singular.
+    """
+    balance = problem.balance(point.support)
+    interface = problem.low.interface
+    if not isinstance(balance, HarmonicBalance) or stiffer(interface, 2.0).laws == interface.laws:
+        return None
+    here = _slopes(problem, balance, point, output)
+    if here is None:
+        return None
+    fixed = StiffnessSlope(here.by_stiffness / here.amplitude, float("nan"))
+    beside = _beside(problem, balance, point) if resonance else None
+    there = None if beside is None else _slopes(problem, balance, beside, output)
+    if beside is None or there is None:
+        return fixed
+    step = beside.omega - point.omega
+    curved = (there.by_omega - here.by_omega) / step
+    turned = (there.by_stiffness - here.by_stiffness) / step
+    if not curved < 0.0 or abs(here.by_omega / curved) > NEAR * point.omega:
+        return fixed
+    way = -here.by_omega / curved
+    height = here.amplitude + 0.5 * here.by_omega * way
+    return StiffnessSlope((here.by_stiffness + turned * way) / height, -turned / curved)
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """Amplitude at a point, m, and its derivatives by frequency and by the logarithm of the stiffness."""
+
+    amplitude: float
+    by_omega: float
+    by_stiffness: float
+
+
+def _slopes(
+    problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint, output: int
+) -> _Slopes | None:
+    x, omega = balance.unknowns(point.coefficients), point.omega
+    rates = np.asarray(balance.linearise(x, omega).jac_p), _by_stiffness(balance, x, omega)
+    found = []
+    for rate, turning in zip(rates, (1.0, 0.0), strict=True):
+        change = problem.sweep.newton.linear.solve(balance.linearise(x, omega).jac, -rate)
+        if change is None or not np.all(np.isfinite(change)):
+            return None
+        step = STEP * float(np.linalg.norm(x)) / max(float(np.linalg.norm(change)), TINY)
+        ends = [(omega + s * turning, balance.coefficients(x + s * change)) for s in (step, -step)]
+        high, low = (problem.amplitude_of(*end, output) for end in ends)
+        found.append((high - low) / (2.0 * step))
+    return _Slopes(problem.amplitude(point, output), *found)
+
+
+def _by_stiffness(balance: HarmonicBalance, x: FloatArray, omega: float) -> FloatArray:
+    """Return the (size,) derivative of the scaled residual by the logarithm of the stiffness of all contacts."""
+    evaluator = balance.compiled.evaluator
+    forces = []
+    for factor in (1.0 + STEP, 1.0 - STEP):
+        compiled = stiffer(balance.interface, factor).compiled(evaluator)
+        forces.append(replace(balance, compiled=compiled).forces(x, omega).coefficients)
+    return balance.scaled_forces((forces[0] - forces[1]) / (2.0 * STEP))
+
+
+def _beside(
+    problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint
+) -> ForcedPoint | None:
+    """Return the solution at a frequency beside a point; None where none is found."""
+    omega = point.omega * (1.0 + APART)
+    start = balance.unknowns(point.coefficients)
+    found = newton(lambda x: balance.linearise(x, omega), start, problem.sweep.newton)
+    if not found.status.converged:
+        return None
+    return replace(point, omega=omega, coefficients=balance.coefficients(found.x))
