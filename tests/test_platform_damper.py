@@ -162,7 +162,8 @@ def write(folder: Path, changes: dict[str, str]) -> Path:
 def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(
     tmp_path: Path,
 ) -> None:
-    path = write(tmp_path, {"forced_response.points": "6", "forced_response.peak_points": "4"})
+    keys = {"points": "6", "peak_points": "4", "stability": '"off"'}
+    path = write(tmp_path, {f"forced_response.{key}": value for key, value in keys.items()})
     done("run", str(path), "--no-report", "--only", "forced_response")
     data = Result.open(tmp_path / "results").data
     response = data["forced_response"]
