@@ -1,4 +1,4 @@
-"""Whether a solution of the balance is right: the judge is the time integration, which shares no code with it.
+"""Whether a solution of the balance is right: the judge is the time integration of `evidence.integrator`, with laws and steps of its own.
 
 A point is solved again with many harmonics, because the integration knows no truncation, and the integration begins on that solution.
 If it stays there, the point is right. If its first periods stay there and later ones leave, the solution is one of the equations but

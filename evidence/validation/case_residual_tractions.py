@@ -1,6 +1,6 @@
 """Bounds over residual tractions: benchmark B8, and a thousand motions in time from random states, none of them outside.
 
-The judge is the integrator of `evidence.integrator`, which shares no code with the balance, its evaluators or the search. The system is that
+The judge is the integrator of `evidence.integrator`, which has laws and steps of its own and none of the balance, its evaluators or the search. The system is that
 of B6 with dashpots of 30 N s/m on the damper as well: without them damper modes ring on and hardly a motion settles. Half of the states
 are drawn anywhere, half beside periodic motions with random tractions, since large vibrations shake most tractions to the middle of
 their interval. A motion counts as periodic whose first harmonic scatters by less than `PERIODIC` over the last third of the periods; others are counted and
