@@ -27,6 +27,7 @@ MARKED = "Haswell"
 THREADS = (1, 2)
 OTHERS = re.compile(r"stickslip\.(cli|report)\b|\bsubprocess\b|\btest_cli\b|\bbrowser\b")
 MARK = "mark.kernel"
+SHARES = 5  # of the files of the numeric half, some minutes each
 STOPPED = "interrupted or resum or goes_on"  # tests that go on after a stop
 
 LOADED = """
@@ -99,10 +100,13 @@ def numeric_files() -> list[Path]:
 
 
 def pieces() -> list[tuple[str, Callable[[int], Counter[str]]]]:
-    """Return what runs the numeric half, with a name of each: on each other kernel, and on the processor's own with two threads."""
+    """Return what runs the numeric half, some files each, with a name of each: on each other kernel, and on the processor's own with two threads."""
     kernels, _ = to_run(tuple(KERNELS))
-    found = [(f"{kernel}, one thread", partial(_numeric, kernel, 1)) for kernel in kernels if kernel != OWN]  # fmt: skip
-    return [*found, ("own kernel, two threads", partial(_numeric, OWN, 2))]
+    found = [(kernel, 1) for kernel in kernels if kernel != OWN]
+    return [
+        (f"{kernel or 'own kernel'}, threads {threads}, files {share + 1} of {SHARES}", partial(_numeric, kernel, threads, share))
+        for kernel, threads in [*found, (OWN, 2)] for share in range(SHARES)
+    ]  # fmt: skip
 
 
 def told() -> list[str]:
@@ -110,8 +114,9 @@ def told() -> list[str]:
     return [f"the processor's own kernel is {loaded(OWN)}", *to_run(tuple(KERNELS))[1]]
 
 
-def _numeric(kernel: str, threads: int, workers: int) -> Counter[str]:
-    return _counted(kernel, threads, workers, ["-m", "not validation", "-k", f"not ({STOPPED})", *numeric_files()])  # fmt: skip
+def _numeric(kernel: str, threads: int, share: int, workers: int) -> Counter[str]:
+    files = numeric_files()[share::SHARES]
+    return _counted(kernel, threads, workers, ["-m", "not validation", "-k", f"not ({STOPPED})", *files])  # fmt: skip
 
 
 def marked(workers: int) -> Counter[str]:

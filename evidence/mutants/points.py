@@ -24,6 +24,19 @@ SWAPPED = {
     "nanmin": "nanmax", "nanmax": "nanmin",
 }  # fmt: skip
 
+# whose arguments may stand in any order: a swap changes nothing
+SYMMETRIC = {
+    "min",
+    "max",
+    "minimum",
+    "maximum",
+    "gcd",
+    "lcm",
+    "hypot",
+    "union1d",
+    "intersect1d",
+}
+
 
 @dataclass(frozen=True)
 class Mutant:
@@ -214,7 +227,7 @@ def _of_call(node: ast.Call, text: Any) -> Iterator[tuple[str, str, ast.expr]]:
         whole = text(node.func)
         yield whole[: len(whole) - len(name)] + SWAPPED[name], "other function", node.func
     plain = [a for a in node.args if not isinstance(a, ast.Starred)]
-    if len(plain) >= 2 and len(plain) == len(node.args):
+    if len(plain) >= 2 and len(plain) == len(node.args) and name not in SYMMETRIC:
         words = [text(a) for a in plain]
         words[0], words[1] = words[1], words[0]
         words += [_keyword(k, text) for k in node.keywords]
