@@ -112,6 +112,18 @@ def test_a_level_is_met_at_every_point_and_the_phase_is_that_of_the_force():
         np.testing.assert_allclose(here.stiffness(found.omega) * motion, level * 0.1, rtol=2e-6)
 
 
+def test_a_curve_passes_its_resonances_at_their_frequency_once_at_a_top():
+    """A top is one point, between the rising and the falling side; a closed curve begins and ends at its least amplitude."""
+    c, *_ = ONE[-1]
+    for own, level in ((modal_oscillator(b4(0.1), PUSH), 1.0), (modal_oscillator(b4(0.1, c, 2000), PUSH), 0.05)):  # fmt: skip
+        found, met = synthesise(own, level), resonances(own, level)
+        assert met
+        for one in met:
+            assert found.omega[found.place == one.place].tolist() == [one.omega] * (
+                1 if one.top else 2
+            )
+
+
 def test_a_hardening_spring_has_an_unstable_branch_between_its_folds():
     ratio, cubic = 0.01, 0.2
     a = np.geomspace(1e-3, 20.0, 300)
