@@ -24,7 +24,6 @@ OWN = ""  # the one that OpenBLAS chooses
 # with the word that /proc/cpuinfo has where a processor can run it
 KERNELS = {OWN: "", "Haswell": "avx2", "Prescott": "pni", "Sandybridge": "avx", "Zen": "avx2", "SkylakeX": "avx512f"}  # fmt: skip
 MARKED = "Haswell"
-THREADS = (1, 2)
 OTHERS = re.compile(r"stickslip\.(cli|report)\b|\bsubprocess\b|\btest_cli\b|\bbrowser\b")
 MARK = "mark.kernel"
 SHARES = 5  # of the files of the numeric half, some minutes each
