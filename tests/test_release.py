@@ -81,17 +81,18 @@ def test_what_is_imported_is_of_the_core_or_named_with_its_extra():
     """Packages that the wheel does not bring are imported inside functions, where a message names the extra."""
     brought = {re.split("[<>=]", one)[0].lower() for one in PROJECT["dependencies"]}
     brought |= {"pydantic_core", "stickslip"}  # the first comes with pydantic
-    lacking = set()
+    lacking, inside = set(), set()
     for path in (ROOT / "src").rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
             lacking |= {(path.name, name) for name in imported(node) - brought}
+        inside |= {
+            name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Import | ast.ImportFrom)
+            for name in imported(node) - brought
+        }
     assert not lacking
-    inside = {
-        name
-        for path in (ROOT / "src").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        for name in imported(node) - brought
-    }
     # IPython shows progress in its own notebooks, psutil serves where there is no /proc: both are asked for before
     asked_for = {"gmsh", "skfem", "meshio", "feral", "pyuff", "executorlib", "IPython", "psutil"}
     assert inside <= asked_for
