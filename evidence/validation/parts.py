@@ -118,7 +118,9 @@ def _faults() -> list[Piece]:
 
 
 def _tests(file: str, word: str, _workers: int) -> Counter[str]:
-    return counted(["-m", "validation", *(("-k", word) if word else ()), file])
+    # 200 kills and 20,000 damaged files last longer than the ten minutes after which the gate takes a test for hanging
+    limit = ("-o", "faulthandler_timeout=3600")
+    return counted(["-m", "validation", *limit, *(("-k", word) if word else ()), file])
 
 
 def _comparisons(names: Iterable[str]) -> list[Piece]:
