@@ -283,7 +283,9 @@ def _projected(matrix: Matrix, tie: Matrix, free: IntArray, *, evened: bool = Tr
         resized = scipy.sparse.csr_array(part)
         resized.resize(size)
         parts.append(resized)
-    return scipy.sparse.csr_array(parts[0] + ((parts[1] + parts[2]) + parts[3]))
+    whole = scipy.sparse.csr_array(parts[0] + ((parts[1] + parts[2]) + parts[3]))
+    whole.sum_duplicates()  # in one order: whoever puts it into order later would change what is stored by its bytes
+    return whole
 
 
 def _wave_dofs(dofs: Dofs, free: IntArray, whirl: Matrix) -> Dofs:

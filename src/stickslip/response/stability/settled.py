@@ -48,6 +48,7 @@ class Settled:
     motion: ForcedPoint | None = None
 
 
+@by_one_thread
 def stability(
     problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
 ) -> Stability:
