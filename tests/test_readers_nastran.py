@@ -410,6 +410,7 @@ def test_a_matrix_of_moduli_and_phases_is_refused_where_it_is_asked_for(tmp_path
         ("GRID,1,7,0.,0.,0.", r"line 1: coordinate system 7 is not in the file\. Add its CORD2"),
         ("GRID,1,,x,0.,0.", "'x' is no number"),
         ("BEGIN BULK\nGRID,1,,0.,0.,0.\nBEGIN SUPER=2\nGRID,2", "line 3: begins the bulk data of another"),
+        ("BEGIN BULK\nGRID,1,,0.,0.,0.\n,,,\n,,\nGRID", "line 5"),
     ],
 )  # fmt: skip
 def test_geometry_that_would_be_misread_is_refused_by_line(tmp_path, cards, message):

@@ -114,6 +114,9 @@ def test_multipliers_and_negative_masses_are_named():
         dense_modes(K, np.diag([1.0, 1.0, 0.0]), 1, dofs=dofs)
     with pytest.raises(InputError, match="mass: is not positive: a motion, coordinate 1 the most"):
         dense_modes(np.eye(2), np.diag([1.0, -1.0]), 1)
+    tiny = np.array([[1e-300, 1e9], [1e9, 1e-300]])  # its scaled terms are no numbers
+    with pytest.raises(InputError, match="mass: is not positive: a motion, coordinate 0 the most"):
+        dense_modes(np.eye(2), tiny, 1)
 
 
 def test_the_dense_and_the_sparse_road_agree_on_massless_dofs():

@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 
 ROUNDED = 1e-12  # of the terms that an eigenvalue is the sum of: below, it is rounding
@@ -78,16 +78,28 @@ def _by_mass(mass: Matrix, dofs: Dofs | None) -> tuple[FloatArray, Matrix, Matri
     """Return the (r,) masses of motions (size, r) that have one, and the motions (size, size - r) that have none."""
     diagonal = np.diagonal(mass).real
     scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-    squares, shapes = np.linalg.eigh(scale[:, None] * mass * scale)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = scale[:, None] * mass * scale
+    sizes = np.abs(scaled).max(axis=0)
+    if not np.all(
+        np.isfinite(sizes)
+    ):  # beside a positive diagonal no number of a positive matrix is so large
+        raise _not_positive(np.where(np.isfinite(sizes), 0.0, 1.0), dofs)
+    squares, shapes = np.linalg.eigh(scaled)
     if squares[0] < -NEGATIVE * squares[-1]:
-        raise input_error(
-            "mass",
-            f"is not positive: a motion, {_most(shapes[:, 0], dofs)} the most, has a negative one",
-            "Check its source: a triangle of a matrix given as the whole, or the stiffness in its place.",
-        )
+        raise _not_positive(shapes[:, 0], dofs)
     heavy = squares > ROUNDED * squares[-1]
     moved = scale[:, None] * shapes
     return squares[heavy], moved[:, heavy], moved[:, ~heavy]
+
+
+def _not_positive(motion: Matrix, dofs: Dofs | None) -> InputError:
+    """Return the error of a mass in which a motion (size,) has a negative one."""
+    return input_error(
+        "mass",
+        f"is not positive: a motion, {_most(motion, dofs)} the most, has a negative one",
+        "Check its source: a triangle of a matrix given as the whole, or the stiffness in its place.",
+    )
 
 
 def _following(stiffness: Matrix, with_mass: Matrix, without: Matrix, dofs: Dofs | None) -> Matrix:

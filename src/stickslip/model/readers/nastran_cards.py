@@ -102,7 +102,7 @@ def _bulk_lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _first_word(text: str) -> str:
-    return text.replace(",", " ").split()[0].upper()
+    return next(iter(text.replace(",", " ").split()), "").upper()
 
 
 def _name(first: str, place: str) -> str:
