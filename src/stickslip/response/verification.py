@@ -126,9 +126,11 @@ def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> Harmon
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `factor` times the reference order and its judging set, with samples enough for them."""
+    """Return the problem with all harmonics up to `factor` times the reference order and, as far as a wheel has waves, its judging set, with samples enough."""
     high = with_stiffness(problem.high)
-    harmonics = tuple(sorted({*harmonics_of(factor * high.order), *judging_set_of(high)}))
+    wanted, fed = harmonics_of(factor * high.order), judging_set_of(high)
+    most = with_waves(problem, high, max(wanted[-1], fed[-1])).linear.most
+    harmonics = tuple(sorted({*wanted, *(h for h in fed if most is None or h <= most)}))
     linear = problem.system.condensed(high.linear.load, harmonics[-1])
     samples = max(high.samples, SAMPLES_A_HARMONIC * harmonics[-1])
     return replace(high, linear=linear, samples=samples).with_harmonics(harmonics)
