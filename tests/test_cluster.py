@@ -227,8 +227,14 @@ def test_executorlib_on_one_node(tmp_path: Path, expected: np.ndarray) -> None:
 
 def test_shards_that_run_at_once(tmp_path: Path, expected: np.ndarray) -> None:
     shares = ["1/3", "2/3", "2/3", "3/3"]  # one of them is started twice
-    for run in [start(tmp_path, shard=share) for share in shares]:
-        end(run, tmp_path)
+    runs = [start(tmp_path, shard=share) for share in shares]
+    try:
+        for run in runs:
+            end(run, tmp_path)
+    finally:
+        for run in runs:  # where one has failed, the others are at work still
+            run.kill()
+            run.communicate()
     np.testing.assert_array_equal(found(tmp_path), expected)
     assert {p.suffix for p in (tmp_path / "results/jobs").iterdir()} == {".job"}
 

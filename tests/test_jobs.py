@@ -4,6 +4,7 @@ import pickle
 import shutil
 import signal
 import time
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from toy_analysis import ToyStudy
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
 from stickslip.study.analyses import ANALYSES
+from stickslip.study.keep import folder as keep_folder
 from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behind
 from stickslip.study.keep.cell import Cell, Ended, Limits, OutOfTime, Stopped
 from stickslip.study.keep.folder import locked_folder
@@ -211,6 +213,24 @@ def test_shards_share_a_folder_that_no_other_run_may_use(tmp_path: Path) -> None
         run_study(made)
     with locked_folder(made.folder), pytest.raises(InputError, match="another run is at work"):
         run_study(made, shard=Shard(1, 2))
+
+
+def test_a_file_that_another_shard_puts_in_place_meanwhile_is_no_stranger(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def listed(folder: Path, pattern: str) -> Iterator[Path]:
+        for path in found(folder, pattern):
+            if "part" in path.stem:
+                path.rename(path.with_name("whole.npz"))
+            yield path
+
+    found = keep_folder._found
+    made = ToyStudy(tmp_path / "study.toml")
+    (made.folder / "parts").mkdir(parents=True)
+    (made.folder / "parts/whole.0123456789ab.part.npz").touch()
+    monkeypatch.setattr(keep_folder, "_found", listed)
+    with locked_folder(made.folder, shared=True):
+        assert (made.folder / "parts/whole.npz").is_file()
 
 
 # ---- what cannot be

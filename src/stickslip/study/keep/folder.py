@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Container, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from stat import S_ISLNK, S_ISREG
 from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
@@ -107,9 +108,13 @@ def _refuse_strangers(folder: Path) -> None:
     inner = [folder / name for name in (JOBS, PARTS)]
     files = [path for pattern in (*OWN, *HELD) for path in _found(folder, pattern)]
     for path in [*inner, *files]:
-        if path.is_symlink():
+        try:
+            mode = path.lstat().st_mode
+        except FileNotFoundError:
+            continue  # another shard has renamed or removed its file since it was listed
+        if S_ISLNK(mode):
             raise _stranger(path, "is a link, which a run does not follow")
-        if path not in inner and not path.is_file():
+        if path not in inner and not S_ISREG(mode):
             raise _stranger(path, "is no file, but a run writes a file of that name")
 
 
