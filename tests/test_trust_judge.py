@@ -1,5 +1,7 @@
 """The judge of trusted points against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,33 @@ def test_a_slider_that_sticks_is_a_spring() -> None:
     assert found is not None
     assert found.motion[1, 0] == pytest.approx(1 / (4.0 - omega**2 + 0.2j * omega), rel=1e-9)
     assert found.multiplier == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
+
+
+def test_a_slider_at_the_edge_of_the_places_at_which_it_sticks_is_a_spring() -> None:
+    """It slips once as the load's mean begins to act, and then rests: slip to one side only is no property of the motion."""
+    omega, spring = 1.7, 3.0
+    size = abs(1 / (1.0 + spring - omega**2 + 0.2j * omega))
+    contact = Contact("slider", ONE, 0 * ONE, stiffness=spring, limit=1.2 * spring * size)
+    machine = replace(one_mass(contact, 1.0), static=np.array([2.0]))
+    found = Judge(machine, omega).orbit(np.array([[0.8 * size + 0j], [size + 0j]]))
+    assert found is not None
+    assert abs(found.motion[1, 0]) == pytest.approx(size, rel=1e-9)
+    assert found.multiplier == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
+
+
+def test_the_multiplier_of_a_mass_between_stop_and_slider_has_the_error_that_is_told() -> None:
+    """The times at which a contact begins and ceases to act decide it: found with an eighth of the step, the same."""
+    stop = Contact("stop", 0 * ONE, ONE, stiffness=400.0, clearance=0.3)
+    slider = Contact("slider", ONE, 0 * ONE, stiffness=5.0, limit=0.2)
+    machine = replace(one_mass(stop, 1.0, damping=0.02), contacts=(stop, slider))
+    found = Judge(machine, 1.3).orbit(np.array([[0j], [0.3 - 0.3j]]))
+    assert found is not None
+    fine = Judge(machine, 1.3)
+    fine.steps *= 8
+    exact = fine.orbit(found.motion)
+    assert exact is not None
+    assert found.multiplier_error < 2e-4
+    assert abs(found.multiplier - exact.multiplier) <= 3.0 * found.multiplier_error + 1e-6
 
 
 def test_friction_takes_the_area_of_its_loop() -> None:
@@ -92,7 +121,7 @@ def lifting_pad(omega: float) -> tuple[Machine, np.ndarray]:
     )  # fmt: skip
     judge, state = Judge(machine, omega), np.zeros(5)
     for _ in range(200):
-        state, motion, _ = judge.flow(state, omega, judge.steps)
+        state, motion, *_ = judge.flow(state, omega, judge.steps)
     return machine, motion
 
 

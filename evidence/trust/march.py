@@ -1,7 +1,7 @@
 """The judge: periodic motions by shooting and their multipliers, with a march of its own. Nothing of stickslip is imported here.
 
-The march is the classical Runge-Kutta method with steps of the same length. A slider's place is part of the state and moves at the end of each step as
-far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
+The march is the classical Runge-Kutta method with steps of the same length, and shorter ones where a contact changes what it does. A slider's place
+is part of the state and moves at the end of each step as far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
 
 Newton's method at the told frequency may leave for another motion. What is farther from the told one than `CLOSE` is looked for again, with steps
 that are cut, and from the told motion at other times of its period; the nearest counts. Where the branch turns there may
@@ -23,6 +23,9 @@ SLIDER, PAD, STOP, CUBIC = range(4)
 ANGLE = 0.04  # of the fastest vibration with all contacts closed, rad a step
 LEAST_STEPS = 1500  # a period
 MOST_STEPS = 60000
+PIECES = 16  # of a step in which a contact changes what it does
+AT_LIMIT = 1e-9  # relative, of the force of a slider that slips
+INSIDE = 1e-4  # of the amplitude, from the edge of the places at which a slider sticks all the time
 SETTLING = 3  # periods of prescribed motion after which sliders repeat
 NEWTON = 25  # iterations
 CLOSED = 1e-8  # residual of a period over the size of the motion
@@ -99,13 +102,88 @@ def _rate(inverse, damping, stiffness, load, q, v, contact, out):  # type: ignor
 
 
 @numba.njit(cache=True)
-def period(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, steps, q, v, place, moved, sums):  # type: ignore[no-untyped-def]  # fmt: skip
-    """March one period; q, v, place are changed in place, `sums` (2, harmonics, n) gets the Fourier coefficients."""
+def _narrow(kind, tangent, normal, number, q, places):  # type: ignore[no-untyped-def]
+    """Keep of the places (2, contacts) from and to those at which sliders would stick now, too."""
+    for c in range(kind.size):
+        if kind[c] != SLIDER and kind[c] != PAD:
+            continue
+        t, z = 0.0, 0.0
+        for i in range(q.size):
+            t += tangent[c, i] * q[i]
+            z += normal[c, i] * q[i]
+        limit = number[c, 1]
+        if kind[c] == PAD:
+            limit = number[c, 3] * (number[c, 4] + number[c, 2] * z)
+        places[0, c] = max(places[0, c], t - limit / number[c, 0])
+        places[1, c] = min(places[1, c], t + limit / number[c, 0])
+
+
+@numba.njit(cache=True)
+def _told(kind, tangent, normal, number, q, v, place, code):  # type: ignore[no-untyped-def]
+    """Fill what each contact does: 0 a closed spring, 2 open, 1 and -1 slip to either side."""
+    for c in range(kind.size):
+        t, z, along, across = 0.0, 0.0, 0.0, 0.0
+        for i in range(q.size):
+            t += tangent[c, i] * q[i]
+            z += normal[c, i] * q[i]
+            along += tangent[c, i] * v[i]
+            across += normal[c, i] * v[i]
+        code[c] = 0
+        if kind[c] == STOP:
+            code[c] = 0 if z > number[c, 5] else 2
+        elif kind[c] == SLIDER or kind[c] == PAD:
+            limit, rate = number[c, 1], 0.0
+            if kind[c] == PAD:
+                press = number[c, 4] + number[c, 2] * z
+                limit, rate = number[c, 3] * press, number[c, 3] * number[c, 2] * across
+            spring = number[c, 0] * (t - place[c])
+            side = 1.0 if spring > 0.0 else -1.0
+            if kind[c] == PAD and limit <= 0.0:
+                code[c] = 2
+            elif abs(spring) >= limit * (1.0 - AT_LIMIT) and side * number[c, 0] * along > rate:
+                code[c] = int(side)
+
+
+@numba.njit(cache=True)
+def _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, time, h, q, v, place, moved, work):  # type: ignore[no-untyped-def]  # fmt: skip
+    """March a step from an angle of the load's first harmonic; q, v, place are changed in place."""
+    contact, load, a, b, c, d = work[0], work[1], work[2], work[3], work[4], work[5]
+    angle = order * time
+    half, whole = angle + 0.5 * order * omega * h, angle + order * omega * h
+    load[:] = static + real * np.cos(angle) - imaginary * np.sin(angle)
+    _forces(kind, tangent, normal, number, q, place, contact, moved, False)
+    _rate(inverse, damping, stiffness, load, q, v, contact, a)
+    load[:] = static + real * np.cos(half) - imaginary * np.sin(half)
+    qb, vb = q + 0.5 * h * v, v + 0.5 * h * a
+    _forces(kind, tangent, normal, number, qb, place, contact, moved, False)
+    _rate(inverse, damping, stiffness, load, qb, vb, contact, b)
+    qc, vc = q + 0.5 * h * vb, v + 0.5 * h * b
+    _forces(kind, tangent, normal, number, qc, place, contact, moved, False)
+    _rate(inverse, damping, stiffness, load, qc, vc, contact, c)
+    load[:] = static + real * np.cos(whole) - imaginary * np.sin(whole)
+    qd, vd = q + h * vc, v + h * c
+    _forces(kind, tangent, normal, number, qd, place, contact, moved, False)
+    _rate(inverse, damping, stiffness, load, qd, vd, contact, d)
+    _landed(kind, tangent, normal, number, q, h / 6 * (v + 2 * vb + 2 * vc + vd), place)
+    q += h / 6 * (v + 2 * vb + 2 * vc + vd)
+    v += h / 6 * (a + 2 * b + 2 * c + d)
+    _forces(kind, tangent, normal, number, q, place, contact, moved, True)
+
+
+@numba.njit(cache=True)
+def period(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, steps, q, v, place, moved, sums, places):  # type: ignore[no-untyped-def]  # fmt: skip
+    """March one period; q, v, place are changed in place, `sums` (2, harmonics, n) gets the Fourier coefficients, `places` (2, contacts) from and to where sliders stick all the time.
+
+    A step in which a contact begins or ceases to slip, opens or closes is taken in `PIECES`: the times of these decide the multipliers.
+    """
     n = q.size
     h = 2 * np.pi / omega / steps
-    contact, load = np.zeros(n), np.zeros(n)
-    a, b, c, d = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    work = np.zeros((6, n))
+    before, after = np.zeros(kind.size, np.int64), np.zeros(kind.size, np.int64)
+    q0, v0, place0, moved0 = q.copy(), v.copy(), place.copy(), moved.copy()
     sums[:] = 0.0
+    places[0], places[1] = -np.inf, np.inf
+    _told(kind, tangent, normal, number, q, v, place, before)
     for s in range(steps):
         for m in range(sums.shape[1]):
             cosine, sine = np.cos(2 * np.pi * m * s / steps), np.sin(2 * np.pi * m * s / steps)
@@ -113,26 +191,18 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
             for i in range(n):
                 sums[0, m, i] += weight * cosine * q[i]
                 sums[1, m, i] -= weight * sine * q[i]
-        angle = 2 * np.pi * order * s / steps
-        half, whole = angle + np.pi * order / steps, angle + 2 * np.pi * order / steps
-        load[:] = static + real * np.cos(angle) - imaginary * np.sin(angle)
-        _forces(kind, tangent, normal, number, q, place, contact, moved, False)
-        _rate(inverse, damping, stiffness, load, q, v, contact, a)
-        load[:] = static + real * np.cos(half) - imaginary * np.sin(half)
-        qb, vb = q + 0.5 * h * v, v + 0.5 * h * a
-        _forces(kind, tangent, normal, number, qb, place, contact, moved, False)
-        _rate(inverse, damping, stiffness, load, qb, vb, contact, b)
-        qc, vc = q + 0.5 * h * vb, v + 0.5 * h * b
-        _forces(kind, tangent, normal, number, qc, place, contact, moved, False)
-        _rate(inverse, damping, stiffness, load, qc, vc, contact, c)
-        load[:] = static + real * np.cos(whole) - imaginary * np.sin(whole)
-        qd, vd = q + h * vc, v + h * c
-        _forces(kind, tangent, normal, number, qd, place, contact, moved, False)
-        _rate(inverse, damping, stiffness, load, qd, vd, contact, d)
-        _landed(kind, tangent, normal, number, q, h / 6 * (v + 2 * vb + 2 * vc + vd), place)
-        q += h / 6 * (v + 2 * vb + 2 * vc + vd)
-        v += h / 6 * (a + 2 * b + 2 * c + d)
-        _forces(kind, tangent, normal, number, q, place, contact, moved, True)
+        time = 2 * np.pi * s / steps
+        _narrow(kind, tangent, normal, number, q, places)
+        q0[:], v0[:], place0[:], moved0[:] = q, v, place, moved
+        _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, time, h, q, v, place, moved, work)  # fmt: skip
+        _told(kind, tangent, normal, number, q, v, place, after)
+        if np.any(before != after):
+            q[:], v[:], place[:], moved[:] = q0, v0, place0, moved0
+            for part in range(PIECES):
+                ahead = time + part * 2 * np.pi / steps / PIECES
+                _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, ahead, h / PIECES, q, v, place, moved, work)  # fmt: skip
+            _told(kind, tangent, normal, number, q, v, place, after)
+        before[:] = after
 
 
 @dataclass(frozen=True)
@@ -154,6 +224,17 @@ class _Closed:
     omega: float
     motion: npt.NDArray[np.complex128]
     multiplier: float
+
+
+def _inside(place: Array, places: Array, scale: Array) -> Array:
+    """Return the places of sliders (contacts,), those that stick all the time moved off the edge: there slip begins to one side only, and no derivative says anything."""
+    low, high = places
+    off = np.minimum(INSIDE * scale, 0.25 * (high - low))
+    sticks = np.isfinite(high - low) & (high > low)
+    near = (place < low + 0.5 * off) | (place > high - 0.5 * off)
+    return np.where(
+        sticks & near, np.clip(place, low + off, np.maximum(high - off, low + off)), place
+    )
 
 
 class Judge:
@@ -184,18 +265,18 @@ class Judge:
         fastest = float(np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stuck)))))
         self.steps = int(np.clip(2 * np.pi * fastest / omega / ANGLE, LEAST_STEPS, MOST_STEPS))
 
-    def flow(self, state: Array, omega: float, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_]]:  # fmt: skip
-        """Return the state (2n + contacts,) after a period, the motion's Fourier coefficients, and which sliders moved."""
+    def flow(self, state: Array, omega: float, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_], Array]:  # fmt: skip
+        """Return the state (2n + contacts,) after a period, the motion's Fourier coefficients, which sliders moved, and between which places (2, contacts) each would stick."""
         n = len(self.machine.mass)
         q, v, place = state[:n].copy(), state[n : 2 * n].copy(), state[2 * n :].copy()
         moved = np.zeros(self.kind.size, dtype=np.bool_)
-        sums = np.zeros((2, HARMONICS, n))
+        sums, places = np.zeros((2, HARMONICS, n)), np.zeros((2, self.kind.size))
         m = self.machine
         period(
             self.inverse, m.damping, m.stiffness, self.kind, self.tangent, self.normal, self.number,
-            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, omega, steps, q, v, place, moved, sums,
+            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, omega, steps, q, v, place, moved, sums, places,
         )  # fmt: skip
-        return np.concatenate([q, v, place]), sums[0] + 1j * sums[1], moved
+        return np.concatenate([q, v, place]), sums[0] + 1j * sums[1], moved, places
 
     def start(self, motion: npt.NDArray[np.complex128]) -> Array:
         """Return the state at t = 0 of a motion (H+1, n): sliders have followed it for some periods from zero."""
@@ -262,10 +343,14 @@ class Judge:
         self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0
     ) -> _Closed | None:
         """Return a motion that closes, at the frequency given or, `free`, at one beside it."""
-        scale = self._scale(state, omega, steps)
+        scale, n = self._scale(state, omega, steps), len(self.machine.mass)
         for number in range(NEWTON):
-            end, found, moved = self.flow(state, omega, steps)
+            end, found, moved, places = self.flow(state, omega, steps)
             off = (end - state) / scale
+            inside = _inside(state[2 * n :], places, scale[2 * n :])
+            if np.max(np.abs(off)) < CLOSED and np.any(inside != state[2 * n :]):
+                state = np.concatenate([state[: 2 * n], inside])
+                continue
             jac = self._jacobian(state, omega, steps, scale)
             if np.max(np.abs(off)) < CLOSED:
                 return _Closed(state, omega, found, self._largest(jac, moved))

@@ -215,11 +215,14 @@ class _Search:
         """Return what is known of a point at which no contact changes its state, from another one with the same states: both obey one linear system.
 
         Its exponents do not depend on the frequency of the load, and its multipliers are those of the other to the ratio of the periods.
+        Samples may miss a short slip; it acts on harmonics beyond those driven, so that the solution must be exact, too.
         """
         cycle, side = self.course.cycle[place], self.question.model.system.structure
-        if cycle is None or has_transitions(cycle) or type(side) is not Structure:
+        point = self.response.accepted[self.course.order[place]].point
+        exact = point.predicted_error == 0.0
+        if cycle is None or has_transitions(cycle) or not exact or type(side) is not Structure:
             return None
-        omega = self._omega(place)
+        omega = point.omega
         for k, e in self.found.items():
             if self.course.cycle[k] == cycle and e.verdict == "stable" and e.error == 0.0:
                 size = e.multiplier ** (e.omega / omega)
