@@ -1,4 +1,4 @@
-"""The reference support held against twice as many harmonics: against solutions that have them, and published ones."""
+"""The reference support held against more harmonics: against solutions that have them, and published ones."""
 
 import math
 from dataclasses import replace
@@ -11,6 +11,9 @@ import stickslip as ss
 from evidence.models.lumped import blades_and_damper
 from evidence.models.lumped_disks import TIP, friction_ring
 from stickslip.errors import InputError
+from stickslip.harmonic.judging import judging_balance, judging_set
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.response.verification import own_error
 from stickslip.solve.status import Status
 
 HERTZ = (2 * np.pi * 159, 2 * np.pi * 164)
@@ -32,37 +35,51 @@ def response(low, high, selection, span=HERTZ, count=11, **others):
     return ss.response.forced_problem(system, load, sweep), points
 
 
-def test_error_of_five_harmonics_against_ten():
-    """Half to twice the truth where it matters, and dead on where no contact changes its state."""
+def test_error_of_five_harmonics_against_those_of_the_check():
+    """Two Newton steps say it to four digits."""
     problem, points = response(1, 5, "always_high")
     checks = ss.response.check_support(problem, points)
-    _, exact = response(10, 10, "always_high")
+    asked = checks[0].harmonics
+    assert asked == (*range(11), 12, 15)
+    _, exact = response(asked, asked, "always_high")
     real = np.array([problem.real_error(p, e) for p, e in zip(points, exact, strict=True)])
     found = np.array([c.error for c in checks])
     assert [c.omega for c in checks] == [p.omega for p in points]
     assert all(c.kept == (0, 1, 2, 3, 4, 5) for c in checks)
-    assert all(c.harmonics == (*range(11), 12, 15) for c in checks)
-    matters = real > 1e-5
-    assert np.count_nonzero(matters) >= 7
-    assert np.all((found / real)[matters] > 0.5)
-    assert np.all((found / real)[matters] < 2.0)
-    assert np.median(np.abs(found / real - 1)[matters]) < 0.2
+    assert np.count_nonzero(real > 1e-5) >= 7
+    # both sides end in Newton's method, whose residuals of 1e-8 are 1e-4 of the smallest of these errors
+    np.testing.assert_allclose(found, real, rtol=1e-4)
     # B6 at five harmonics is good to a thousandth: an error that the reference need not fear
-    assert max(found) == pytest.approx(max(real), rel=0.3)
     assert max(found) < 2e-3
 
 
 def test_points_with_few_harmonics_are_held_against_the_same():
-    """As the alert, but with what lies beyond its reference; 163 Hz, its blind spot, is left out."""
+    """Solved with one harmonic they change as by those of the check; the alert, one step, takes 7.3 % at 163 Hz for 1.4 %."""
     problem, points = response(1, 5, "jacobian_alert")
     checks = ss.response.check_support(problem, points)
-    few = [c for c in checks if c.kept == (0, 1)]
-    assert few
-    assert len(few) < len(checks)
-    alerts = {p.omega: p.predicted_error for p in points}
-    for check in few:
-        # harmonics 6 to 10 do a part of the work: at most a third of it here
-        assert check.error == pytest.approx(alerts[check.omega], rel=0.35, abs=1e-12)
+    asked = checks[0].harmonics
+    _, exact = response(asked, asked, "always_high")
+    few = [(c, p, e) for c, p, e in zip(checks, points, exact, strict=True) if c.kept == (0, 1)]
+    assert 3 < len(few) < len(checks)
+    for check, point, true in few:
+        assert check.error == pytest.approx(problem.real_error(point, true), rel=0.05)
+    missed = [(c, p) for c, p, _ in few if c.error > 3 * p.predicted_error]
+    assert [round(c.omega / 2 / np.pi) for c, _ in missed] == [163]
+    assert missed[0][1].predicted_error < 0.02
+    assert missed[0][0].error > 0.07
+
+
+def test_own_error_sees_contacts_that_change_their_states():
+    """One harmonic at 163 Hz is 7.3 % off: towards its judging set one step says 1.4 %, two say it."""
+    problem, points = response(1, 1, "always_low", span=(2 * np.pi * 162.5, HERTZ[1]), count=4)
+    point = min(points, key=lambda p: abs(p.omega - 2 * np.pi * 163))
+    fed = judging_set(point.support)
+    _, exact = response(fed, fed, "always_low", span=(point.omega, HERTZ[1]), count=2)
+    real = problem.real_error(point, exact[0])
+    low, high = problem.low, judging_balance(problem.low)
+    one = jacobian_alert(low, high, low.unknowns(point.coefficients), point.omega, problem.measure)
+    assert one.error < 0.5 * real
+    assert own_error(problem, point) == pytest.approx(real, rel=0.1)
 
 
 def test_even_harmonics_that_the_reference_lacks_are_found_missing():

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.judging import (
@@ -12,7 +13,7 @@ from stickslip.harmonic.judging import (
     judging_balance,
     judging_set_of,
 )
-from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
@@ -35,7 +36,7 @@ class SupportCheck:
     dof, label
         The dof with that change, and its name.
     seconds_contact
-        Time of the contact evaluation.
+        Time of the contact evaluations.
     """
 
     omega: float
@@ -56,9 +57,9 @@ def check_support(
 ) -> tuple[SupportCheck, ...]:
     """Predict at every solved point what all harmonics up to a multiple of the reference order, and those of its judging set, would change.
 
-    One contact evaluation and one linear solution a point; nothing is iterated. It is a warning and no bound: one Newton step, which
-    keeps the contact states of the point, in amplitude and phase; mostly early, and at times too small. Harmonics that the reference leaves out, such as
-    the even ones, are among those that it is held against.
+    Two Newton steps a point: two contact evaluations and two linear solutions. The first keeps the contact states of the point; the second asks the
+    contacts where the first leads. It is a warning and no bound: right where contacts keep their states for most of the period, and too
+    large where they do not. Harmonics that the reference leaves out, such as the even ones, are among those that it is held against.
 
     Parameters
     ----------
@@ -107,9 +108,17 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     if more.harmonics == own.harmonics:
         return float("nan")  # the wheel has no more waves
     x = own.unknowns(point.coefficients)
-    found = jacobian_alert(own, more, x, point.omega, problem.measure, problem.alert_solve)
+    found = _twice(problem, own, more, x, point.omega)
     known = covers(own, more) and point.by_dof is None
     return found.error if known else max(found.error, UNSEEN)
+
+
+def _twice(
+    problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float
+) -> Alert:
+    """Return what two Newton steps from a solution towards more harmonics say."""
+    first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
+    return asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
 
 
 def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> HarmonicBalance:
@@ -138,16 +147,8 @@ def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
 
 def _check(problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint) -> SupportCheck:
     own = with_stiffness(problem.balance(point.support))
-    measure = problem.measure
-    alert = jacobian_alert(
-        own,
-        enlarged,
-        own.unknowns(point.coefficients),
-        point.omega,
-        measure,
-        problem.alert_solve,
-    )
-    dof = int(measure.dofs[alert.worst])
+    alert = _twice(problem, own, enlarged, own.unknowns(point.coefficients), point.omega)
+    dof = int(problem.measure.dofs[alert.worst])
     return SupportCheck(
         point.omega, point.support, enlarged.harmonics, alert.error, alert.harmonic, dof,
         problem.system.structure.dofs.labels[dof], alert.seconds_contact,

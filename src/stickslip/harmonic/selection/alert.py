@@ -1,12 +1,12 @@
 """The prediction of the Jacobian Alert: how missing harmonics would change a solution (Gastaldi & Berruti 2017, section 4)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal, get_args
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.event_integrals import Events
 from stickslip.errors import check_choice
 from stickslip.harmonic.aft import ContactPeriod
@@ -35,7 +35,7 @@ class Alert:
     start
         Scaled unknowns ``q + Δq`` of the high-order problem.
     seconds_contact
-        Time of the contact evaluation, or of the integrals between known events.
+        Time of the contact evaluations, or of the integrals between known events.
     """
 
     error: float
@@ -100,11 +100,57 @@ def jacobian_alert(
     change = (solve or solve_array)(at.jac, right)
     if change is None:
         return Alert(np.inf, 0, 0, padded, seconds)
+    return _led_to(high, q, omega, padded + change, measure, seconds)
+
+
+def asked_again(
+    low: HarmonicBalance,
+    high: HarmonicBalance,
+    x: FloatArray,
+    omega: float,
+    first: Alert,
+    measure: ErrorMeasure,
+    solve: Solve | None = None,
+) -> Alert:
+    """Ask the contacts where a prediction leads, and go on from there by one more Newton step.
+
+    The first step keeps the contact states of the low-order solution. Where they change on the way it may say far too little; then the residual at
+    ``q + Δq`` is large, and with it the second step. Where they stay, the second step is of second order.
+
+    Parameters
+    ----------
+    low, high, x, omega, measure, solve
+        As of `jacobian_alert`.
+    first
+        What that predicted.
+    """
+    q = low.coefficients(x)
+    if np.array_equal(first.start, high.unknowns(q)):  # silent, or singular
+        return first
+    start = perf_counter()
+    period = high.forces(first.start, omega)
+    seconds = first.seconds_contact + perf_counter() - start
+    at = high.linearise(first.start, omega, period)
+    change = (solve or solve_array)(at.jac, -at.residual)
+    if change is None:
+        return replace(first, error=np.inf, seconds_contact=seconds)
+    return _led_to(high, q, omega, first.start + change, measure, seconds)
+
+
+def _led_to(
+    high: HarmonicBalance,
+    q: ComplexArray,
+    omega: float,
+    start: FloatArray,
+    measure: ErrorMeasure,
+    seconds: float,
+) -> Alert:
+    """Return what steps from the low-order coefficients to the scaled unknowns `start` say."""
     before = high.linear.recover(omega, q)
     rows = measure.rows(len(q), high.order + 1)
-    moved = high.linear.recover_change(omega, high.coefficients(change)[:rows])
-    error, worst, harmonic = measure.change(before, moved)
-    return Alert(error, worst, harmonic, padded + change, seconds)
+    change = high.coefficients(start - high.unknowns(q))[:rows]
+    error, worst, harmonic = measure.change(before, high.linear.recover_change(omega, change))
+    return Alert(error, worst, harmonic, start, seconds)
 
 
 def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:

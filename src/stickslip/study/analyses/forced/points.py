@@ -231,7 +231,7 @@ def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
 
 
 def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the bound of a solution's own error: what was said of it on the way, else what one step with the harmonics of its judging set changes."""
+    """Return the bound of a solution's own error: what was said of it on the way, else what two steps with the harmonics of its judging set change."""
     if not point.converged:
         return float("nan")
     # in the published passages a strategy looks at nothing beyond its reference
