@@ -122,7 +122,7 @@ def test_units_that_give_absurd_numbers_are_doubted(tmp_path: Path) -> None:
     write_deck(tmp_path / "deck.inp")
     said = refused("check", str(file_study(tmp_path, units="mm-t-s")))
     assert "that looks like SI" in said
-    assert "Give part.stub.units, or part.stub.plausible = false" in said
+    assert "Correct part.stub.units, or give part.stub.plausible = false" in said
 
 
 @pytest.mark.parametrize("plausible", [True, False])

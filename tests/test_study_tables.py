@@ -402,7 +402,7 @@ def test_a_file_that_is_not_there_is_told_before_anything_is_read(tmp_path):
 
 DECK = [
     ({"part.blade.sectors": "9"}, "part.blade.sectors: is 9, but the deck's cyclic symmetry has 8. Give sectors = 8, or leave it out."),
-    ({"part.blade.units": '"mm-t-s"'}, "Give part.blade.units, or part.blade.plausible = false where"),
+    ({"part.blade.units": '"mm-t-s"'}, "Correct part.blade.units, or give part.blade.plausible = false where"),
     ({"part.blade.clamped": '["TIPP"]'}, "part.blade.clamped[0]: the file has no set 'TIPP' of free nodes. Did you mean 'TIP'?"),
 ]  # fmt: skip
 

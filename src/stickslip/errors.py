@@ -134,8 +134,8 @@ def together(errors: Iterable[InputError]) -> InputError:
 SHORT = 2  # letters of a word of which no other is a slip
 
 
-def did_you_mean(word: str, known: list[str]) -> str:
-    """Return ``did you mean 'word'?`` for the nearest known word, whatever its capitals, or the list of the known ones.
+def nearest(word: str, known: list[str]) -> str:
+    """Return the known word that is nearest to another, whatever its capitals; empty where none is near.
 
     Of words as short as x, y, z none is nearer than another.
     """
@@ -143,8 +143,14 @@ def did_you_mean(word: str, known: list[str]) -> str:
 
     plain = {one.casefold(): one for one in reversed(known) if len(one) > SHORT}
     near = get_close_matches(word.casefold(), plain, n=1, cutoff=0.6)
+    return plain[near[0]] if near else ""
+
+
+def did_you_mean(word: str, known: list[str]) -> str:
+    """Return ``did you mean 'word'?`` for the `nearest` known word, or the list of the known ones."""
+    near = nearest(word, known)
     if near:
-        return f"Did you mean {plain[near[0]]!r}?"
+        return f"Did you mean {near!r}?"
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 

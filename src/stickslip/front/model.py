@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.model import Model as Assembly
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import input_error
 from stickslip.front.as_tables import as_tables
 from stickslip.front.result import Result
 from stickslip.front.screen import by_default
@@ -23,6 +23,7 @@ from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
+from stickslip.study.file.suffixes import nearest_key
 from stickslip.study.file.tables import Tables
 from stickslip.study.run import answer
 from stickslip.units import RPM
@@ -270,7 +271,7 @@ def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
         if key not in home or key in _OF_THE_MODEL:
             known = [k for k in home if k not in _OF_THE_MODEL]
             raise input_error(
-                f"{name}: {key}", "is no key of this question", did_you_mean(key, known)
+                f"{name}: {key}", "is no key of this question", nearest_key(key, known, value)
             )
         values[home[key]][key] = _plain(value)
     return {table: _validated(own, values[table], name) for table, own in sections.items()}

@@ -20,7 +20,7 @@ SOLIDS = (500.0, 25_000.0)  # kg/m³: from light plastics to heavy metals
 MODULI = (1e7, 2e12)  # Pa: from rubber-like to diamond
 SIZES = (1e-4, 50.0)  # m
 ARGUMENTS = {"units": "units=Units.…()", "plausible": "plausible=False"}  # of all readers
-WRONG_UNITS = "Give $units, or $plausible where the numbers are right."
+WRONG_UNITS = "Correct $units, or give $plausible where the numbers are right."
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pydantic_core import ErrorDetails
 
 from stickslip.errors import InputError, did_you_mean, input_error, together
 from stickslip.study.file.section import shown
+from stickslip.study.file.suffixes import meant_key, nearest_key
 
 NO_ABOUT = "a value of the kind that the example of 'stickslip new' shows"
 
@@ -51,12 +52,38 @@ def told(
     renamed
         Keys that come from elsewhere: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
     """
-    found = (
-        _told(place, model, one, renamed or {})
-        for details in error.errors(include_url=False)
-        for one in _each(details)
-    )
+    every = [one for details in error.errors(include_url=False) for one in _each(details)]
+    found = (_told(place, model, one, renamed or {}) for one in _unknown_first(model, every))
     return together({str(one): one for one in found}.values())
+
+
+def _unknown_first(model: type[BaseModel], every: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Return unknown keys before what is missing, and leave out a missing key that one of them is a slip of."""
+    unknown = [one for one in every if one["type"] == "extra_forbidden"]
+    rest = [one for one in every if one["type"] != "extra_forbidden"]
+    spots = [spot_at(model, _path(one)) for one in unknown]
+    meant = {(*spot.keys[:-1], meant_key(spot.keys[-1], _known(spot))) for spot in spots}
+    return unknown + [one for one in rest if not (_is_missing(one) and _place(model, one) in meant)]
+
+
+def _is_missing(details: ErrorDetails) -> bool:
+    problem = str(details.get("ctx", {}).get("problem", ""))
+    return details["type"] == "missing" or problem.startswith("is missing")
+
+
+def _path(details: ErrorDetails) -> list[str | int]:
+    return [part for part in details["loc"] if part != "[key]"]
+
+
+def _place(model: type[BaseModel], details: ErrorDetails) -> tuple[str, ...]:
+    """Return the keys that lead to what is wrong."""
+    own = details.get("ctx", {}).get("key", "") if details["type"] == "stickslip" else ""
+    return (*spot_at(model, _path(details)).keys, *filter(None, [own]))
+
+
+def _known(spot: Spot) -> list[str]:
+    """Return the keys of the table that holds a place."""
+    return [] if spot.owner is None else list(spot.owner.model_fields)
 
 
 def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
@@ -69,15 +96,12 @@ def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
 def _told(
     place: str, model: type[BaseModel], details: ErrorDetails, renamed: Mapping[str, str]
 ) -> InputError:
-    spot = spot_at(model, [part for part in details["loc"] if part != "[key]"])
     context: dict[str, Any] = details.get("ctx", {})
-    keys = spot.keys
     if details["type"] == "stickslip":
-        keys = (*keys, *filter(None, [context["key"]]))
         problem, remedy = context["problem"], context["remedy"]
     else:
-        problem, remedy = _problem(spot, details, context)
-    where = ".".join(keys)
+        problem, remedy = _problem(spot_at(model, _path(details)), details, context)
+    where = ".".join(_place(model, details))
     for key, other in renamed.items():
         if where == key or where.startswith((f"{key}.", f"{key}[")):
             where = other
@@ -151,8 +175,8 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
     if kind == "missing":
         return "is missing", f"Add it: {spot.about}."
     if kind == "extra_forbidden":
-        known = [] if spot.owner is None else list(spot.owner.model_fields)
-        return f"unknown key {spot.keys[-1]!r}", did_you_mean(spot.keys[-1], known)
+        remedy = nearest_key(spot.keys[-1], _known(spot), details["input"])
+        return f"unknown key {spot.keys[-1]!r}", remedy
     if kind == "literal_error":
         known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
         word = "off" if details["input"] is False else str(details["input"])

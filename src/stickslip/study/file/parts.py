@@ -12,7 +12,7 @@ from pydantic import (
 )
 
 from stickslip.assembly.contact import NEXT
-from stickslip.errors import did_you_mean
+from stickslip.errors import did_you_mean, nearest
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, Bending
 from stickslip.model.mesh.blade_pair import BladePair
@@ -291,6 +291,11 @@ def _known_kind(given: Any) -> Any:
         return given
     shapes = ", ".join(SHAPES)
     if "shape" not in given:
+        elsewhere = {key for table in KINDS.values() for key in table.model_fields}
+        for key in map(str, given):
+            if key not in elsewhere and nearest(key, ["shape", "file"]):
+                remedy = did_you_mean(key, ["shape", "file"])
+                raise custom_error(f"unknown key {key!r}", remedy, key)
         raise custom_error(
             "is missing",
             f'Say what the part is: a shape ({shapes}), file = "...", or of = "...".',

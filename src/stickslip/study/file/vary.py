@@ -8,9 +8,10 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
-from stickslip.errors import InputError, did_you_mean, input_error, together
+from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import alternatives, plain, whole
 from stickslip.study.file.section import shown
+from stickslip.study.file.suffixes import nearest_key
 
 MOST_CASES = 1000
 EXAMPLE = "For example [vary] with load.shaker.ratio = [100, 20]."
@@ -161,7 +162,7 @@ def _unknown(
         if name not in known or (i == 0 and name in ("vary", "schema_version", "title")):
             return [
                 input_error(
-                    f"{place}: vary.{key}", f"there is no key {name!r}", did_you_mean(name, known)
+                    f"{place}: vary.{key}", f"there is no key {name!r}", nearest_key(name, known)
                 )
             ]
         content = content.get(name) if isinstance(content, Mapping) else None
