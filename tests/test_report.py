@@ -25,10 +25,18 @@ from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.tables import peaks
-from stickslip.report.inputs import told
+from stickslip.report.inputs import Varied, as_run, told
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
-from stickslip.report.quantities import number, percent, quantity, runs, scale_for
+from stickslip.report.quantities import (
+    amplitude,
+    column,
+    number,
+    percent,
+    quantity,
+    runs,
+    scale_for,
+)
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges, skin_picture
 from stickslip.report.tiles import patches, triangulated
@@ -796,6 +804,52 @@ def test_keys_of_a_study_are_told_in_words() -> None:
     assert told("frequency_hz", [150.0, 184.0]) == "frequency 150 to 184 Hz"
     assert told("dashpots_n_s_per_m", [["a", "b", 2.0]]) == "dashpots (a, b, 2) N s/m"
     assert told("coriolis", True) == "coriolis yes"
+    assert told("force_n", Varied((4.0, 2e4))) == "force 4 N, 20 kN (varied)"
+    assert told("law", Varied(("jenkins", "dahl"))) == "law jenkins, dahl (varied)"
+
+
+def test_a_varied_key_is_told_with_the_values_that_were_run() -> None:
+    """Of lists in one table and in tables of their own; a key that its table leaves out is told as well."""
+    study = {
+        "contact": {"flat": {"friction_coefficient": 0.6}},
+        "load": {"a": {"force_n": 1.0}},
+        "vary": [
+            {"contact": {"flat": {"friction_coefficient": [0.1, 0.2], "preload_n": [5.0, 6.0]}}},
+            {"load.a.force_n": [2.0, 3.0], "load.b.force_n": [1.0]},
+        ],
+    }
+    run = as_run(study)
+    flat = run["contact"]["flat"]
+    assert flat == {"friction_coefficient": Varied((0.1, 0.2)), "preload_n": Varied((5.0, 6.0))}
+    assert run["load"] == {"a": {"force_n": Varied((2.0, 3.0))}}
+    assert study["load"] == {"a": {"force_n": 1.0}}
+
+
+def test_two_values_are_too_few_for_an_optimisation_curve_and_the_page_says_so() -> None:
+    needed = "need 3 values or more"
+    text = page_text(html_of(synthetic_result(ratios=(20, 5))))
+    assert (
+        f"Curves over load.shaker.ratio, and where friction works, {needed}; there are 2. Add values to [vary]."
+        in text
+    )
+    for ratios in ((20,), (20, 10, 5)):
+        assert needed not in page_text(html_of(synthetic_result(ratios=ratios)))
+
+
+def test_peaks_are_told_in_millimetres_as_on_the_terminal() -> None:
+    assert amplitude(7.09898e-5, "m") == "0.07099 mm"
+    assert amplitude(2.0, "rad") == "2 rad"
+    assert amplitude(2e3, "m") == "more than a kilometre"
+    assert amplitude(float("nan"), "m") == "–"
+    assert column(np.array([4.435e-5, 1e-3]), "m", millimetres=True) == ("mm", ["0.044", "1.000"])
+    assert column(np.array([0.01]), "rad", millimetres=True)[0] == "mrad"
+    view = Response(synthetic_result(ratios=(20, 5)))
+    best = min(view.cases, key=view.peak_response)
+    size = f"{number(1e3 * view.peak_response(best) * best.excitation, 4)} mm"
+    card = cards(view)[0]
+    assert card.value.endswith("m/N")
+    assert f", {size}, " in card.note
+    assert "peak (mm)" in peaks(view).head
 
 
 def test_the_head_of_the_page_tells_what_went_in() -> None:
@@ -816,7 +870,7 @@ points = { tip1 = "blades.tip1" }
 load.shaker.ratio = [20, 5]
 """
     text = page_text(html_of(synthetic_result(ratios=(20, 5)), study_toml=study))
-    assert "load shakerload.pull over 20 on blades.force along x; harmonic 1" in text
+    assert "load shakerload.pull over 20, 5 (varied) on blades.force along x; harmonic 1" in text
     assert "flatdamper.flat, blades.under" in text
     assert "friction coefficient 0.6" in text
     assert "cases: load.shaker.ratio20, 5" in text

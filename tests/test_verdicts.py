@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from test_cli import done
 
 import stickslip as ss
 from stickslip.study.analyses.forced.curve import Curve, branch_length
-from stickslip.study.analyses.forced.verdicts import verdicts, with_levels
+from stickslip.study.analyses.forced.verdicts import said_once, verdicts, with_levels
 from stickslip.study.analyses.verdict import (
     LEVELS,
     POINT_LEVELS,
@@ -120,7 +121,7 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
         Verdict("doubtful", "k = 6", None, "4 audits failed"),
     ]
     assert in_lines(given) == [
-        f"DOUBTFUL: k = 2: 11.00 Hz: {fold.format(0.99)}. Ask at 11 Hz. The like: k = 4 (12.5 Hz).",
+        f"DOUBTFUL: k = 2: 11.00 Hz: {fold.format(0.99)}. Ask at 11 Hz. Likewise: k = 4 (12.5 Hz).",
         "DOUBTFUL: k = 5: 3 points have no solution.",
         "DOUBTFUL: k = 6: 4 audits failed.",
         "TRUSTED: k = 1, 3.",
@@ -131,6 +132,22 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     assert together(["a = 1", "b = 1"]) == "a = 1, b = 1"
     assert together(["a = 1", "a = 1, b = 3"]) == "a = 1, a = 1, b = 3"
     assert together(["a = 1"]) == "a = 1"
+
+
+def test_what_a_worse_verdict_says_is_not_said_again_as_a_part_of_a_note() -> None:
+    march = "multipliers lie outside the unit circle; in time its amplitude goes from 1 to 2 mm"
+    doubtful = Verdict("doubtful", "", 11.0, march, "Give it more time.")
+    note = Verdict(
+        "trusted", "", None, f"the largest motion is unstable; {march}", "See the points."
+    )
+    alone = Verdict("trusted", "", None, f"another is; {march}; and this", "See.")
+    told = said_once([doubtful, note, alone, doubtful])
+    assert told[0] == told[3] == doubtful
+    assert told[1] == replace(note, why="the largest motion is unstable")
+    assert told[2] == replace(alone, why="another is; and this")
+    assert said_once([note]) == (note,)
+    short = Verdict("doubtful", why="it folds")
+    assert said_once([short, replace(note, why="a; it folds")])[1].why == "a; it folds"
 
 
 def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> None:

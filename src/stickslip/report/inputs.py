@@ -4,6 +4,9 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -47,12 +50,40 @@ def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
         The analyses by their names.
     """
     response = next((n for n in nodes.values() if isinstance(n, Response)), None)
+    study = as_run(study)
     found = (_given(study, nodes), _contacts(study, response), _names(study, nodes))
     return [table for table in found if table is not None]
 
 
+@dataclass(frozen=True)
+class Varied:
+    """The values of a key that the cases of a study have, in place of the one that its table has."""
+
+    values: tuple[Any, ...]
+
+
+def as_run(study: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a study with all values of a varied key in place of the one that its table has."""
+    found: dict[str, Any] = deepcopy(dict(study))
+    varied = found.get("vary", {})
+    for own in varied if isinstance(varied, list) else [varied]:
+        for key, values in _flat(own if isinstance(own, dict) else {}):
+            *tables, last = key.split(".")
+            table: Any = found
+            for name in tables:
+                table = table.get(name) if isinstance(table, dict) else None
+            if isinstance(table, dict) and isinstance(values, list):
+                table[last] = Varied(tuple(values))
+    return found
+
+
 def told(key: str, value: Any) -> str:
     """Write a key of a study file and its value in words: ``normal_stiffness_n_per_m = 5.2e8`` as ``normal stiffness 520 MN/m``."""
+    if isinstance(value, Varied):
+        each = [told(key, v) for v in value.values]
+        words = takewhile(lambda own: len(set(own)) == 1, zip(*map(str.split, each), strict=False))
+        name = "".join(f"{own[0]} " for own in words)
+        return f"{name}{_joined([one.removeprefix(name) for one in each])} (varied)"
     for ending, unit, scaled in _UNITS:
         if key.endswith(f"_{ending}") and _numbers(value):
             name = key.removesuffix(f"_{ending}").replace("_", " ")
@@ -76,6 +107,8 @@ def _numbers(value: Any) -> bool:
 
 
 def _plain(value: Any) -> str:
+    if isinstance(value, Varied):
+        return f"{_joined([_plain(v) for v in value.values])} (varied)"
     if isinstance(value, dict):
         return ", ".join(f"{k} = {_plain(v)}" for k, v in value.items())
     if isinstance(value, list):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.units import BEYOND, LARGEST_PERCENT, LONGEST_M
+from stickslip.units import BEYOND, LARGEST_PERCENT, LONGEST_M, MM
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 NARROW_SPACE = "\u202f"
@@ -68,8 +68,24 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{number(value * scale.factor, digits)} {scale.unit}" if math.isfinite(value) else NONE
 
 
-def column(values: FloatArray, unit: str, digits: int = 4) -> tuple[str, list[str]]:
+def amplitude(value: float, unit: str, digits: int = 4) -> str:
+    """Write an amplitude of an output: a length in mm, as verdicts and the terminal have it; another unit with a prefix."""
+    if unit != "m" or not math.isfinite(value):
+        return quantity(value, unit, digits)
+    return BEYOND if _beyond(value, unit) else f"{number(value / MM, digits)} mm"
+
+
+def column(
+    values: FloatArray, unit: str, digits: int = 4, *, millimetres: bool = False
+) -> tuple[str, list[str]]:
     """Write numbers of one column with one unit and the same decimals, as `aligned` does.
+
+    Parameters
+    ----------
+    values, unit, digits
+        In `unit`, which gets the prefix that suits the largest.
+    millimetres
+        Whether lengths are in mm, as verdicts and the terminal have amplitudes.
 
     Returns
     -------
@@ -78,7 +94,7 @@ def column(values: FloatArray, unit: str, digits: int = 4) -> tuple[str, list[st
     given = np.asarray(values)
     beyond = np.array([_beyond(float(v), unit) for v in given], dtype=bool)
     usual = np.where(beyond, np.nan, given)
-    scale = scale_for(usual, unit)
+    scale = Scale(1 / MM, "mm") if millimetres and unit == "m" else scale_for(usual, unit)
     cells = aligned(usual * scale.factor, digits)
     return scale.unit, [BEYOND if far else cell for far, cell in zip(beyond, cells, strict=True)]
 

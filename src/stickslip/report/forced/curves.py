@@ -18,10 +18,10 @@ from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_tick
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced.summary import amplitude_name
+from stickslip.study.analyses.forced.working_range import FEWEST
 from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
-_FEWEST = 3  # cases of an optimisation curve
 _BUTTONS = {
     "type": "buttons", "direction": "right", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"t": 0, "b": 4},
     "font": {"size": 11}, "showactive": True, "bordercolor": GRID,
@@ -295,7 +295,7 @@ def optimisation(response: Response) -> Plot | None:
     known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
     cases = sorted(known, key=lambda c: c.value)
     measured = measured_of(response, key)
-    if not key or len(cases) < (1 if measured else _FEWEST):
+    if not key or len(cases) < (1 if measured else FEWEST):
         return None
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from stickslip.report.cases import ShownCase
 from stickslip.report.quantities import (
     NONE,
+    amplitude,
     counted,
     number,
     percent,
@@ -29,8 +31,7 @@ def _peak_card(response: Response) -> Card:
     size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
     no_resonance = "the largest amplitude stands at the end of the sweep: no resonance"
     if len(cases) == 1:
-        whole = quantity(float(peaks[0]) * cases[0].excitation, response.length)
-        more = f", {whole}" if response.per_force else ""
+        more = _whole(response, cases[0]) if response.per_force else ""
         at = f"{response.peak_is(cases[0])}, at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
         return Card(
             size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}"
@@ -42,7 +43,7 @@ def _peak_card(response: Response) -> Card:
     kind = counted(int(counts.sum()), "case")
     if not counts.all():
         kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
-    note = f"{response.peak_is(within[best])}, {response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    note = f"{response.peak_is(within[best])}, {response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz{_whole(response, within[best]) if response.per_force else ''}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if within[best] in (response.cases[0], response.cases[-1]):
         note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
     lower = int(np.argmin(peaks))
@@ -51,6 +52,11 @@ def _peak_card(response: Response) -> Card:
     if left_out:
         note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
     return Card(size, f"smallest peak of {kind}", note)
+
+
+def _whole(response: Response, case: ShownCase) -> str:
+    """Return the peak itself of a case whose response is over the force, as the terminal tells it."""
+    return f", {amplitude(response.peak_response(case) * case.excitation, response.length)}"
 
 
 def _shift_card(response: Response) -> Card | None:

@@ -8,6 +8,7 @@ from stickslip.report.content import Table
 from stickslip.report.quantities import (
     NONE,
     aligned,
+    amplitude,
     column,
     fixed,
     number,
@@ -25,7 +26,9 @@ def peaks(response: Response) -> Table:
     value = np.array([response.peak_response(c) for c in cases])
     force = np.array([c.excitation for c in cases])
     newton, forces = column(force, "N")
-    length, sizes = column(value * (force if response.per_force else 1.0), response.length)
+    length, sizes = column(
+        value * (force if response.per_force else 1.0), response.length, millimetres=True
+    )
     unit, ratios = column(value if response.per_force else value * np.nan, response.unit)
     zeta = np.array([response.number_of("peak_damping", c) for c in cases])
     head = [
@@ -146,8 +149,8 @@ def time_integration(response: Response) -> Table | None:
         told = response.labels_of("verify_motion")
         motion = [word or known for word, known in zip(told, motion, strict=True)]
     rows = [
-        [response.cases[int(case)].short if np.isfinite(case) else NONE, fixed(float(hz), 3), quantity(float(transient), response.length, 5),
-         quantity(float(balance), response.length, 5), percent(float(off)),
+        [response.cases[int(case)].short if np.isfinite(case) else NONE, fixed(float(hz), 3), amplitude(float(transient), response.length, 5),
+         amplitude(float(balance), response.length, 5), percent(float(off)),
          word, fixed(float(n), 0)]
         for case, hz, transient, balance, off, word, n in zip(*columns, motion, periods, strict=True)
     ]  # fmt: skip

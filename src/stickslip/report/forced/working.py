@@ -3,10 +3,11 @@
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.cases import first_number
 from stickslip.report.content import Words
 from stickslip.report.plot import GRID
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.working_range import working_ranges
+from stickslip.study.analyses.forced.working_range import FEWEST, working_ranges
 from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 
 
@@ -16,6 +17,15 @@ def where_friction_works(response: Response) -> Words | None:
     if not lines:
         return None
     return Words(heading=TITLE, items=lines)
+
+
+def what_is_needed(response: Response) -> Words | None:
+    """Say what optimisation curves need where a number is varied with too few values."""
+    key, n = first_number(response.data)[0], len(response.cases)
+    if not key or n >= FEWEST:
+        return None
+    text = f"Curves over {key}, and where friction works, need {FEWEST} values or more; there are {n}. Add values to [vary]."
+    return Words((text,))
 
 
 def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:

@@ -15,7 +15,7 @@ from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
 from stickslip.report.forced.wheel import blades, peaks_of_blades, statistics, wheel_at_peak
 from stickslip.report.forced.wheel_motion import wheel_in_motion
-from stickslip.report.forced.working import where_friction_works
+from stickslip.report.forced.working import what_is_needed, where_friction_works
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
 
@@ -25,7 +25,11 @@ SECTION: Section = Section(
     Response,
     (
         Block("response", "Forced response", (frequency_response, of_each_order)),
-        Block("optimisation", "Optimisation curves", (optimisation, where_friction_works)),
+        Block(
+            "optimisation",
+            "Optimisation curves",
+            (optimisation, where_friction_works, what_is_needed),
+        ),
         Block(
             "wheel",
             "Blades of the wheel",

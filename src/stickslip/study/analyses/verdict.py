@@ -148,7 +148,7 @@ def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
             lines.append(f"TRUSTED: {together([v.case for v in (first, *others)])}.")
         else:
             like = together([v.place for v in others])
-            lines.append(f"{first}{f' The like: {like}.' * bool(others)}")
+            lines.append(f"{first}{f' Likewise: {like}.' * bool(others)}")
     return lines
 
 

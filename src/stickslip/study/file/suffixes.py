@@ -64,7 +64,9 @@ def unit_of(ending: str) -> Unit | None:
     """Return the unit that an ending such as ``n_per_mm`` stands for; None where it is none."""
     if ending == "percent":
         return Unit(*_PERCENT)
-    above, below, size, powers, sign = [], [], 1.0, (0, 0, 0, 0), 1
+    above: list[str] = []
+    below: list[str] = []
+    size, powers, sign = 1.0, (0, 0, 0, 0), 1
     for word in ending.split("_"):
         if word == "per" and sign == 1:
             sign = -1

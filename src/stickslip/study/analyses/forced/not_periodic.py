@@ -223,7 +223,7 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
     if found.overflowed or not np.isfinite(of.spread):
         count = question.problem.system.outputs.size
         said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else (
-            f"the time was too short: {found.periods} of at least {LEAST} periods, more of it (forced_response.not_periodic_s) tells more"
+            f"the time was too short: {found.periods} of at least {LEAST} periods"
         )  # fmt: skip
         return _nothing(omega, why, count, said)
     last = found.amplitude[-TURNS:, own]
@@ -260,16 +260,16 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
 
 def _patience(march: _March) -> str:
     if np.isinf(march.needed):
-        return "how fast a disturbance grows is not known: more time (forced_response.not_periodic_s) tells more"
+        return "how fast a disturbance grows is not known"
     if march.course.periods < march.needed:
-        return f"a disturbance needs {march.needed:.0f} periods, more time (forced_response.not_periodic_s) tells more"
+        return f"a disturbance needs {march.needed:.0f} periods to grow"
     return "a disturbance should have grown by now"
 
 
 def _settledness(spread: float, settled: bool) -> str:
     if settled:
         return f"; four windows differ by {100 * spread:.2g} %"
-    return f"; not settled: four windows differ by {100 * spread:.2g} %, more time (forced_response.not_periodic_s) tells more"
+    return f"; not settled: four windows differ by {100 * spread:.2g} %"
 
 
 def _of_the_step(march: _March, own: int) -> str:

@@ -210,7 +210,11 @@ def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> 
         shown = (min(physics.damped, key=lambda d: d.apart(peak_hz * HZ)),)
     told = "; ".join(str(d) for d in shown)
     why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for steady normal loads and one slip ratio of all contacts"
-    yield Verdict("trusted", why=why, remedy="More slip damps less, and so does less slip.")
+    yield Verdict(
+        "trusted",
+        why=why,
+        remedy="That is at one amplitude: smaller and larger motions are damped less.",
+    )
 
 
 def _loads_move(question: Question, response: Response) -> str:

@@ -1,7 +1,8 @@
 """The verdicts of a forced response: what the rules find, point by point and case by case."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,7 @@ from stickslip.study.analyses.forced.rules import RULES
 from stickslip.study.analyses.forced.stable_rules import LEFT
 from stickslip.study.analyses.forced.stable_words import said_of
 from stickslip.study.analyses.verdict import (
+    ALIKE,
     LEVELS,
     POINT_LEVELS,
     UNSTABLE,
@@ -61,7 +63,7 @@ class Judged:
         if self.level == "trusted":
             hz = self.case.peak_hz if self.case.peak >= 0 else None
             found = [Verdict("trusted", self.label, hz, _examined(self.case)), *found]
-        return tuple(found)
+        return said_once(found)
 
     def _of_rule(self, found: Sequence[Finding]) -> Iterator[Verdict]:
         """Yield a verdict for what holds as a whole, and of each level one for its points: of the peak, else of the worst."""
@@ -89,6 +91,15 @@ class Judged:
         if most.value and most is not first:
             told = f", the most at {self.case.hz[most.points[0]]:.2f} Hz ({most.value})"
         return f"; the same is said of {count}, {hz.min():.2f} to {hz.max():.2f} Hz{told}"
+
+
+def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
+    """Return verdicts of a case without what one before says whole, as a part of a sentence: the same march in time is a doubt of a point and belongs to a note."""
+    told: list[Verdict] = []
+    for v in verdicts:
+        known = [before.why for before in told if len(before.why) >= ALIKE]
+        told.append(replace(v, why=reduce(lambda why, own: why.replace(f"; {own}", ""), known, v.why)))  # fmt: skip
+    return tuple(told)
 
 
 def _examined(case: Curve) -> str:
