@@ -80,10 +80,10 @@ def as_run(study: Mapping[str, Any]) -> dict[str, Any]:
 def told(key: str, value: Any) -> str:
     """Write a key of a study file and its value in words: ``normal_stiffness_n_per_m = 5.2e8`` as ``normal stiffness 520 MN/m``."""
     if isinstance(value, Varied):
-        each = [told(key, v) for v in value.values]
-        words = takewhile(lambda own: len(set(own)) == 1, zip(*map(str.split, each), strict=False))
-        name = "".join(f"{own[0]} " for own in words)
-        return f"{name}{_joined([one.removeprefix(name) for one in each])} (varied)"
+        texts = [told(key, v) for v in value.values]
+        rows = zip(*(one.split(" ") for one in texts), strict=False)
+        name = "".join(f"{own[0]} " for own in takewhile(lambda own: len(set(own)) == 1, rows))
+        return f"{name}{_joined([one.removeprefix(name) for one in texts])} (varied)"
     for ending, unit, scaled in _UNITS:
         if key.endswith(f"_{ending}") and _numbers(value):
             name = key.removesuffix(f"_{ending}").replace("_", " ")
