@@ -12,6 +12,7 @@ from test_judging import chain
 import stickslip as ss
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.settled import SOLUTIONS, settle
+from stickslip.response.verification import own_error
 
 SWEEP = ss.Sweep(
     omega_range=(2 * math.pi * 9.0, 2 * math.pi * 14.0), points=12, peak_points=4, threshold=0.01
@@ -108,3 +109,30 @@ def test_a_peak_of_fixed_harmonics_is_compared_with_more():
     assert problem.real_error(top, most) < sweep.threshold
     again = solved(sweep, points[:-1])
     assert [(p.stage, p.omega) for p in again] == [(p.stage, p.omega) for p in points]
+
+
+@pytest.mark.parametrize("told", [None, 5.0])
+def test_a_doubt_about_a_fixed_harmonic_order_is_settled_by_comparing(monkeypatch, told):
+    """The study fixes H = 3. What a prediction doubts, or one that tells 500 % everywhere, is solved with more to compare; nothing is raised."""
+    if told is not None:
+        monkeypatch.setattr("stickslip.response.forced.settled.own_error", lambda *_: told)
+    system, load = chain(1)
+    sweep = replace(SWEEP, high=3, threshold=0.01, peak_points=0)
+    points = solved(sweep)
+    problem = ss.response.forced_problem(system, load, sweep)
+    audits, accepted = audits_by_frequency(points), ss.response.accepted_points(points)
+    assert max(p.order for p in accepted) == 3
+    many = replace(
+        sweep, at=tuple(p.omega for p in accepted), low=25, high=25, selection="always_high"
+    )
+    true = list(ss.forced_response(system, load, many))
+    small = 0
+    for point, exact in zip(accepted, true, strict=True):
+        doubted = point.order == 3 and (told or own_error(problem, point)) > sweep.threshold
+        assert (point.omega in audits) == doubted
+        if doubted:
+            (audit,) = audits[point.omega]
+            error = problem.real_error(point, audit)
+            assert error == pytest.approx(problem.real_error(point, exact), abs=8e-3)
+            small += error <= sweep.threshold
+    assert (small > 0) == (told is not None)

@@ -28,6 +28,7 @@ AT_LIMIT = 1e-9  # relative, of the force of a slider that slips
 INSIDE = 1e-4  # of the amplitude, from the edge of the places at which a slider sticks all the time
 SETTLING = 3  # periods of prescribed motion after which sliders repeat
 NEWTON = 25  # iterations
+SLOW = 0.1  # of the residual before: with more a derivative is taken anew
 CLOSED = 1e-8  # residual of a period over the size of the motion
 NUDGE = 1e-6  # difference step over the size of the motion
 HARMONICS = 6  # that are compared
@@ -224,6 +225,7 @@ class _Closed:
     omega: float
     motion: npt.NDArray[np.complex128]
     multiplier: float
+    jac: Array
 
 
 def _inside(place: Array, places: Array, scale: Array) -> Array:
@@ -329,7 +331,9 @@ class Judge:
 
     def _orbit(self, begin: Array, free: bool, cut: float = 1.0) -> Orbit | None:
         one = self._shoot(begin, self.omega, self.steps, free, cut)
-        two = None if one is None else self._shoot(one.state, one.omega, 2 * self.steps, free)
+        two = None
+        if one is not None:
+            two = self._shoot(one.state, one.omega, 2 * self.steps, free, jac=one.jac)
         if one is None or two is None:
             return None
         size = float(np.max(np.abs(two.motion[1:])))
@@ -340,10 +344,10 @@ class Judge:
         return Orbit(two.motion, off, two.multiplier, error, abs(two.omega / self.omega - 1.0))
 
     def _shoot(
-        self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0
-    ) -> _Closed | None:
-        """Return a motion that closes, at the frequency given or, `free`, at one beside it."""
-        scale, n = self._scale(state, omega, steps), len(self.machine.mass)
+        self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0, jac: Array | None = None,
+    ) -> _Closed | None:  # fmt: skip
+        """Return a motion that closes, at the frequency given or, `free`, at one beside it; the derivative of a state nearby serves as long as it is good."""
+        scale, n, before = self._scale(state, omega, steps), len(self.machine.mass), np.inf
         for number in range(NEWTON):
             end, found, moved, places = self.flow(state, omega, steps)
             off = (end - state) / scale
@@ -351,9 +355,11 @@ class Judge:
             if np.max(np.abs(off)) < CLOSED and np.any(inside != state[2 * n :]):
                 state = np.concatenate([state[: 2 * n], inside])
                 continue
-            jac = self._jacobian(state, omega, steps, scale)
+            if jac is None or np.max(np.abs(off)) > SLOW * before or np.max(np.abs(off)) < CLOSED:
+                jac = self._jacobian(state, omega, steps, scale)
             if np.max(np.abs(off)) < CLOSED:
-                return _Closed(state, omega, found, self._largest(jac, moved))
+                return _Closed(state, omega, found, self._largest(jac, moved), jac)
+            before = float(np.max(np.abs(off)))
             matrix = np.eye(len(off)) - jac
             if free:
                 matrix = np.column_stack([matrix, -self._by_frequency(state, omega, steps, scale)])

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
@@ -11,6 +13,7 @@ from stickslip.harmonic.judging import (
     UNSEEN,
     covers,
     judging_balance,
+    judging_set,
     judging_set_of,
 )
 from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert
@@ -92,15 +95,27 @@ def check_support(
 
 
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Predict what the harmonics of its judging set would change in a solution, a fraction: 0 where nothing acts on them; NaN where that cannot be told.
+    """Predict what the harmonics of its judging set would change in a solution, a fraction: what was said of it on the way, else by two Newton steps.
 
     Parameters
     ----------
     problem
         The forced response.
     point
-        A point that converged.
+        One of its points.
+
+    Returns
+    -------
+    float
+        0 where nothing acts on these harmonics; NaN where that cannot be told, or the point did not converge.
     """
+    if not point.converged:
+        return float("nan")
+    # in the published passages a strategy looks at nothing beyond its reference
+    fed = judging_set(point.support, problem.driven)
+    looked = problem.sweep.auto or set(fed) <= set(problem.high.harmonics)
+    if problem.strategy.verifies and looked and not np.isnan(point.predicted_error):
+        return point.predicted_error
     if problem.system.interface.rigid:
         return float("nan")
     own = with_stiffness(problem.balance(point.support))

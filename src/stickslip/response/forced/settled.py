@@ -21,7 +21,7 @@ from stickslip.response.forced.problem import (
     forced_point,
     with_stiffness,
 )
-from stickslip.response.verification import with_waves
+from stickslip.response.verification import own_error, with_waves
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
@@ -69,20 +69,26 @@ def settle(
     stages: tuple[Stage, Stage] = ("peak", "check") if of_peak else ("settled", "compared")
     budget = max(WORK, sum(map(_work, solved)))
     settling = _Settling(problem, list(accepted), stored, stages, budget)
-    if not problem.sweep.auto:  # what a study fixes stands along the branch; its peak is compared
-        if of_peak and problem.sweep.peak_points:
-            yield from settling.settle_highest()
-        return
+    sweep, done = problem.sweep, set[int]()
+    if not sweep.auto and of_peak and sweep.peak_points:
+        done = yield from settling.settle_highest()
     audits = audits_by_frequency(solved)
     for place, point in enumerate(accepted):
-        mine = point.converged and (point.stage == "peak") == of_peak
+        mine = point.converged and (point.stage == "peak") == of_peak and place not in done
         if mine and _open(problem, point, audits.get(point.omega, [])):
             yield from settling.settle(place)
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
     """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
-    bound, limit = point.predicted_error, problem.strategy.threshold
+    limit, bound = problem.strategy.threshold, point.predicted_error
+    if (
+        not problem.sweep.auto
+    ):  # what a study fixes stands; a doubt about all of it is compared with more
+        if point.support != problem.sweep.high_harmonics:
+            return False
+        bound = own_error(problem, point)
+        bound = 0.0 if bound <= limit else bound
     if bound == 0.0:
         return False
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
@@ -138,16 +144,17 @@ class _Settling:
     left: float  # work
     spent: int = 0  # solutions of the point that is being settled
 
-    def settle_highest(self) -> Iterator[ForcedPoint]:
-        """Compare the highest point with more harmonics, and what is highest then, until that has been compared."""
+    def settle_highest(self) -> Generator[ForcedPoint, None, set[int]]:
+        """Compare the highest point with more harmonics, and what is highest then, until that has been compared; return the places of all."""
         seen: set[int] = set()
         for _ in range(SOLUTIONS):
             heights = [self.problem.amplitude(p) if p.converged else -np.inf for p in self.known]
             top = int(np.argmax(heights)) if heights else -1
             if top < 0 or top in seen or not self.known[top].converged:
-                return
+                break
             seen.add(top)
             yield from self.settle(top)
+        return seen
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
         """Raise the harmonics of a point until the motion stays, a solution after the other."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.judging import judging_set
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.amplitude import amplitudes
@@ -185,7 +184,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     audits = audits_by_frequency(points)
     accepted = []
     for point, low in accepted_pairs(points):
-        own = _own_error(problem, point)
+        own = own_error(problem, point)
         more = _audit(point, audits.get(point.omega, []))
         audit = float("nan") if more is None else problem.real_error(point, more)
         made = _accept(problem, point, low)
@@ -228,18 +227,6 @@ def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
         seconds_total=0.0,
         harmonics=harmonics,
     )
-
-
-def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the bound of a solution's own error: what was said of it on the way, else what two steps with the harmonics of its judging set change."""
-    if not point.converged:
-        return float("nan")
-    # in the published passages a strategy looks at nothing beyond its reference
-    fed = judging_set(point.support, problem.driven)
-    looked = problem.sweep.auto or set(fed) <= set(problem.high.harmonics)
-    if problem.strategy.verifies and looked and not np.isnan(point.predicted_error):
-        return point.predicted_error
-    return own_error(problem, point)
 
 
 def _audit(point: ForcedPoint, audits: Sequence[ForcedPoint]) -> ForcedPoint | None:

@@ -58,13 +58,13 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
     """Doubt a solution whose own harmonics are predicted to be too few, and one that nothing has judged."""
     for i in np.flatnonzero(case.converged):
         own, solved = case.own_error[i], case.audit[i]
-        if case.attained[i] or solved <= case.limit:
+        if case.attained[i] or not np.isnan(solved):
             continue  # what was solved or integrated tells more than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
             remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(own), error_text(own))
-        elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
+        elif np.isnan([own, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
 
