@@ -1,6 +1,7 @@
 """What a model can and cannot do, told from its modes: damping, bounds by friction, bodies on contacts, what a damper can do."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from stickslip.contact.laws.iwan import Iwan
 from stickslip.model.damping import Damping
 from stickslip.response.physics.damper import complex_stiffness, damped_modes
 from stickslip.response.physics.friction import friction_of
-from stickslip.response.physics.modes import Range, range_modes, springs_of
+from stickslip.response.physics.modes import Range, RangeMode, range_modes, springs_of
+from stickslip.study.keep.progress import LOG
 from stickslip.units import HZ
 
 STIFFNESS = 1e4 * np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
@@ -190,6 +192,33 @@ def test_stiffness_alone_bounds_an_undamped_hardening_oscillator():
         if not damping:
             assert "neutral" in told
     assert size[0.0] == pytest.approx(size[2e-5], rel=1e-3)
+
+
+def test_check_says_which_stuck_frequency_counts(tmp_path, caplog):
+    """Four masses: an open contact stuck as well would give 16.09 Hz; two modes in the range: the larger resonance first."""
+    caplog.set_level("INFO", logger=LOG.name)
+    text = (EXAMPLES / "four_masses" / "study.toml").read_text()
+    for name, own in (
+        ("one", text),
+        ("two", re.sub(r"(frequency_hz = \[[^,]*, )[^\]]*", r"\g<1>50.0", text)),
+    ):
+        (tmp_path / f"{name}.toml").write_text(own)
+        caplog.clear()
+        ss.Study.from_file(tmp_path / f"{name}.toml").check()
+        (line,) = [m for m in caplog.messages if "the load drives" in m]
+        assert "the load drives the mode at 14.09 Hz most (pressed contacts stuck)" in line
+        assert ("it drives the mode at" in line) == (name == "two")
+
+
+def test_the_driven_mode_is_that_of_the_largest_resonance():
+    """Modal amplitude F/(2 ζ ω²): a mode twice as high needs four times the force, one with a tenth of the damping a tenth."""
+    gaps = np.zeros((1, 3), dtype=complex)
+    one = RangeMode(1, 1, 100.0, 1e-3, 1.0, gaps, 0.0, "a", 0.5)
+    high = replace(one, number=2, omega=200.0, force=3.9)
+    assert one.resonance == pytest.approx(1.0 / (2 * 1e-3 * 1e4))
+    assert high.resonance < one.resonance < replace(high, force=4.1).resonance
+    assert replace(one, ratio=0.0).resonance == pytest.approx(1e2 * one.resonance)
+    assert replace(one, harmonic=2).resonance == pytest.approx(0.25 * one.resonance)
 
 
 def test_check_says_before_any_response_that_nothing_damps_a_mode(tmp_path):

@@ -78,6 +78,11 @@ class RangeMode:
         return self.force > 0.0 and self.ratio < UNDAMPED_RATIO
 
     @property
+    def resonance(self) -> float:
+        """Modal amplitude at its resonance, m √kg, with at least the damping ratio `UNDAMPED_RATIO`."""
+        return self.force / (2.0 * (self.harmonic * self.omega) ** 2 * max(self.ratio, UNDAMPED_RATIO))  # fmt: skip
+
+    @property
     def hz(self) -> float:
         """Frequency of the excitation, Hz."""
         return self.omega / HZ

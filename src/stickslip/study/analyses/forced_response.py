@@ -46,7 +46,13 @@ from stickslip.study.analyses.forced.not_periodic import (
     of_answers,
     without_periodic,
 )
-from stickslip.study.analyses.forced.physics import PHYSICS, beforehand, of_physics, physics_of
+from stickslip.study.analyses.forced.physics import (
+    PHYSICS,
+    beforehand,
+    driven_line,
+    of_physics,
+    physics_of,
+)
 from stickslip.study.analyses.forced.points import Response, lost_point
 from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
@@ -162,6 +168,7 @@ class ForcedResponseAnalysis:
         doubted = [text for text in doubts_of_model(question) if text not in model.warnings]
         physics = physics_of(question)
         known = [] if physics is None else list(beforehand(physics))
+        driven = [] if physics is None else driven_line(physics)
         notes = [v for v in known if not v.rank]
         doubts = [
             *no_resonance(question),
@@ -178,6 +185,7 @@ class ForcedResponseAnalysis:
             cost_line(question),
             *bifurcations_line(question),
             *inside(question),
+            *driven,
             *(f"note: {v.why}. {v.remedy}" for v in (*off_engine_order(question), *notes)),
             *(f"WARNING: {text}" for text in (*doubted, *(f"{v.why}. {v.remedy}" for v in doubts))),
         )

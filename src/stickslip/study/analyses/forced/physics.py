@@ -61,6 +61,12 @@ class Physics:
         each = [(m, m.excess(self.friction)) for m in self.sliding if m.undamped]
         return [(m, excess) for m, excess in each if 1.0 < excess < np.inf]
 
+    @property
+    def driven(self) -> RangeMode | None:
+        """The mode whose linear resonance is largest with contacts stuck; None where the load drives none in the range."""
+        known = [m for m in self.stuck if m.force > 0.0]
+        return max(known, key=lambda m: m.resonance) if known else None
+
     def ends(self, mode: RangeMode) -> float:
         """Return the frequency that friction leads a mode to, rad/s: its own where there is none."""
         near = [d for d in self.damped if abs(d.stuck - mode.omega) <= 1e-6 * mode.omega]
@@ -104,6 +110,18 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
     yield from _of_bounds(physics)
     yield from _of_bodies(physics)
     yield from _of_dampers(physics)
+
+
+def driven_line(physics: Physics) -> list[str]:
+    """Say which mode in the range counts: the one that the load drives most with the contacts stuck that are pressed."""
+    top = physics.driven
+    if top is None:
+        return []
+    others = [m for m in physics.stuck if m.force > 0.0 and m is not top]
+    beside = f"; it drives {_modes(others)} less" if others else ""
+    return [
+        f"the load drives the mode at {top.hz:.2f} Hz most (pressed contacts stuck): the resonance while nothing slips{beside}"
+    ]
 
 
 def afterwards(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
