@@ -351,7 +351,8 @@ def test_peak_at_the_end_is_no_resonance() -> None:
     said = warnings_of(dataset(solved(lifted(omega_range=(0.6, 0.9), points=5))))
     told = (
         f"The largest amplitude stands at the end of the sweep ({0.9 / HZ:.2f} Hz); it is no resonance. "
-        "Widen forced_response.frequency_hz."
+        "Widen forced_response.frequency_hz. Where contacts shift the resonance, a larger motion of its branch may reach into the range: "
+        "[all_motions] looks for it."
     )
     assert told in said
 

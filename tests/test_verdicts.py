@@ -13,6 +13,7 @@ from small_v2 import write_four_masses
 from test_cli import done
 
 import stickslip as ss
+from stickslip.report.frame import concluded
 from stickslip.study.analyses.forced.curve import Curve, branch_length
 from stickslip.study.analyses.forced.verdicts import said_once, verdicts, with_levels
 from stickslip.study.analyses.verdict import (
@@ -127,6 +128,12 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
         "TRUSTED: k = 1, 3.",
     ]
     assert in_lines(given, every=True) == [str(v) for v in worst_first(given)]
+    page = concluded(given, "", bad=True)
+    assert [(t.verdict.case, t.likewise) for t in page.shown] == [
+        ("k = 2", "Likewise: k = 4 (12.5 Hz)."), ("k = 5", ""), ("k = 6", ""), ("k = 4", "")
+    ]  # fmt: skip
+    assert [t.verdict.case for t in page.good] == ["k = 1", "k = 3"]
+    assert page.kind == "bad"
     assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
     assert together(["a = 1", "a = 2"]) == "a = 1, 2"
     assert together(["a = 1", "b = 1"]) == "a = 1, b = 1"
@@ -384,7 +391,7 @@ def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
 
 @pytest.mark.parametrize(
     ("cap", "said"),
-    [(41, "give more forced_response.points"), (5, "raise limits.work_s or limits.memory_gb"), (None, 'Give harmonics.high = "auto"')],
+    [(41, "Give more forced_response.points"), (5, "raise limits.work_s or limits.memory_gb"), (None, 'Give harmonics.high = "auto"')],
 )  # fmt: skip
 def test_remedies_name_what_kept_a_point_from_more_harmonics(cap: int | None, said: str) -> None:
     auto = {} if cap is None else {"passages": "auto", "high_order": cap}

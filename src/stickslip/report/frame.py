@@ -18,7 +18,7 @@ from plotly.offline import get_plotlyjs
 from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
-from stickslip.study.analyses.verdict import Verdict, worst_first
+from stickslip.study.analyses.verdict import Verdict, likewise, of_kinds, worst_first
 from stickslip.study.keep.whole import write_whole
 
 _CONFIG = {
@@ -66,13 +66,21 @@ class Chapter:
 
 
 @dataclass(frozen=True)
+class Told:
+    """A verdict, and where others of its kind are, which follow after the first of each kind."""
+
+    verdict: Verdict
+    likewise: str = ""
+
+
+@dataclass(frozen=True)
 class Conclusion:
     """What is not trusted, why, and what to do, the worst first; and what is trusted."""
 
     told: str
     kind: Literal["good", "some", "bad"]
-    shown: Sequence[Verdict]
-    good: Sequence[Verdict]
+    shown: Sequence[Told]
+    good: Sequence[Told]
 
 
 @dataclass
@@ -129,10 +137,13 @@ def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusio
         Whether a case or an analysis is not trusted.
     """
     every = worst_first(verdicts)
-    shown = [v for v in every if v.told]
-    warns = any(v.rank or v.warns for v in shown)
+    told_of = [v for v in every if v.told]
+    kinds = of_kinds(told_of)
+    shown = [Told(first, likewise(others)) for first, *others in kinds]
+    shown += [Told(v) for _, *others in kinds for v in others]
+    warns = any(v.rank or v.warns for v in told_of)
     kind: Literal["good", "some", "bad"] = "bad" if bad else "some" if warns else "good"
-    return Conclusion(told, kind, shown, [v for v in every if not v.told])
+    return Conclusion(told, kind, shown, [Told(v) for v in every if not v.told])
 
 
 def anchor(key: str) -> str:

@@ -132,23 +132,34 @@ def together(labels: Sequence[str]) -> str:
     return ", ".join(labels)
 
 
-def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
-    """Return verdicts as lines, worst first: of one kind the first one and where the others are, unless `every` one is asked for."""
+def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:
+    """Return verdicts by kind, the kinds worst first: of one kind say the same before their first number; what is only trusted of cases is one kind."""
     kinds: dict[tuple[str, ...], list[Verdict]] = {}
     for v in worst_first(verdicts):
         own: tuple[str, ...] = (v.word, _gist(v.why), _gist(v.remedy))
-        if every or len(own[1]) < ALIKE:
+        if len(own[1]) < ALIKE:
             own = (str(v),)
-        if not every and v.case and not v.told:
+        if v.case and not v.told:
             own = ()
         kinds.setdefault(own, []).append(v)
+    return list(kinds.values())
+
+
+def likewise(others: Sequence[Verdict]) -> str:
+    """Say where the others of a kind are; nothing where there are none."""
+    return f"Likewise: {together([v.place for v in others])}." if others else ""
+
+
+def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
+    """Return verdicts as lines, worst first: of one kind the first one and where the others are, unless `every` one is asked for."""
+    if every:
+        return [str(v) for v in worst_first(verdicts)]
     lines = []
-    for own, (first, *others) in kinds.items():
-        if not own and others:
+    for first, *others in of_kinds(verdicts):
+        if first.case and not first.told and others:
             lines.append(f"TRUSTED: {together([v.case for v in (first, *others)])}.")
         else:
-            like = together([v.place for v in others])
-            lines.append(f"{first}{f' Likewise: {like}.' * bool(others)}")
+            lines.append(f"{first} {likewise(others)}".rstrip())
     return lines
 
 

@@ -77,8 +77,8 @@ def _more(case: Curve, point: int) -> str:
         return "Its own error was predicted below harmonics.alert_threshold_percent: lower that, and more harmonics are kept"
     if case.supports[point][-1] < case.cap:
         return (
-            f"Up to {case.cap} harmonics were allowed, and the work that a response may take, or the want of a solution nearby, ended "
-            f"before: give {case.nearer}, which allow more work, or a narrower range"
+            f"Give {case.nearer}, or a narrower range: the search for up to {case.cap} harmonics ended before, by its share of work or because "
+            "no solution was near"
         )
     if case.cap < RUNGS[-1]:
         return f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
@@ -266,7 +266,11 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         if case.hump >= 0:
             size, hz = 1e3 * case.amplitude[case.hump], case.hz[case.hump]
             why += f"; inside the sweep the largest maximum is {size:.4g} mm at {hz:.2f} Hz"
-        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
+        remedy = (
+            f"Widen forced_response.{case.range_key}. Where contacts shift the resonance, a larger motion of its branch may reach into the "
+            "range: [all_motions] looks for it."
+        )
+        yield Finding("doubtful", why, remedy)
 
 
 def retention(case: Curve) -> Iterator[Finding]:
