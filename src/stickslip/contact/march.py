@@ -1,11 +1,11 @@
 """Forces and derivatives of any contact law over one period, sample by sample.
 
-The state is marched from its start until it is periodic; derivatives by the Fourier coefficients of the gaps travel with it. Two periods
-are enough for independent tangents. Other laws forget their start only gradually: a planar Coulomb contact near incipient slip or a
-Dahl contact in micro-slip would take hundreds of periods. From the third period on, the derivative of the state after a period by the state
-before it is marched, too, and one Newton step a period is made towards the state that repeats. It also says how far the state is from
-that one, which the change over a period alone does not where the start is forgotten slowly. A direction that keeps the memory of its
-start for ever, as a spring that only sticks, is left where marching brought it.
+The state is marched from its start until it is periodic; derivatives by the Fourier coefficients of the gaps travel with it. One period is
+enough for a law without memory, two for independent tangents. Other laws forget their start only gradually: a planar Coulomb contact near
+incipient slip or a Dahl contact in micro-slip would take hundreds of periods. From the third period on, the derivative of the state after a
+period by the state before it is marched, too, and one Newton step a period is made towards the state that repeats. It also says how far the
+state is from that one, which the change over a period alone does not where the start is forgotten slowly. A direction that keeps the memory
+of its start for ever, as a spring that only sticks, is left where marching brought it.
 """
 
 from functools import cache
@@ -217,8 +217,11 @@ def _settle(  # type: ignore[no-untyped-def]
     largest_gap = max(np.max(np.abs(gap[c])), 1e-300)
     safe, safe_rows, safe_omega = s.copy(), rows.copy(), s_omega.copy()
     last, plain, patience = np.inf, 0, 1
+    memory = n_state > 0
     _one_period(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
-                work, False, False, force, state, by_omega)  # fmt: skip
+                work, not memory, False, force, state, by_omega)  # fmt: skip
+    if not memory:
+        return 1
     for period in range(1, MAX_PERIODS):
         before, rows_before, omega_before = s.copy(), rows.copy(), s_omega.copy()
         track = period > 1
