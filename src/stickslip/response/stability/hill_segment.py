@@ -268,7 +268,9 @@ class _Part:
 
 def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
     B, D, held = modes.ports, modes.diagonal(z, sign), modes.springs
-    rest = np.setdiff1d(np.arange(B.shape[1]), slow)
+    ringing = np.zeros(B.shape[1], dtype=bool)
+    ringing[slow] = True
+    rest = np.flatnonzero(~ringing)
     B_s, B_r = B[:, slow], B[:, rest]
     if D is None:
         Z = modes.dynamic(z, sign)

@@ -51,6 +51,7 @@ class _Kicks:
         self.rates = self.gaps * (modes.omega * modes.speed)
         self.pull = modes.pull(self.gaps)
         self.weights = np.repeat(weights, 3)[:, None]
+        self.by_rate = np.any(tangents.jac[:, :, :3, 3:6], axis=(1, 2, 3))  # (samples,)
         own_stiffness = np.diagonal(tangents.jac[:, :, :3, :3], axis1=2, axis2=3)
         self.springs = self.weights * own_stiffness.mean(axis=0).reshape(-1, 1)
         self.real = tangents.kept
@@ -68,10 +69,9 @@ class _Kicks:
         now = gap.reshape(n, 3, -1)
         known = np.concatenate([now, np.zeros_like(now), self.states, self.before], axis=1)
         force = self.weights * (jac[:, :3] @ known).reshape(3 * n, -1) - self.springs * gap
-        by_rate = jac[:, :3, 3:6]
-        if np.any(by_rate):
+        if self.by_rate[sample]:
             damping = np.zeros((n, 3, n, 3))
-            damping[np.arange(n), :, np.arange(n)] = by_rate
+            damping[np.arange(n), :, np.arange(n)] = jac[:, :3, 3:6]
             damping = self.weights * damping.reshape(3 * n, 3 * n)
             mobility = share * (self.rates @ self.pull)
             force = decayed(damping @ mobility) @ (force + damping @ rate)

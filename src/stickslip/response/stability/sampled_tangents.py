@@ -175,12 +175,12 @@ class _Steps:
         s = self.size
         basis, slope = fourier_basis(tau, len(self.polynomials))
         gap, velocity = basis @ self.polynomials, self.path.omega * (slope @ self.polynomials)
-        out, force, new, status = np.zeros((tau.size, 3, 6)), np.empty(3), np.empty(s), np.empty(2, np.int64)  # fmt: skip
-        for i, start in enumerate(self.starts[part]):
-            full = np.zeros((3 + s, 6 + s))
-            self.law.kernel(gap[i], velocity[i], start, self.parameters, force, new, full, status)
-            out[i] = full[:3, :6]
-        return out
+        force, new, status = np.empty(3), np.empty(s), np.empty(2, np.int64)
+        out = np.zeros((tau.size, 3 + s, 6 + s))
+        kernel, parameters = self.law.kernel, self.parameters
+        for u, v, start, jac in zip(gap, velocity, self.starts[part], out, strict=True):
+            kernel(u, v, start, parameters, force, new, jac, status)
+        return out[:, :3, :6]
 
     def _corrected(self, state: FloatArray, new: FloatArray, jac: FloatArray) -> FloatArray:
         """Return the state that Newton's method expects to repeat, without directions that never forget."""
@@ -192,25 +192,26 @@ class _Steps:
 
     def _period(self, state: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
         """Take the law through a period; return the state at its end and the tangents of whole steps."""
-        s = self.size
+        s, count = self.size, len(self.times)
         old, new, force, status = state.copy(), state.copy(), np.empty(3), np.empty(2, np.int64)
-        whole = np.zeros((len(self.samples), 3 + s, 9 + s))
-        carried = np.eye(s, 9 + s, 6)  # of the state, by what a whole step begins and ends with
-        sample = int(np.searchsorted(self.samples, first))
-        for i in range(first, len(self.times)):
-            jac = np.zeros((3 + s, 6 + s))
+        jac = np.zeros((count, 3 + s, 6 + s))
+        kernel, parameters = self.law.kernel, self.parameters
+        for i in range(first, count):
             self.starts[i] = old
-            self.law.kernel(
-                self.gap[i], self.velocity[i], old, self.parameters, force, new, jac, status
-            )
+            kernel(self.gap[i], self.velocity[i], old, parameters, force, new, jac[i], status)
             old, new = new, old
-            step = jac[:, 6:] @ carried
-            step[:, :3] += self.share[i] * jac[:, :3]
-            step[:, 6 + s :] += (1.0 - self.share[i]) * jac[:, :3]
-            step[:, 3:6] += jac[:, 3:6]
-            carried = step[3:]
-            if i == self.samples[sample]:
-                whole[sample] = step
-                carried = np.eye(s, 9 + s, 6)
-                sample += 1
+        # of each part, by what its step begins and ends with; states are those at the beginning of the part
+        parts, share = np.zeros((count, 3 + s, 9 + s)), self.share[:, None, None]
+        parts[:, :, :3] = share * jac[:, :, :3]
+        parts[:, :, 3:6] = jac[:, :, 3:6]
+        parts[:, :, 6 : 6 + s] = jac[:, :, 6:]
+        parts[:, :, 6 + s :] = (1.0 - share) * jac[:, :, :3]
+        later = np.ones(count, dtype=bool)  # not the first part of its step
+        later[: first + 1], later[self.samples[:-1] + 1] = False, False
+        for part in np.flatnonzero(later):
+            own = parts[part, :, 6 : 6 + s].copy()
+            parts[part, :, 6 : 6 + s] = 0.0
+            parts[part] += own @ parts[part - 1, 3:]
+        whole = parts[self.samples]
+        whole[self.samples < first] = 0.0
         return old, whole
