@@ -200,7 +200,7 @@ class PeriodMap:
 
         `seen` says which of the laws' derivatives were not zero, `still` which of their states stayed.
         """
-        pattern = law_derivatives(seen.astype(float), self.linear, still.size)
+        (pattern,) = law_derivatives(seen[None].astype(float), self.linear, still.size)
         sprung = np.any(pattern.force_by_law[self.marcher.contacts.table.stuck != 0.0], axis=0)
         felt, more = np.zeros_like(still), np.any(pattern.force_by_law, axis=0)
         while not np.array_equal(felt, more):
@@ -261,7 +261,8 @@ def _law_scale(marcher: Marcher, linear: TangentOperators) -> FloatArray:
     contacts = marcher.contacts
     n_states = contacts.start.size
     at_rest = marcher.begin(np.zeros(2 * marcher.n), contacts.start)[1]
-    force = law_derivatives(at_rest, linear, n_states).force_by_law.reshape(contacts.n, 3, n_states)
+    (laws,) = law_derivatives(at_rest[None], linear, n_states)
+    force = laws.force_by_law.reshape(contacts.n, 3, n_states)
     stiffness = np.max(contacts.table.stuck.reshape(-1, 3), axis=1, initial=0.0)
     fallback = np.max(stiffness, initial=0.0) or 1.0
     root = np.sqrt(np.where(stiffness > 0.0, stiffness, fallback))

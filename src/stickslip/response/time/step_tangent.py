@@ -4,7 +4,7 @@ The state of a motion has a tangent, one column for each direction in which its 
 logged by the march, make a step of it; steps in a row with the same derivatives are taken by squares of their common matrix.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from stickslip.response.time.marcher import Marcher
 from stickslip.response.time.time_step import StepLog
 
 SINGLY = 6  # steps in a row up to which their matrix is not worth its making
+NUMBERS = 1 << 20  # of the matrices that are made of rows of a log at once: 8 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,30 +78,33 @@ def tangent_operators(marcher: Marcher) -> TangentOperators:
     )
 
 
-def law_derivatives(row: FloatArray, linear: TangentOperators, n_states: int) -> LawDerivatives:
-    """Return a row of the log as matrices."""
+def law_derivatives(
+    rows: FloatArray, linear: TangentOperators, n_states: int
+) -> Iterator[LawDerivatives]:
+    """Yield the (r, ...) rows of a log as matrices."""
     k = linear.springs.size
-    whole, entry = np.zeros((k + n_states, 2 * k + n_states)), np.zeros((k + n_states, 2 * k))
-    landed = False
+    whole = np.zeros((len(rows), k + n_states, 2 * k + n_states))
+    entry = np.zeros((len(rows), k + n_states, 2 * k))
+    landed = np.zeros(len(rows), dtype=bool)
     for block in linear.blocks:
         size = block.states.shape[1]
-        rows = np.hstack([block.gaps[:, :3], k + block.states])[:, :, None]
-        columns = np.hstack([block.gaps, 2 * k + block.states])[:, None, :]
-        whole[rows, columns] = row[block.jac].reshape(-1, 3 + size, 6 + size)
-        before = row[block.entry].reshape(-1, 3 + size, 6)
-        if np.any(before):
-            landed = True
-            entry[rows, block.gaps[:, None, :]] = before
+        down = np.hstack([block.gaps[:, :3], k + block.states])[:, :, None]
+        across = np.hstack([block.gaps, 2 * k + block.states])[:, None, :]
+        whole[:, down, across] = rows[:, block.jac].reshape(len(rows), -1, 3 + size, 6 + size)
+        before = rows[:, block.entry].reshape(len(rows), -1, 3 + size, 6)
+        landed |= np.any(before, axis=(1, 2, 3))
+        entry[:, down, block.gaps[:, None, :]] = before
     split = 2 * k
-    return LawDerivatives(
-        whole[:k, :split], whole[:k, split:], whole[k:, :split], whole[k:, split:],
-        entry if landed else entry[:, :0],
-    )  # fmt: skip
+    for own, before, lands in zip(whole, entry, landed, strict=True):
+        yield LawDerivatives(
+            own[:k, :split], own[:k, split:], own[k:, :split], own[k:, split:],
+            before if lands else before[:, :0],
+        )  # fmt: skip
 
 
 def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
     """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of how a march begins."""
-    laws = law_derivatives(row, linear, n_states)
+    (laws,) = law_derivatives(row[None], linear, n_states)
     k, m = linear.springs.size, linear.seen.shape[1]
     by_motion = laws.force @ linear.seen - linear.springs[:, None] * linear.seen[:k]
     return np.block(
@@ -114,10 +118,14 @@ def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> F
 
 def advanced(log: StepLog, rows: int, tangent: FloatArray, linear: TangentOperators) -> FloatArray:
     """Return the tangent (m + k + s, columns) after the steps of a log."""
-    n_states = len(tangent) - linear.free.shape[1]
-    for i in range(rows):
-        laws = law_derivatives(log.jac[i], linear, n_states)
-        tangent = _steps(int(log.steps[i]), laws, tangent, linear)
+    n_states, k = len(tangent) - linear.free.shape[1], linear.springs.size
+    width = (k + n_states) * (4 * k + n_states)  # 0 without contacts
+    at_once = max(1, NUMBERS // max(1, width))
+    for first in range(0, rows, at_once):
+        own = slice(first, min(first + at_once, rows))
+        each = law_derivatives(log.jac[own], linear, n_states)
+        for count, laws in zip(log.steps[own], each, strict=True):
+            tangent = _steps(int(count), laws, tangent, linear)
     return tangent
 
 
