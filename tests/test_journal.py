@@ -1,5 +1,6 @@
 """The file of a job: exact, whole after a kill, its own job's only, and named where it is damaged."""
 
+import io
 import sqlite3
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.model.checksum import with_checksum
 from stickslip.solve.status import Status
 from stickslip.study.analyses.analysis import Pieces
 from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
@@ -86,6 +88,35 @@ def test_objects_that_would_need_pickle_are_refused() -> None:
     with pytest.raises(ValueError, match="Object arrays cannot be saved"):
         encode({"a": np.array([object()])})
     assert decode(encode({"a": 1.5})) == {"a": 1.5}
+
+
+def test_objects_in_an_archive_of_another_program_are_not_read() -> None:
+    stream = io.BytesIO()
+    np.savez(stream, a=np.array([object()]))
+    with pytest.raises(ValueError, match="damaged archive: an array of objects"):
+        decode(with_checksum(stream.getvalue()))
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.asfortranarray(np.arange(6.0).reshape(2, 3)),
+        np.arange(24).reshape(2, 3, 4).transpose(2, 0, 1),
+        np.zeros((0, 3), dtype=complex),
+        np.array([True, False]),
+        np.array(["µ", "", "three"]),
+    ],
+    ids=["columns", "turned", "empty", "truths", "texts"],
+)
+def test_arrays_come_back_as_numpy_reads_them(array: np.ndarray) -> None:
+    payload = encode({"a": array})
+    (found,) = decode(payload).values()
+    with np.load(io.BytesIO(payload)) as opened:
+        known = opened["a"]
+    assert found.dtype == known.dtype
+    assert found.flags.f_contiguous == known.flags.f_contiguous
+    np.testing.assert_array_equal(found, array)
+    found[...] = found  # it may be changed
 
 
 def test_file_of_another_job_is_refused(tmp_path: Path) -> None:
