@@ -6,6 +6,8 @@ VENV ?= .venv
 PYTHON ?= $(shell sed -n 's/^executable = //p' $(VENV)/pyvenv.cfg 2>/dev/null | grep . || command -v python3.11 || command -v python3)
 STUDY  ?= examples/two_blades/study.toml
 WORKERS ?= 2
+# further Pythons that `make release` goes its journey with, such as 3.12
+PYTHONS ?=
 
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 BIN := $(VENV)/bin
@@ -21,8 +23,10 @@ LOCK := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-versio
 unexport PYTHONDONTWRITEBYTECODE
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# Each worker gets tests in one piece: what the tests of a file share is made, and what they compile compiled, once.
+TESTS := pytest -n $(WORKERS) --dist worksteal --durations=20
 
-.PHONY: help install run test test-kernels coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate validate-tests validate-faults validate-kernels validate-literature validate-in-time validate-mutants baseline strategies alarms sections trust mutants lock clean
+.PHONY: help install run test test-kernels coverage optional test-optional test-cluster lint docs-tools docs release figures second-damper reconstruction bench bench-rival calculix validate validate-tests validate-faults validate-kernels validate-literature validate-in-time validate-mutants baseline strategies alarms sections trust mutants lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -46,13 +50,13 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
 test: $(INSTALLED)  ## run the tests
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20
+	$(ONE_THREAD) $(BIN)/python -m $(TESTS)
 
 test-kernels: $(INSTALLED)  ## run the tests marked `kernel` with the LAPACK kernels of Haswell, which `make test` does not have
 	$(ONE_THREAD) $(BIN)/python -m evidence.kernels --marked --workers $(WORKERS)
 
 coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
+	$(ONE_THREAD) $(BIN)/python -m $(TESTS) --cov --cov-report=term:skip-covered
 
 optional: $(OPTIONAL_INSTALLED)  ## install what nobody needs by default: readers, a faster factorisation, files of ANSYS to test with (1 GB)
 
@@ -72,6 +76,8 @@ lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs-tools: $(DOCS_INSTALLED)  ## install what the documentation and a release are made with
 
 $(DOCS_INSTALLED): $(INSTALLED) docs/requirements.lock
 	$(PIP_INSTALL) --no-deps --require-hashes -r docs/requirements.lock
@@ -151,7 +157,7 @@ release: $(DOCS_INSTALLED)  ## build the wheel, the source archive and the notes
 	$(BIN)/python -m build --no-isolation --outdir dist .
 	$(BIN)/python -m twine check --strict dist/*
 	$(BIN)/python .ci/release_notes.py >dist/NOTES.md
-	$(BIN)/python .ci/wheel_journey.py dist $(BIN)/python
+	$(BIN)/python .ci/wheel_journey.py dist $(BIN)/python $(PYTHONS)
 
 lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, and write the lock files
 	$(PIP_INSTALL) uv
