@@ -31,7 +31,11 @@ TWO_BLADES = {
     "forced_response.peak_points": "2",
     "harmonics.samples": "64",
 }
-FOUR_MASSES = {"forced_response.points": "10", "forced_response.peak_points": "2"}
+FOUR_MASSES = {
+    "forced_response.points": "10",
+    "forced_response.peak_points": "2",
+    "forced_response.stability": '"peak"',
+}
 
 SECTOR_DECK = {
     "modes.number": "1",

@@ -31,6 +31,7 @@ force_n = 5.0
 [forced_response]
 frequencies_hz = [15.0, 20.0, 25.0]
 peak_points = 0
+stability = "off"
 [solver]
 evaluator = "intervals"
 [harmonics]

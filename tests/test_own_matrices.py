@@ -21,6 +21,7 @@ EXAMPLE = EXAMPLES / "own_matrices"
 FEW = {
     "forced_response.frequencies_hz": "[7.0, 8.0, 9.0, 9.5, 10.0, 10.5, 11.0, 12.0]",
     "forced_response.peak_points": "0",
+    "forced_response.stability": '"off"',
 }
 FEW["harmonics.selection"] = '"always_high"'  # steps of a branch follow rounding
 FEW["part.chain.reduction.method"] = (

@@ -459,7 +459,7 @@ def invoke(*words: str) -> tuple[int, str]:
 
 
 def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
-    study = write_four_masses(tmp_path)
+    study = write_four_masses(tmp_path, {"forced_response.stability": '"auto"'})
     code, said = invoke("check", str(study))
     assert code == 0
     assert "stability: the peak, and other points as far as the work of the solutions goes" in said
