@@ -12,6 +12,7 @@ from evidence.judges.flow_map import FlowMap, judged
 from evidence.models.lumped import griffin
 from evidence.models.random_motions import as_solved
 from evidence.models.solving import at_frequency
+from stickslip.contact.addresses import compiled_step
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.bonded import Bonded
 from stickslip.contact.laws.bouc_wen import BoucWen
@@ -482,7 +483,7 @@ def test_laws_without_finite_tangents_leave_the_verdict_undecided(monkeypatch):
         if gap[0] > 0.0:
             jac[0, 0] = np.nan
 
-    monkeypatch.setattr(CoupledCoulomb, "kernel", staticmethod(broken))
+    monkeypatch.setattr(CoupledCoulomb, "kernel", compiled_step(broken))
     found = motion_stability(structure, Interface(("a",), (law,), operator), gaps, 1.1)
     assert found.verdict == "undecided"
     assert found.error == np.inf

@@ -46,12 +46,13 @@ class _Kicks:
     ) -> None:
         n, most = tangents.kept.shape
         self.modes, self.jac = modes, tangents.jac
+        self.by_rate = np.any(tangents.jac[:, :, :, 3:6] != 0.0, axis=(1, 2, 3))
+        self.alone = np.delete(tangents.jac, [3, 4, 5], axis=3)  # where no rate acts
         index = 3 * tangents.contacts[:, None] + np.arange(3)
         self.gaps = modes.gaps[index.reshape(-1)]  # (3 n, n_modes)
         self.rates = self.gaps * (modes.omega * modes.speed)
         self.pull = modes.pull(self.gaps)
         self.weights = np.repeat(weights, 3)[:, None]
-        self.by_rate = np.any(tangents.jac[:, :, :3, 3:6], axis=(1, 2, 3))  # (samples,)
         own_stiffness = np.diagonal(tangents.jac[:, :, :3, :3], axis1=2, axis2=3)
         self.springs = self.weights * own_stiffness.mean(axis=0).reshape(-1, 1)
         self.real = tangents.kept
@@ -63,19 +64,24 @@ class _Kicks:
 
     def kick(self, sample: int, share: float, motion: FloatArray) -> None:
         """Change velocities and states at a sample; velocities decay as the kick goes on."""
-        jac, n = self.jac[sample], len(self.states)
-        half = self.modes.n
-        gap, rate = self.gaps @ motion[:half], self.rates @ motion[half:]
+        n, half = len(self.states), self.modes.n
+        gap = self.gaps @ motion[:half]
         now = gap.reshape(n, 3, -1)
+        if not self.by_rate[sample]:
+            after = self.alone[sample] @ np.concatenate([now, self.states, self.before], axis=1)
+            force = self.weights * after[:, :3].reshape(3 * n, -1) - self.springs * gap
+            motion[half:] -= share * (self.pull @ force)
+            self.states, self.before = after[:, 3:], now
+            return
+        jac, rate = self.jac[sample], self.rates @ motion[half:]
         known = np.concatenate([now, np.zeros_like(now), self.states, self.before], axis=1)
         force = self.weights * (jac[:, :3] @ known).reshape(3 * n, -1) - self.springs * gap
-        if self.by_rate[sample]:
-            damping = np.zeros((n, 3, n, 3))
-            damping[np.arange(n), :, np.arange(n)] = jac[:, :3, 3:6]
-            damping = self.weights * damping.reshape(3 * n, 3 * n)
-            mobility = share * (self.rates @ self.pull)
-            force = decayed(damping @ mobility) @ (force + damping @ rate)
-            rate = rate - 0.5 * mobility @ force
+        damping = np.zeros((n, 3, n, 3))
+        damping[np.arange(n), :, np.arange(n)] = jac[:, :3, 3:6]
+        damping = self.weights * damping.reshape(3 * n, 3 * n)
+        mobility = share * (self.rates @ self.pull)
+        force = decayed(damping @ mobility) @ (force + damping @ rate)
+        rate = rate - 0.5 * mobility @ force
         known[:, 3:6] = rate.reshape(n, 3, -1)
         motion[half:] -= share * (self.pull @ force)
         self.states, self.before = jac[:, 3:] @ known, now

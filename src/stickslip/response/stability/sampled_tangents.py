@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.contact.addresses import law_address
 from stickslip.contact.law import ContactLaw
+from stickslip.contact.law_steps import steps_along, tangents_at
 from stickslip.response.stability.step_integrals import fourier_basis, hat_integrals
 
 MOST_PERIODS = 200
@@ -112,6 +114,7 @@ class _Steps:
 
     def __init__(self, law: ContactLaw, path: Path, j: int) -> None:
         self.law, self.parameters = law, np.asarray(law.parameters(), dtype=float)
+        self.address = law_address(law.kernel)
         self.size = law.initial_state().size
         polynomials = path.polynomials[:, j]
         before = path.times[-1] - 2 * np.pi
@@ -172,15 +175,11 @@ class _Steps:
 
     def _tangents(self, tau: FloatArray, part: IntArray) -> FloatArray:
         """Return the (k, 3, 6) derivatives of the forces at times within parts of steps."""
-        s = self.size
         basis, slope = fourier_basis(tau, len(self.polynomials))
         gap, velocity = basis @ self.polynomials, self.path.omega * (slope @ self.polynomials)
-        force, new, status = np.empty(3), np.empty(s), np.empty(2, np.int64)
-        out = np.zeros((tau.size, 3 + s, 6 + s))
-        kernel, parameters = self.law.kernel, self.parameters
-        for u, v, start, jac in zip(gap, velocity, self.starts[part], out, strict=True):
-            kernel(u, v, start, parameters, force, new, jac, status)
-        return out[:, :3, :6]
+        out = np.empty((tau.size, 3, 6))
+        tangents_at(self.address, gap, velocity, self.starts, part, self.parameters, out)
+        return out
 
     def _corrected(self, state: FloatArray, new: FloatArray, jac: FloatArray) -> FloatArray:
         """Return the state that Newton's method expects to repeat, without directions that never forget."""
@@ -192,26 +191,9 @@ class _Steps:
 
     def _period(self, state: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
         """Take the law through a period; return the state at its end and the tangents of whole steps."""
-        s, count = self.size, len(self.times)
-        old, new, force, status = state.copy(), state.copy(), np.empty(3), np.empty(2, np.int64)
-        jac = np.zeros((count, 3 + s, 6 + s))
-        kernel, parameters = self.law.kernel, self.parameters
-        for i in range(first, count):
-            self.starts[i] = old
-            kernel(self.gap[i], self.velocity[i], old, parameters, force, new, jac[i], status)
-            old, new = new, old
-        # of each part, by what its step begins and ends with; states are those at the beginning of the part
-        parts, share = np.zeros((count, 3 + s, 9 + s)), self.share[:, None, None]
-        parts[:, :, :3] = share * jac[:, :, :3]
-        parts[:, :, 3:6] = jac[:, :, 3:6]
-        parts[:, :, 6 : 6 + s] = jac[:, :, 6:]
-        parts[:, :, 6 + s :] = (1.0 - share) * jac[:, :, :3]
-        later = np.ones(count, dtype=bool)  # not the first part of its step
-        later[: first + 1], later[self.samples[:-1] + 1] = False, False
-        for part in np.flatnonzero(later):
-            own = parts[part, :, 6 : 6 + s].copy()
-            parts[part, :, 6 : 6 + s] = 0.0
-            parts[part] += own @ parts[part - 1, 3:]
-        whole = parts[self.samples]
-        whole[self.samples < first] = 0.0
-        return old, whole
+        new, s = np.array(state, dtype=float), self.size
+        whole = np.zeros((len(self.samples), 3 + s, 9 + s))
+        steps_along(
+            self.address, first, self.gap, self.velocity, new, self.parameters, self.share, self.samples, self.starts, whole
+        )  # fmt: skip
+        return new, whole

@@ -1,0 +1,97 @@
+"""Steps of one contact law along given gaps, compiled: tangents at samples, and those of a period chained over the parts of each step."""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from stickslip.contact.addresses import law_at
+from stickslip.contact.cache import njit
+
+_matrix = types.float64[:, ::1]
+_cube = types.float64[:, :, ::1]
+_AT = types.void(
+    types.int64,  # where the step of the law begins
+    _matrix,  # gap
+    _matrix,  # velocity
+    _matrix,  # starts
+    types.int64[::1],  # part
+    types.float64[::1],  # parameters
+    _cube,  # out
+)
+_ALONG = types.void(
+    types.int64,  # where the step of the law begins
+    types.int64,  # first
+    _matrix,  # gap
+    _matrix,  # velocity
+    types.float64[::1],  # state
+    types.float64[::1],  # parameters
+    types.float64[::1],  # share
+    types.int64[::1],  # samples
+    _matrix,  # starts
+    _cube,  # whole
+)
+
+
+@njit(_AT, cache=True)
+def _tangents_at(address, gap, velocity, starts, part, parameters, out):  # type: ignore[no-untyped-def]
+    step = law_at(address)
+    s = starts.shape[1]
+    jac = np.zeros((3 + s, 6 + s))
+    force, new, status = np.empty(3), np.empty(s), np.empty(2, np.int64)
+    for i in range(gap.shape[0]):
+        jac[:] = 0.0
+        step(gap[i], velocity[i], starts[part[i]], parameters, force, new, jac, status)
+        for a in range(3):
+            for b in range(6):
+                out[i, a, b] = jac[a, b]
+
+
+@njit(cache=True)
+def _chain(jac, carried, share, line):  # type: ignore[no-untyped-def]
+    """Fill the (3 + s, 9 + s) derivatives after a part of a step by what the step begins and ends with: gap and velocity, state, gap before."""
+    s = carried.shape[0]
+    for a in range(3 + s):
+        for b in range(9 + s):
+            total = 0.0
+            for c in range(s):
+                total += jac[a, 6 + c] * carried[c, b]
+            line[a, b] = total
+        for b in range(3):
+            line[a, b] += share * jac[a, b]
+            line[a, 6 + s + b] += (1.0 - share) * jac[a, b]
+            line[a, 3 + b] += jac[a, 3 + b]
+
+
+@njit(_ALONG, cache=True)
+def _steps_along(address, first, gap, velocity, state, parameters, share, samples, starts, whole):  # type: ignore[no-untyped-def]
+    step = law_at(address)
+    s = state.size
+    jac, line = np.zeros((3 + s, 6 + s)), np.zeros((3 + s, 9 + s))
+    carried = np.zeros((s, 9 + s))  # of the state, by what a whole step begins and ends with
+    force, new, status = np.empty(3), np.empty(s), np.empty(2, np.int64)
+    for a in range(s):
+        carried[a, 6 + a] = 1.0
+    sample = 0
+    while samples[sample] < first:
+        sample += 1
+    for i in range(first, gap.shape[0]):
+        jac[:] = 0.0
+        for a in range(s):
+            starts[i, a] = state[a]
+        step(gap[i], velocity[i], starts[i], parameters, force, new, jac, status)
+        _chain(jac, carried, share[i], line)
+        for a in range(s):
+            state[a] = new[a]
+        if i == samples[sample]:
+            whole[sample] = line
+            carried[:] = 0.0
+            for a in range(s):
+                carried[a, 6 + a] = 1.0
+            sample += 1
+        else:
+            carried[:] = line[3:]
+
+
+tangents_at: Any = _tangents_at
+steps_along: Any = _steps_along
