@@ -192,6 +192,10 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "audit": (
         {"audit_error_percent": values(TOP, 8.0)}, "doubtful", {TOP: "doubtful"}, "it differs by 8 %",
     ),
+    "audit of an output": (
+        {"audit_error_percent": values(TOP, 8.0), "audit_error_of": np.full(6, "damper.rx")}, "doubtful", {TOP: "doubtful"},
+        "it differs by 8 % in damper.rx",
+    ),
     "no audit": (
         {"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone",
     ),

@@ -43,6 +43,8 @@ class Accepted:
         Difference from the same motion solved with more harmonics to compare, a fraction; NaN where it was not.
     audit
         That solution.
+    audit_place
+        Of what differs so much, in what the error is taken over; -1 without one.
     """
 
     point: ForcedPoint
@@ -55,6 +57,7 @@ class Accepted:
     own_error: float = float("nan")
     audit_error: float = float("nan")
     audit: ForcedPoint | None = None
+    audit_place: int = -1
 
     @property
     def exact(self) -> bool:
@@ -186,7 +189,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     for point, low in accepted_pairs(points):
         own = own_error(problem, point)
         more = _audit(point, audits.get(point.omega, []))
-        audit = float("nan") if more is None else problem.real_error(point, more)
+        audit, place = (float("nan"), -1) if more is None else problem.worst_error(point, more)
         made = _accept(problem, point, low)
         of = problem.sweep.amplitude_of
         accepted.append(
@@ -197,6 +200,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
                 own_error=own,
                 audit_error=audit,
                 audit=more,
+                audit_place=place,
             )
         )
     some = problem.system.peak_of

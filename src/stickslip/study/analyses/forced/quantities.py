@@ -93,6 +93,7 @@ _OF = {
         "predicted_error_percent": ("percent", "error of the first solution that an alert predicted, NaN where the indicator is no error; where harmonics were raised along the branch (passages = auto) no first solution stands apart, and it is own_error_percent"),
         "own_error_percent": ("percent", "error that is predicted of the accepted solution itself: 0 where no force acts on the harmonics left out, NaN where it was not judged"),
         "audit_error_percent": ("percent", "difference of the accepted solution from one with more harmonics (an audit), NaN where none was made: not needed, or judged by prediction alone"),
+        "audit_error_of": ("1", "the output or dof that differs so much, empty where no audit was made"),
         "real_error_percent": ("percent", "difference of the first and the accepted solution where the frequency was solved again"),
         "newton_iterations": ("1", "Newton iterations"),
         "seconds": ("s", "time of the point"),

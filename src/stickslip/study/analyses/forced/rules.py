@@ -102,11 +102,12 @@ def _examination(case: Curve) -> str:
 
 def audited(case: Curve) -> Iterator[Finding]:
     """Doubt a solution that more harmonics changed, and that stands all the same."""
+    of = case.texts("audit_error_of")
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
-            why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
+            told = " in ".join(filter(None, (error_text(case.audit[i]), of[i])))
+            why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {told}"
             remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
-            told = error_text(case.audit[i])
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]), told)
 
 

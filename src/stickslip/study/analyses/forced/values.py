@@ -181,6 +181,7 @@ def _damping(question: Question, response: Response) -> float:
 
 def _of_points(question: Question, response: Response) -> Values:
     chooser, engine_order = question.chooser, question.model.engine_order
+    labels = question.model.error_labels
     points = [a.point for a in response.accepted]
     asked = np.array([a.indicator for a in response.accepted], dtype=float)
     own = np.array([p.predicted_error for p in points], dtype=float)
@@ -196,6 +197,9 @@ def _of_points(question: Question, response: Response) -> Values:
         "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
         "own_error_percent": 100 * np.array([a.own_error for a in response.accepted]),
         "audit_error_percent": 100 * np.array([a.audit_error for a in response.accepted]),
+        "audit_error_of": texts(
+            labels[a.audit_place] if a.audit_place >= 0 else "" for a in response.accepted
+        ),
         "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
         "newton_iterations": _whole(p.iterations for p in points),
         "seconds": np.array([p.seconds_total for p in points]),
