@@ -10,6 +10,8 @@ import pytest
 from test_judging import chain
 
 import stickslip as ss
+from evidence.trust.ask import asked, model_of
+from evidence.trust.draw import draw
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.settled import SOLUTIONS, settle
 from stickslip.response.verification import own_error
@@ -136,3 +138,21 @@ def test_a_doubt_about_a_fixed_harmonic_order_is_settled_by_comparing(monkeypatc
             assert error == pytest.approx(problem.real_error(point, exact), abs=8e-3)
             small += error <= sweep.threshold
     assert (small > 0) == (told is not None)
+
+
+def test_an_audit_that_is_doubted_itself_settles_nothing():
+    """The 13th harmonic meets a mode of damping ratio 0.001 (evidence.trust, seed 110607, machine 13).
+
+    Five harmonics differ from nine by 2 %, and from 25 by 7 %: what is predicted of nine counts, too.
+    """
+    machine = draw(110607, 13)
+    told = asked(machine, stability="off")
+    near = int(np.argmin(np.abs(told.hz - 37.8637)))
+    exact = model_of(machine).forced_response(
+        hz=[float(told.hz[near])], low=41, high=41, samples=512, selection="always_high", stability="off"
+    )["forced_response"]  # fmt: skip
+    parts = exact.output_displacement.values[0, machine.harmonic]
+    true = parts[:, 0] + 1j * parts[:, 1]
+    assert told.level[near] == 0
+    off = np.abs(told.motion[near][machine.harmonic] - true) / np.abs(true).max()
+    assert off.max() < 0.01
