@@ -213,7 +213,7 @@ class ForcedCurve:
         self, omega: float, fewer: tuple[int, FloatArray], more: tuple[int, FloatArray]
     ) -> float:
         a, b = (self.problem(level).coefficients(x) for level, x in (fewer, more))
-        return self.forced.difference(omega, a, b)
+        return self.forced.difference(omega, a, b)[0]
 
     def stored(self, found: Followed) -> Followed:
         """Return a solution as it comes back from where it was written down."""

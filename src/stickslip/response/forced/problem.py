@@ -262,22 +262,14 @@ class ForcedProblem:
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
         """Return the largest relative error of a point against another at its frequency (eq. 29 where the measure is the published one), a fraction."""
-        return self.worst_error(point, reference)[0]
+        return self.difference(point.omega, point.coefficients, reference.coefficients)[0]
 
-    def worst_error(self, point: ForcedPoint, reference: ForcedPoint) -> tuple[float, int]:
-        """Return the same, and the place of what is so far off in what the error is taken over."""
-        return self._change(point.omega, point.coefficients, reference.coefficients)
-
-    def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> float:
-        """Return the largest relative difference of two motions (H+1, n_retained) at a frequency, a fraction of the first one."""
-        return self._change(omega, one, other)[0]
-
-    def _change(self, omega: float, one: ComplexArray, other: ComplexArray) -> tuple[float, int]:
+    def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> tuple[float, int]:
+        """Return the largest relative difference of two motions (H+1, n_retained) at a frequency, a fraction of the first one, and the place of what differs so."""
         rows = self.measure.rows(len(one), len(other))
         linear = self._linear_of(rows - 1)
         motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
-        error, place, _ = self.measure.change(motion, exact - motion)
-        return error, place
+        return self.measure.change(motion, exact - motion)[:2]
 
     def _linear_of(self, order: int) -> DynamicStiffness:
         """Return a linear side with matrices for harmonics up to `order`; of a wheel that of a balance that has them."""

@@ -189,7 +189,9 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     for point, low in accepted_pairs(points):
         own = own_error(problem, point)
         more = _audit(point, audits.get(point.omega, []))
-        audit, place = (float("nan"), -1) if more is None else problem.worst_error(point, more)
+        audit, place = float("nan"), -1
+        if more is not None:
+            audit, place = problem.difference(point.omega, point.coefficients, more.coefficients)
         made = _accept(problem, point, low)
         of = problem.sweep.amplitude_of
         accepted.append(
