@@ -133,7 +133,7 @@ def test_a_doubt_about_a_fixed_harmonic_order_is_settled_by_comparing(monkeypatc
         doubted = point.order == 3 and (told or own_error(problem, point)) > sweep.threshold
         assert (point.omega in audits) == doubted
         if doubted:
-            (audit,) = audits[point.omega]
+            audit = max(audits[point.omega], key=lambda p: p.harmonics.size)
             error = problem.real_error(point, audit)
             assert error == pytest.approx(problem.real_error(point, exact), abs=8e-3)
             small += error <= sweep.threshold

@@ -41,15 +41,22 @@ TURN = 1e-3  # relative change of the frequency that counts as much as a change 
 
 
 @numba.njit(cache=True)
+def _gap(tangent, normal, c, q):  # type: ignore[no-untyped-def]
+    """Return the displacements of a contact along its tangent and its normal."""
+    t, z = 0.0, 0.0
+    for i in range(q.size):
+        t += tangent[c, i] * q[i]
+        z += normal[c, i] * q[i]
+    return t, z
+
+
+@numba.njit(cache=True)
 def _forces(kind, tangent, normal, number, q, place, out, moved, move):  # type: ignore[no-untyped-def]
     """Fill the contact forces on the dofs, and with `move` the places of the sliders; mark those that moved."""
     out[:] = 0.0
     n = q.size
     for c in range(kind.size):
-        t, z = 0.0, 0.0
-        for i in range(n):
-            t += tangent[c, i] * q[i]
-            z += normal[c, i] * q[i]
+        t, z = _gap(tangent, normal, c, q)
         along, across = 0.0, 0.0
         if kind[c] == CUBIC:
             along = -number[c, 0] * t * t * t
@@ -78,12 +85,8 @@ def _landed(kind, tangent, normal, number, q, step, place):  # type: ignore[no-u
     for c in range(kind.size):
         if kind[c] != PAD:
             continue
-        t, z, along, across = 0.0, 0.0, 0.0, 0.0
-        for i in range(q.size):
-            t += tangent[c, i] * q[i]
-            z += normal[c, i] * q[i]
-            along += tangent[c, i] * step[i]
-            across += normal[c, i] * step[i]
+        t, z = _gap(tangent, normal, c, q)
+        along, across = _gap(tangent, normal, c, step)
         gap = -(z + number[c, 4] / number[c, 2])
         if gap > 0.0 and across > gap:
             place[c] = t + along * gap / across
@@ -108,10 +111,7 @@ def _narrow(kind, tangent, normal, number, q, places):  # type: ignore[no-untype
     for c in range(kind.size):
         if kind[c] != SLIDER and kind[c] != PAD:
             continue
-        t, z = 0.0, 0.0
-        for i in range(q.size):
-            t += tangent[c, i] * q[i]
-            z += normal[c, i] * q[i]
+        t, z = _gap(tangent, normal, c, q)
         limit = number[c, 1]
         if kind[c] == PAD:
             limit = number[c, 3] * (number[c, 4] + number[c, 2] * z)
@@ -120,15 +120,11 @@ def _narrow(kind, tangent, normal, number, q, places):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True)
-def _told(kind, tangent, normal, number, q, v, place, code):  # type: ignore[no-untyped-def]
+def _states(kind, tangent, normal, number, q, v, place, code):  # type: ignore[no-untyped-def]
     """Fill what each contact does: 0 a closed spring, 2 open, 1 and -1 slip to either side."""
     for c in range(kind.size):
-        t, z, along, across = 0.0, 0.0, 0.0, 0.0
-        for i in range(q.size):
-            t += tangent[c, i] * q[i]
-            z += normal[c, i] * q[i]
-            along += tangent[c, i] * v[i]
-            across += normal[c, i] * v[i]
+        t, z = _gap(tangent, normal, c, q)
+        along, across = _gap(tangent, normal, c, v)
         code[c] = 0
         if kind[c] == STOP:
             code[c] = 0 if z > number[c, 5] else 2
@@ -184,7 +180,7 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
     q0, v0, place0, moved0 = q.copy(), v.copy(), place.copy(), moved.copy()
     sums[:] = 0.0
     places[0], places[1] = -np.inf, np.inf
-    _told(kind, tangent, normal, number, q, v, place, before)
+    _states(kind, tangent, normal, number, q, v, place, before)
     for s in range(steps):
         for m in range(sums.shape[1]):
             cosine, sine = np.cos(2 * np.pi * m * s / steps), np.sin(2 * np.pi * m * s / steps)
@@ -196,13 +192,13 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
         _narrow(kind, tangent, normal, number, q, places)
         q0[:], v0[:], place0[:], moved0[:] = q, v, place, moved
         _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, time, h, q, v, place, moved, work)  # fmt: skip
-        _told(kind, tangent, normal, number, q, v, place, after)
+        _states(kind, tangent, normal, number, q, v, place, after)
         if np.any(before != after):
             q[:], v[:], place[:], moved[:] = q0, v0, place0, moved0
             for part in range(PIECES):
                 ahead = time + part * 2 * np.pi / steps / PIECES
                 _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, ahead, h / PIECES, q, v, place, moved, work)  # fmt: skip
-            _told(kind, tangent, normal, number, q, v, place, after)
+            _states(kind, tangent, normal, number, q, v, place, after)
         before[:] = after
 
 

@@ -35,6 +35,10 @@ _ALONG = types.void(
 
 @njit(_AT, cache=True)
 def _tangents_at(address, gap, velocity, starts, part, parameters, out):  # type: ignore[no-untyped-def]
+    """Fill the (k, 3, 6) derivatives of the forces, N/m and N s/m, by gaps and velocities (k, 3) at `k` times.
+
+    The step at each begins with the state of its `part`, a row of `starts` (parts, s).
+    """
     step = law_at(address)
     s = starts.shape[1]
     jac = np.zeros((3 + s, 6 + s))
@@ -65,6 +69,12 @@ def _chain(jac, carried, share, line):  # type: ignore[no-untyped-def]
 
 @njit(_ALONG, cache=True)
 def _steps_along(address, first, gap, velocity, state, parameters, share, samples, starts, whole):  # type: ignore[no-untyped-def]
+    """March a law along gaps and velocities (parts, 3) from its part `first`; `state` (s,) is changed in place.
+
+    `samples` are the parts that end a step, `share` (parts,) tells where between both ends of its step each part ends. Filled are the states
+    `starts` (parts, s) with which the parts begin, and `whole` (samples, 3 + s, 9 + s): the derivatives of force and new state of a step by gap,
+    velocity and state, and by the gap at the sample before.
+    """
     step = law_at(address)
     s = state.size
     jac, line = np.zeros((3 + s, 6 + s)), np.zeros((3 + s, 9 + s))

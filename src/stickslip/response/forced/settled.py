@@ -82,9 +82,7 @@ def settle(
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
     """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
     limit, bound = problem.strategy.threshold, point.predicted_error
-    if (
-        not problem.sweep.auto
-    ):  # what a study fixes stands; a doubt about all of it is compared with more
+    if not problem.sweep.auto:  # what a study fixes stands; a doubt about it is compared with more
         if point.support != problem.sweep.high_harmonics:
             return False
         bound = own_error(problem, point)
@@ -99,10 +97,10 @@ def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoi
 
 
 def _settles(problem: ForcedProblem, change: float, audit: ForcedPoint) -> bool:
-    """Whether a solution with more harmonics settles a prediction that speaks against a point: the change to it and what is predicted of itself stay below the threshold together.
+    """Whether a solution with more harmonics confirms a point that a prediction doubts.
 
-    A mode that is excited by a harmonic beyond both is seen by neither: one of ratio 0.001 at the 13th moved the first by 6.7 %, of which the change from
-    five to nine harmonics told 2.3 %, and the prediction for nine 4.6 %.
+    The change to it and its own predicted error have to stay below the threshold together. A harmonic beyond both may excite a mode: one of damping
+    ratio 0.001 at the 13th moved the first by 6.7 %; the change from five to nine harmonics was 2.3 %, and 4.6 % were predicted of nine.
     """
     return change + own_error(problem, audit) <= problem.strategy.threshold
 
@@ -182,10 +180,13 @@ class _Settling:
                 if lost == LOST:
                     return
                 continue
-            if support in levels.beyond:
-                return
-            doubted = not here.predicted_error <= self.problem.strategy.threshold
-            if change <= limit and not (doubted and not _settles(self.problem, change, more)):
+            beyond, threshold = support in levels.beyond, self.problem.strategy.threshold
+            near = change <= (threshold if beyond else limit)
+            doubted = not here.predicted_error <= threshold
+            if near and doubted and not _settles(self.problem, change, more):
+                if beyond:
+                    continue
+            elif near or beyond:
                 return
             last = not levels.beyond and support == levels.standing[-1]
             bound = CAP_SAFETY * change if last else np.nan

@@ -97,7 +97,9 @@ def _split(key: str) -> Iterator[tuple[str, Unit]]:
 
 
 def nearest_key(word: str, known: Sequence[str], value: object = None) -> str:
-    """Return the remedy for an unknown key: the known one in another unit, with its value there, else the nearest one.
+    """Return the remedy for an unknown key.
+
+    It names the known key that has the same name and another unit, and converts the value. Without such a key it names the nearest one.
 
     Parameters
     ----------
