@@ -149,8 +149,9 @@ validate-in-time: $(INSTALLED)  ## a part of `make validate`: time integration a
 validate-mutants: $(INSTALLED)  ## a part of `make validate`: one-point changes that a test has to notice
 	$(PART)
 
-baseline: $(INSTALLED)  ## compare the examples with the results of the commit that the moves began from (some minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.baseline
+# `make baseline REF=hub/main NAME="two_tones flutter"`: what moved code has to pass
+baseline: $(INSTALLED)  ## run every example, made small, with the sources of REF=HEAD and with those here: same numbers to the bit, same words (NAME=flutter: it alone)
+	$(ONE_THREAD) $(BIN)/python -m evidence.baseline $(or $(REF),HEAD) $(NAME) --workers $(WORKERS)
 
 release: $(DOCS_INSTALLED)  ## build the wheel, the source archive and the notes of a release into dist/ and try them; uploads nothing
 	rm -rf dist
@@ -169,5 +170,5 @@ lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, 
 
 clean:  ## remove everything that the other targets made, .venv included
 	rm -rf $(VENV) .venv-rival dist .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
-		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/validation/out evidence/mutants/out examples/*/results
+		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/baseline/out evidence/validation/out evidence/mutants/out examples/*/results
 	find src tests evidence docs examples -name __pycache__ -type d -prune -exec rm -rf {} +
