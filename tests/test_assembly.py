@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from newton_bounds import allowed, answer_at
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
@@ -92,7 +93,7 @@ def two_blades(damper, part):
 
 def test_two_blades_and_a_damper_are_those_of_the_lower_layers(blades):
     damper, mesh, part = blades
-    found = two_blades(damper, part).assembled(1)
+    found = assemble(two_blades(damper, part), 1)
 
     points, body = damper.contact_points(), damper.body()
     full = rayleigh_damping(assemble_solid(mesh, Material()), 0.003, (150.0, 300.0))
@@ -163,7 +164,7 @@ def four_masses():
 
 @pytest.mark.kernel
 def test_four_masses_with_two_friction_elements_and_a_gap_are_those_of_hand_made_matrices():
-    found = four_masses().assembled(5)
+    found = assemble(four_masses(), 5)
     gaps = np.zeros((9, 4))
     gaps[0, 1] = -1.0
     gaps[3, 2:] = -1.0, 1.0
@@ -188,11 +189,11 @@ def test_four_masses_with_two_friction_elements_and_a_gap_are_those_of_hand_made
 
 def test_models_and_what_they_are_assembled_to_survive_pickling():
     model = four_masses()
-    model.assembled(3)
+    assemble(model, 3)
     again = pickle.loads(pickle.dumps(model))
     assert repr(again) == repr(model)
-    found = pickle.loads(pickle.dumps(again.assembled(3)))
-    np.testing.assert_array_equal(found.load.static, model.assembled(3).load.static)
+    found = pickle.loads(pickle.dumps(assemble(again, 3)))
+    np.testing.assert_array_equal(found.load.static, assemble(model, 3).load.static)
 
 
 @dataclass(frozen=True)
@@ -206,7 +207,7 @@ def test_a_gap_of_an_own_law_names_the_fields_it_goes_into():
     own = _Pressed(k_t=1.0, k_n=1.0, limit=1.0)
     one = Contact(between=("chain.m1", "ground"), law=own, acts="normal", gap=-2e-5)
     with pytest.raises(InputError) as error:
-        replace(four_masses(), contacts={"a": one}).assembled(3)
+        assemble(replace(four_masses(), contacts={"a": one}), 3)
     said = str(error.value)
     assert "interference_m: is given (in Python gap=-2e-05), and the law _Pressed" in said
     assert "has no field `preload`: " in said
@@ -218,7 +219,7 @@ def test_what_is_wrong_with_a_model_is_named():
 
     def refused(match, harmonics=3, **changes):
         with pytest.raises(InputError, match=match):
-            replace(model, **changes).assembled(harmonics)
+            assemble(replace(model, **changes), harmonics)
 
     law = Jenkins(k_t=1.0, limit=1.0)
     one = Contact(between=("chain.m9", "ground"), law=law, acts="tangential")

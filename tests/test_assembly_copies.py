@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from newton_bounds import allowed, answer_at
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
@@ -76,7 +77,7 @@ def bar(cells=(3, 1, 1), *, start=0.0, length=0.3, clamp=True, quadratic=False):
 
 
 def answered(model, hertz=(300.0, 330.0), order=3):
-    found = model.assembled(order)
+    found = assemble(model, order)
     sweep = Sweep(
         omega_range=(2 * math.pi * hertz[0], 2 * math.pi * hertz[1]),
         low=order, high=order, selection="always_low", frequencies=2, peak_points=0,
@@ -150,7 +151,7 @@ def test_a_copy_is_the_part_assembled_in_place(how, n_modes, speed):
     models = [replace(pair(first, second), speed=speed) for second in (copy, meshed)]
     found, expected = (natural_frequencies(m.at(speed, 0, "stuck"), 6) for m in models)
     np.testing.assert_allclose(found, expected, rtol=1e-9)
-    reduced = [m.assembled(2).system.structure for m in models]
+    reduced = [assemble(m, 2).system.structure for m in models]
     for matrix in ("mass", "damping", "stiffness"):
         mine, theirs = (natural_sizes(getattr(s, matrix)) for s in reduced)
         np.testing.assert_allclose(mine, theirs, rtol=1e-8, atol=1e-8 * theirs.max())
@@ -221,8 +222,8 @@ def test_two_halves_tied_are_the_whole(pairing):
         found, expected = (natural_frequencies(m.at(speed, 0, "stuck"), 8) for m in (tied, whole))
         np.testing.assert_allclose(found, expected, rtol=1e-10)
     same(tied, whole)
-    few = replace(halves(pairing, n_modes=12), speed=300.0).assembled(3)
-    full = replace(whole, speed=300.0).assembled(3)
+    few = assemble(replace(halves(pairing, n_modes=12), speed=300.0), 3)
+    full = assemble(replace(whole, speed=300.0), 3)
     np.testing.assert_allclose(
         few.static_gap, full.static_gap, atol=1e-9 * np.abs(full.static_gap).max()
     )
@@ -286,7 +287,7 @@ def test_what_is_wrong_with_surfaces_joins_and_copies_is_named():
 
     def refused(match, **changes):
         with pytest.raises(InputError, match=match):
-            replace(model, **changes).assembled(3)
+            assemble(replace(model, **changes), 3)
 
     uneven = replace(stop, tangent=None, law=replace(LAW, k_w=1e6))
     refused(

@@ -8,6 +8,7 @@ from test_assembly_copies import LAW, STEEL, bar, pair, place_of
 from test_assembly_wheel import STEEL as SAME
 from test_assembly_wheel import sector_model, shrouded_sector
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.placing import copy_of
 from stickslip.model.damping import Damping
 from stickslip.model.part import solid_part
@@ -46,34 +47,34 @@ def twins():
 
 def test_friction_loads_and_speed_of_sound_parts_reduce_nothing_again(reductions):
     model = twins()
-    model.assembled(3)
+    assemble(model, 3)
     assert len(reductions) == 1  # of both copies
     rough = {name: replace(c, law=replace(LAW, mu=0.5)) for name, c in model.contacts.items()}
     strong = {name: replace(load, newton=5.0) for name, load in model.loads.items()}
-    second = replace(model, contacts=rough, loads=strong, retention=1.0).assembled(5)
+    second = assemble(replace(model, contacts=rough, loads=strong, retention=1.0), 5)
     assert len(reductions) == 1
     assert second.system.interface.laws[0].mu == 0.5
-    replace(model, speed=100.0).assembled(3)
+    assemble(replace(model, speed=100.0), 3)
     assert (
         len(reductions) == 3
     )  # the copy stands beside the axis: the rotation stresses it differently
     elsewhere = {**model.loads, "new": replace(model.loads["one"], on="one.top")}
-    replace(model, loads=elsewhere).assembled(3)
+    assemble(replace(model, loads=elsewhere), 3)
     assert len(reductions) == 4
 
 
 def test_a_store_gives_later_runs_what_earlier_ones_reduced(reductions):
     shelf = Shelf()
-    first = twins().assembled(3, shelf)
+    first = assemble(twins(), 3, shelf)
     assert len(reductions) == 1
-    again = twins().assembled(3, shelf)
+    again = assemble(twins(), 3, shelf)
     assert len(reductions) == 1
     for name in ("mass", "damping", "stiffness"):
         mine, theirs = (getattr(a.system.structure, name) for a in (first, again))
         np.testing.assert_array_equal(mine, theirs)
     np.testing.assert_array_equal(first.frequencies.stuck_full, again.frequencies.stuck_full)
     softer = replace(STEEL, young_modulus=200e9)
-    pair(solid_part(bar(), softer, **OWN), solid_part(bar(), STEEL, **OWN)).assembled(3, shelf)
+    assemble(pair(solid_part(bar(), softer, **OWN), solid_part(bar(), STEEL, **OWN)), 3, shelf)
     assert len(reductions) == 2  # the steel one is there already
 
 
@@ -81,20 +82,20 @@ def test_waves_are_reduced_once(reductions):
     shelf = Shelf()
     assert SAME == STEEL
     model = reduced_sector_model()
-    first = model.assembled(3, shelf)
+    first = assemble(model, 3, shelf)
     assert len(reductions) == 3  # waves 0, 1 and 2 of 0, 2, 4, 1
     assert first.system.structure.n < model.places.n
-    model.assembled(3)
+    assemble(model, 3)
     rough = {n: replace(c, law=replace(c.law, mu=0.5)) for n, c in model.contacts.items()}
-    replace(model, contacts=rough).assembled(2)
-    again = reduced_sector_model().assembled(3, shelf)
+    assemble(replace(model, contacts=rough), 2)
+    again = assemble(reduced_sector_model(), 3, shelf)
     assert len(reductions) == 3
     np.testing.assert_array_equal(first.load.static, again.load.static)
     for k, wave in first.system.structure.waves.items():
         np.testing.assert_array_equal(wave.stiffness, again.system.structure.waves[k].stiffness)
     assert first.frequencies.warnings() == []
     assert (
-        np.abs(first.static_gap - sector_model(shrouded_sector()).assembled(3).static_gap).max()
+        np.abs(first.static_gap - assemble(sector_model(shrouded_sector()), 3).static_gap).max()
         < 1e-12
     )
 

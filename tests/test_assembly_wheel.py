@@ -8,10 +8,11 @@ import pytest
 import scipy.sparse
 from newton_bounds import allowed, answer_at
 
-from stickslip.assembly.build import linear_side
+from stickslip.assembly.assembling import assemble
+from stickslip.assembly.build import holding_points, linear_side
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
-from stickslip.assembly.model import Model
+from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.reduced import in_memory
 from stickslip.assembly.waves import _one_of
 from stickslip.contact.interface import Interface
@@ -163,7 +164,7 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all(touched):
     model = sector_model(mesh)
     if touched:
         model = replace(model, outputs=(*model.outputs, Output(name="low", on="blade.shroud_low")))
-    found = model.assembled(H)
+    found = assemble(model, H)
     assert found.engine_order == ORDER
     if not touched:
         assert found.system.retained.size == 3 * 6  # gaps, not nodes of both sides
@@ -240,13 +241,15 @@ def spectrum(structure):
 def test_full_waves_have_the_frequencies_of_the_whole_wheel_with_its_contacts_stuck_open_or_pressed():
     model = sector_model(shrouded_sector())
     damped, gaps = whole_with_gaps(model)
-    holds = {"open": np.zeros(30), "stuck": np.ones(30), "static": np.tile(model.pressed, SECTORS)}
-    assert 0 < np.count_nonzero(model.pressed) < 6
+    ways: tuple[ContactsAs, ...] = ("open", "stuck", "static")
+    holds = [holding_points(model, way) for way in ways]
+    assert [np.count_nonzero(held) for held in holds[:2]] == [0, 6]
+    assert 0 < np.count_nonzero(holds[2]) < 6
     springs = np.array([LAW.k_t, LAW.k_w, LAW.k_n])
-    for how, held in holds.items():
-        waves = [model.at(SPEED, k, how) for k in range(SECTORS)]
+    for held in holds:
+        waves = [model.at(SPEED, k, held) for k in range(SECTORS)]
         found = np.sort(np.concatenate([natural_frequencies(w, 3) for w in waves]))[:10]
-        whole = with_springs(damped, gaps, (held[:, None] * springs).ravel())
+        whole = with_springs(damped, gaps, (np.tile(held, SECTORS)[:, None] * springs).ravel())
         np.testing.assert_allclose(found, natural_frequencies(whole, 10), rtol=1e-9)
         assert scipy.sparse.issparse(waves[0].stiffness)
         assert waves[1].basis.shape[0] == model.places.n
@@ -332,7 +335,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
         speed=SPEED,
         retention=1e5,
     )
-    found = model.assembled(H)
+    found = assemble(model, H)
     assert found.output_labels[3:9] == tuple(
         f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz")
     )
@@ -443,7 +446,7 @@ def test_what_is_wrong_with_a_wheel_is_named():
         ),
     ):
         with pytest.raises(InputError, match=match):
-            replace(model, **changes).assembled(H)
+            assemble(replace(model, **changes), H)
 
 
 def test_an_output_on_the_high_face_is_refused_by_name():
@@ -451,7 +454,7 @@ def test_an_output_on_the_high_face_is_refused_by_name():
     model = sector_model(shrouded_sector())
     behind = Output(name="behind", on="blade.cyclic_high")
     with pytest.raises(InputError, match=r"output\.points: .* lies on the high cyclic face"):
-        replace(model, outputs=(*model.outputs, behind)).assembled(H)
+        assemble(replace(model, outputs=(*model.outputs, behind)), H)
 
 
 @pytest.mark.parametrize(

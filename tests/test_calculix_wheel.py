@@ -9,6 +9,7 @@ import xarray as xr
 from small_v2 import EXAMPLES, changed
 from test_cli import done
 
+from stickslip.assembly.assembling import assemble
 from stickslip.response.forced.response import (
     Sweep,
     accepted_points,
@@ -45,7 +46,7 @@ def test_the_frequencies_of_a_calculix_deck_are_those_of_calculix(tmp_path: Path
 
 
 def test_the_wheel_of_a_calculix_deck_rubs_at_its_platforms(tmp_path: Path) -> None:
-    found = read_study(small(tmp_path / "wheel")).model().assembled(1)
+    found = assemble(read_study(small(tmp_path / "wheel")).model(), 1)
     assert found.engine_order == 13
     assert (found.static_force[:, 2] < 0).sum() == 18  # of 27: at speed the rest has opened
     omega = 2 * np.pi * np.array(HERTZ)

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import stickslip as ss
+from stickslip.assembly.assembling import assemble
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.iwan_populations import FourParameter
@@ -116,7 +117,7 @@ def test_forces_of_a_study_are_those_of_the_law(name, tmp_path):
 def pressed(folder, contact):
     """Return the static force and gap of a stop between the second mass and the ground."""
     law = 'law = "unilateral_spring"\nnormal_stiffness_n_per_m = 2e4\n'
-    found = read_study(write(folder, law + contact)).model().assembled(3)
+    found = assemble(read_study(write(folder, law + contact)).model(), 3)
     return found.static_force[0, 2], found.static_gap[0, 2]
 
 

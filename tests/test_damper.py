@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_v2 import write_two_blades
 
+from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
@@ -127,7 +128,7 @@ def test_pressed_outward_all_nine_points_are_in_compression(tmp_path):
     path = write_two_blades(
         tmp_path, {"reduction.fixed_interface_modes": "2", "retention.stiffness_n_per_m": "0.0"}
     )
-    found = read_study(path).model().assembled(1)
+    found = assemble(read_study(path).model(), 1)
     pull = 442.0
     assert found.contacts.names == (
         "L1.1",

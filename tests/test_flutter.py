@@ -14,7 +14,9 @@ from test_assembly_wheel import SECTORS, sector_model, shrouded_sector
 
 import stickslip as ss
 from stickslip.assembly.aerodynamics import Aerodynamics
-from stickslip.assembly.flow import flow_around, largest_displacements, phases
+from stickslip.assembly.assembling import assemble
+from stickslip.assembly.build import flow_around
+from stickslip.assembly.flow import largest_displacements, phases
 from stickslip.assembly.mistuning import BladeMistuning, Mistuning
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
@@ -350,7 +352,7 @@ def test_forced_response_is_that_of_the_whole_wheel_with_its_fluid(order: int) -
 
 
 def test_the_static_state_is_that_without_the_fluid() -> None:
-    wet, dry = (driven(aero).assembled(1) for aero in (of_blade(influence()), None))
+    wet, dry = (assemble(driven(aero), 1) for aero in (of_blade(influence()), None))
     np.testing.assert_allclose(wet.static_gap, dry.static_gap, rtol=1e-9)
     np.testing.assert_allclose(wet.static_force, dry.static_force, rtol=1e-9)
     assert np.abs(wet.load.static - dry.load.static).max() > 1e-5
@@ -367,7 +369,7 @@ def test_a_mistuned_wheel_without_deviations_does_what_one_sector_does_in_the_fl
     tuned, sectors = one["amplitude"].values, every["amplitude"].values
     assert sectors.shape[1] >= N
     np.testing.assert_allclose(sectors[:, :N], np.repeat(tuned[:, :1], N, axis=1), rtol=1e-8)
-    dry, wet = (m.assembled(1) for m in (replace(whole, aerodynamics=None), whole))
+    dry, wet = (assemble(m, 1) for m in (replace(whole, aerodynamics=None), whole))
     np.testing.assert_allclose(wet.static_gap, dry.static_gap, rtol=1e-8)
 
 
@@ -382,7 +384,7 @@ def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
     loads = {"gas": ss.Load(on="sector.blade", newton=0.02, engine_order=order)}
     outputs = (ss.Output(name="tip", on="sector.blade"),)
     there = model(aero, contacts={"rub": rub}, loads=loads, outputs=outputs)
-    found = there.assembled(7)
+    found = assemble(there, 7)
     omega = 2 * np.pi * 0.36
     sweep = ss.Sweep(
         omega_range=(omega, 1.0001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0
@@ -405,8 +407,8 @@ def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
     expected, size = whole.spread(motion)[:2], np.abs(motion[1]).max()
     assert np.abs(shot.harmonics[:2] - expected).max() < 2e-3 * size
     # the other direction is another answer
-    other = replace(there, loads={"gas": replace(loads["gas"], engine_order=N - order)}).assembled(
-        7
+    other = assemble(
+        replace(there, loads={"gas": replace(loads["gas"], engine_order=N - order)}), 7
     )
     mirrored = ss.response.accepted_points(
         list(ss.forced_response(other.system, other.load, sweep))

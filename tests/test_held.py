@@ -8,6 +8,7 @@ from small_v2 import changed, write_four_masses, write_shrouded_deck, write_two_
 from test_assembly_copies import LAW, bar, halves
 from test_cli import done, refused
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.held import refuse_unheld, unheld
@@ -66,7 +67,7 @@ def test_a_contact_holds_what_its_springs_strain() -> None:
     assert "translation along y, translation along z, rotation about x" in said
     assert "translation along x" not in said
     with pytest.raises(InputError, match=r"part.loose: is held by nothing"):
-        normal.assembled(1)
+        assemble(normal, 1)
 
 
 def test_a_join_holds_and_so_does_a_joined_neighbour() -> None:

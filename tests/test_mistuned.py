@@ -25,6 +25,7 @@ from test_assembly_wheel import (
 
 import stickslip as ss
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.deviations import Blade, blade_alone, blade_alone_hz
 from stickslip.assembly.mistuned import changed
@@ -60,7 +61,7 @@ def test_without_deviations_all_sectors_do_what_one_does(modes):
     model = replace(model, contacts={"shroud": replace(model.contacts["shroud"], law=law)})
     even = BladeMistuning(of="blade", deviations=np.zeros(SECTORS), modes=modes)
     none = Mistuning(blades={"all": even})
-    wheel, tuned = replace(model, mistuning=none).assembled(H), model.assembled(H)
+    wheel, tuned = assemble(replace(model, mistuning=none), H), assemble(model, H)
     assert wheel.output_labels[4] == "tip[1].y"
     assert np.allclose(wheel.static_force.reshape(SECTORS, -1, 3), tuned.static_force, rtol=1e-9)
     hertz = (2140.0, 2200.0)
@@ -121,7 +122,7 @@ def mistuned_model():
 def test_a_mistuned_wheel_answers_as_its_sectors_assembled_one_by_one():
     """Stiffness of each sector times (1 + d)², friction of each interface its own; the whole wheel is put together from the sectors."""
     model = mistuned_model()
-    found = model.assembled(H)
+    found = assemble(model, H)
     mesh, own = model.parts["blade"].mesh, model.parts["blade"].structure
     full, nodes, stiffness = assembled_wheel(
         mesh, model, [(1 + d) ** 2 * own.stiffness for d in DEVIATIONS]
@@ -177,7 +178,7 @@ def test_all_modes_of_a_blade_are_the_whole_blade_and_a_common_deviation_scales_
     frequencies = {}
     for modes in (None, 3, 72):
         one = BladeMistuning(of="blade.shroud_high", deviations=DEVIATIONS, modes=modes)
-        wheel = replace(model, mistuning=Mistuning(blades={"high": one})).assembled(2)
+        wheel = assemble(replace(model, mistuning=Mistuning(blades={"high": one})), 2)
         frequencies[modes] = natural_frequencies(wheel.bare.stuck_structure(), 8)
     np.testing.assert_allclose(frequencies[72], frequencies[None], rtol=1e-10)
     np.testing.assert_allclose(frequencies[3], frequencies[None], rtol=1e-3)
@@ -205,7 +206,7 @@ def test_a_blade_with_the_cyclic_face_counts_what_both_sectors_do_to_it(modes):
     more = [((1 + d) ** 2 - 1) * around_one_blade(stiffness, b) for b, d in zip(blades, DEVIATIONS, strict=True)]  # fmt: skip
     whole = replace(full, stiffness=stiffness + sum(more))
     one = BladeMistuning(of="blade.inner", deviations=DEVIATIONS, modes=modes)
-    wheel = replace(model, mistuning=Mistuning(blades={"b": one})).assembled(2)
+    wheel = assemble(replace(model, mistuning=Mistuning(blades={"b": one})), 2)
     found = natural_frequencies(wheel.bare.structure.of_harmonic(0), 10)
     np.testing.assert_allclose(found, natural_frequencies(whole, 10), rtol=1e-9)
     b, mass = blades[0], full.mass.toarray()
@@ -282,7 +283,7 @@ def test_a_sector_with_a_part_of_its_own_is_that_part():
     _, _, mass = assembled_wheel(
         mesh, model, [(new if s == 3 else old).mass for s in range(SECTORS)]
     )
-    found = wheel.assembled(2).bare.structure
+    found = assemble(wheel, 2).bare.structure
     whole = replace(full, stiffness=stiffness, mass=mass)
     np.testing.assert_allclose(
         natural_frequencies(found, 12), natural_frequencies(whole, 12), rtol=1e-9
@@ -323,7 +324,7 @@ def test_what_is_no_mistuning_is_refused_with_its_key():
 
     def refused(place, problem, **kinds):
         with pytest.raises(InputError) as found:
-            replace(model, mistuning=Mistuning(**kinds)).assembled(2)
+            assemble(replace(model, mistuning=Mistuning(**kinds)), 2)
         assert found.value.place == place
         assert problem in found.value.problem
 
@@ -349,7 +350,7 @@ def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():
     """Stiffness, loads, their derivatives, recovery, rows of outputs and energy, with springs on contact coordinates."""
     model = sector_model(shrouded_sector())
     one = BladeMistuning(of="blade.shroud_high", deviations=DEVIATIONS, modes=2)
-    found = replace(model, mistuning=Mistuning(blades={"high": one})).assembled(H)
+    found = assemble(replace(model, mistuning=Mistuning(blades={"high": one})), H)
     wheel, retained = found.bare.structure, found.bare.retained
     assert isinstance(wheel, MistunedWheel)
     springs = np.zeros(wheel.n)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from evidence.validation.case_b12_mistuning import DEVIATIONS, MISTUNED, TUNED
+from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.front.study import Study
 from stickslip.model.dofs import numbered_dofs
@@ -295,7 +296,7 @@ def test_what_is_no_mistuning_is_refused_by_its_key(tmp_path: Path, more: str, s
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=says):
-        study_of(tmp_path, SIX + more).model().assembled(0)
+        assemble(study_of(tmp_path, SIX + more).model(), 0)
 
 
 def test_a_wheel_is_needed_for_mistuning(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.forces import first_nodes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -170,7 +171,7 @@ def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
     """Matrices, gaps, loads and a point in slip; the study writes them in the motion of contact points, a change of basis."""
     own = {"vary.load.shaker.ratio": f"[{RATIO}]", "part.damper.sections_m": str(list(SECTIONS))}
     path = write(tmp_path, own)
-    found = read_study(path).model().assembled(3)
+    found = assemble(read_study(path).model(), 3)
     structure, gaps, laws, static, force = hands()
     way = found.bare.structure.basis
 

@@ -13,6 +13,7 @@ import pytest
 from newton_bounds import allowed, answer_at
 from test_assembly_wheel import SECTORS, SPEED, STEEL, shrouded_sector, whole_wheel
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
@@ -170,7 +171,7 @@ def all_sectors() -> Model:
 
 
 def answered(model: Model, hertz: float):
-    found = model.assembled(H)
+    found = assemble(model, H)
     omega = 2 * math.pi * hertz
     sweep = Sweep(
         omega_range=(0.999 * omega, omega), at=(omega,), low=H, high=H, selection="always_low", peak_points=0, samples=128,
@@ -187,7 +188,7 @@ def test_modes_and_static_state_are_those_of_all_sectors() -> None:
     waves = [natural_frequencies(one.at(SPEED, k, "stuck"), 5) for k in range(SECTORS)]
     whole = natural_frequencies(every.at(SPEED, 0, "stuck"), 12)
     np.testing.assert_allclose(np.sort(np.concatenate(waves))[:12], whole, rtol=1e-8)
-    found, all_of_it = one.assembled(H), every.assembled(H)
+    found, all_of_it = assemble(one, H), assemble(every, H)
     force = found.static_force
     assert np.abs(np.tile(force, (SECTORS, 1)) - all_of_it.static_force).max() < 1e-9 * np.abs(force).max()  # fmt: skip
     # all of the piece's own weight at this speed presses on the two shrouds; friction carries a part of it
@@ -262,7 +263,7 @@ def test_a_deck_without_cyclic_faces_says_so_in_the_study(tmp_path: Path) -> Non
     )
     (tmp_path / "study.toml").write_text(text)
     model = read_study(tmp_path / "study.toml").model()
-    force = model.assembled(1).static_force
+    force = assemble(model, 1).static_force
     assert np.all(force[:, 2].reshape(2, -1).sum(axis=1) < -100.0)  # pressed on both sides
     (tmp_path / "study.toml").write_text(text.replace("cyclic = 'none'\n", ""))
     with pytest.raises(InputError, match='Of a part that only contacts connect say cyclic = "none"'):  # fmt: skip

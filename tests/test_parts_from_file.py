@@ -9,6 +9,7 @@ from small_v2 import write_shrouded_sector
 from test_assembly_copies import answered, halves
 from test_cli import refused
 
+from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.damping import Damping
 from stickslip.model.matrices import chain
@@ -76,7 +77,7 @@ def test_each_reduction_gives_frequencies_and_response_of_the_whole_part(
     tmp_path, whole, keys, tolerance
 ):
     found = model(tmp_path, f"{RAYLEIGH}[part.rod.reduction]\n{keys}\n")
-    small, full = found.assembled(3), whole.assembled(3)
+    small, full = assemble(found, 3), assemble(whole, 3)
     assert (small.counts["reduced"] < full.counts["reduced"]) == ("none" not in keys)
     for name in ("free_reduced", "stuck_reduced"):
         mine, theirs = getattr(small.frequencies, name)[:3], getattr(full.frequencies, name)[:3]
@@ -132,7 +133,7 @@ def test_waves_of_a_wheel_are_reduced_in_the_same_ways(tmp_path, keys):
     path = write_shrouded_sector(tmp_path)
     text = path.read_text()
     path.write_text(text.replace("fixed_interface_modes = 6", keys))
-    frequencies = read_study(path).model().assembled(1).frequencies
+    frequencies = assemble(read_study(path).model(), 1).frequencies
     assert frequencies.stuck_full[0] > 100.0
     np.testing.assert_allclose(frequencies.stuck_reduced[:2], frequencies.stuck_full[:2], rtol=2e-3)
     np.testing.assert_allclose(frequencies.free_reduced[:2], frequencies.free_full[:2], rtol=2e-3)
@@ -141,10 +142,10 @@ def test_waves_of_a_wheel_are_reduced_in_the_same_ways(tmp_path, keys):
 def test_shapes_stand_for_joined_nodes():
     """Two tied halves, 4 shared nodes: as many shapes as dofs are exact, few are near."""
     plain = halves("node_to_node", n_modes=10)
-    full = plain.assembled(3)
+    full = assemble(plain, 3)
     for count, tolerance in ((12, 1e-9), (7, 2e-2)):
         model = halves("node_to_node", n_modes=10, interface_modes=count)
-        small = model.assembled(3)
+        small = assemble(model, 3)
         assert small.counts["reduced"] == full.counts["reduced"] - 12 + count
         for name in ("free_reduced", "stuck_reduced"):
             mine, theirs = getattr(small.frequencies, name), getattr(full.frequencies, name)
@@ -177,7 +178,7 @@ def ratios(structure) -> np.ndarray:
     ],
 )
 def test_each_form_of_damping_gives_its_ratios(tmp_path, keys, expected, reduction):
-    found = model(tmp_path, f"[damping]\n{keys}\n{reduction}").assembled(1).system.plain_structure
+    found = assemble(model(tmp_path, f"[damping]\n{keys}\n{reduction}"), 1).system.plain_structure
     omega = np.sqrt(normal_modes(found, found.n).squares)
     if expected is None:
         low, high = 2 * math.pi * 30.0, 2 * math.pi * 300.0
@@ -189,7 +190,7 @@ def test_each_form_of_damping_gives_its_ratios(tmp_path, keys, expected, reducti
 
 
 def test_a_loss_factor_stands_beside_viscous_damping(tmp_path):
-    found = model(tmp_path, "[damping]\nalpha_per_s = 3.0\nloss_factor = 0.02\n").assembled(1)
+    found = assemble(model(tmp_path, "[damping]\nalpha_per_s = 3.0\nloss_factor = 0.02\n"), 1)
     structure = found.system.plain_structure
     np.testing.assert_allclose(structure.loss, 0.02 * structure.stiffness)
     np.testing.assert_allclose(structure.damping, 3.0 * structure.mass)
@@ -197,7 +198,7 @@ def test_a_loss_factor_stands_beside_viscous_damping(tmp_path):
 
 def test_a_part_has_its_own_damping(tmp_path):
     own = f"{RAYLEIGH}[part.rod.damping]\nloss_factor = 0.02\n"
-    found = model(tmp_path, own).assembled(1).system.plain_structure
+    found = assemble(model(tmp_path, own), 1).system.plain_structure
     assert not np.any(found.damping)
     np.testing.assert_allclose(found.loss, 0.02 * found.stiffness)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.assembly.assembling import assemble
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.dahl import Dahl
@@ -43,7 +44,7 @@ def three_masses(limit=1e7, newton=1.0, damping=None, loss=None):
 
 
 def modes_of(model, *, sliding=False, hz=(5.0, 16.0)):
-    found = model.assembled(1)
+    found = assemble(model, 1)
     friction = friction_of(found.system.springs, found.static_gap, found.static_force)
     springs = springs_of(found.system, EVERY, friction.slips if sliding else None)
     within = Range(hz[0] * HZ, hz[1] * HZ)
@@ -148,7 +149,7 @@ def test_what_friction_can_do_to_one_mass_is_its_describing_function():
         loads={"f": ss.Load(on="one.m", newton=1.0)},
         outputs=(ss.Output(name="m", on="one.m"),),
     )
-    found = model.assembled(1)
+    found = assemble(model, 1)
     friction = friction_of(found.system.springs, found.static_gap, found.static_force)
     springs = springs_of(found.system, EVERY)
     (best,) = damped_modes(found.system, friction, springs, 1, Range(10 * HZ, 20 * HZ))

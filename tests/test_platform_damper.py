@@ -11,6 +11,7 @@ from test_assembly_wheel import LAW, SECTORS, SPEED, STEEL, answered, shrouded_s
 from test_cli import done, refused
 
 from stickslip.assembly import wheel
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
@@ -104,7 +105,7 @@ def test_a_damper_between_sectors_answers_on_one_sector_as_on_all() -> None:
     waves = [natural_frequencies(one.at(SPEED, k, "stuck"), 5) for k in range(SECTORS)]
     whole = natural_frequencies(every.at(SPEED, 0, "stuck"), 12)
     np.testing.assert_allclose(np.sort(np.concatenate(waves))[:12], whole, rtol=1e-9)
-    found, all_of_it = one.assembled(H), every.assembled(H)
+    found, all_of_it = assemble(one, H), assemble(every, H)
     assert found.system.retained.size == 8 * 3 + 6  # the motion of points, not of nodes
     np.testing.assert_allclose(
         np.tile(found.static_force, (SECTORS, 1)),
@@ -122,13 +123,13 @@ def test_a_damper_between_sectors_answers_on_one_sector_as_on_all() -> None:
 def test_the_motion_of_points_stands_for_that_of_the_nodes_around_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    few = one_sector().assembled(H)
+    few = assemble(one_sector(), H)
 
     def refuse(*_: object) -> None:
         raise InputError("gaps", "depend on each other", "")
 
     monkeypatch.setattr(wheel, "in_relative_coordinates", refuse)
-    nodal = one_sector().assembled(H)
+    nodal = assemble(one_sector(), H)
     assert nodal.system.retained.size > few.system.retained.size
     mine, theirs = (answered(a.system, a.load, (2000.0, 2050.0)) for a in (few, nodal))
     for a, b in zip(mine, theirs, strict=True):

@@ -12,6 +12,7 @@ from small_v2 import SECTOR
 from test_assembly_wheel import ORDER, SECTORS, H, sector_model, shrouded_sector
 
 import stickslip as ss
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.places import Places
 from stickslip.assembly.pressure import PressureField, put_on
 from stickslip.contact.surface import nodal_surface
@@ -221,8 +222,8 @@ def test_a_pressure_drives_a_wheel_as_its_nodal_forces_do() -> None:
     )
     model = replace(model, loads={"lean": model.loads["lean"], "gas": gas, "more": more})
     assert model.spread == ("gas", "more")
-    found = model.assembled(H)
-    whole = replace(model, mistuning=ss.assembly.Mistuning()).assembled(H)
+    found = assemble(model, H)
+    whole = assemble(replace(model, mistuning=ss.assembly.Mistuning()), H)
     put = gas.field.on(model.places, "blade.flank_low", "x")
     for h, share in ((1, np.exp(0.3j)), (2, 0.5)):
         side = found.system.structure

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from stickslip import Study
+from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.part import damper_part
@@ -251,6 +252,6 @@ frequencies_hz = [100.0]
 def test_rotation_alone_presses_a_body_where_no_part_is_a_mesh(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(RIM)
-    force = Study.from_file(path).model().assembled(1).static_force
+    force = assemble(Study.from_file(path).model(), 1).static_force
     growth = 0.05 * (1000.0 * RPM) ** 2  # N/m: the further out, the stronger it is pulled
     assert force[:, 2].sum() == pytest.approx(-growth * 0.3 / (1.0 - growth / 1e6), rel=1e-9)

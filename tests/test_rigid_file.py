@@ -6,6 +6,7 @@ import xarray as xr
 from test_contacts_file import CHAIN
 from typer.testing import CliRunner
 
+from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
 from stickslip.study.analyses.verdict import stored
 from stickslip.study.models.study import read_study
@@ -89,7 +90,7 @@ def test_linear_analyses_take_rigid_contacts_as_stuck(tmp_path):
 
 def test_a_static_load_that_friction_holds_moves_nothing(tmp_path):
     pull = '[load.pull]\non = "chain.m2"\nforce_n = 1.5\nharmonic = 0\n'
-    found = read_study(written(tmp_path, more=pull)).model().assembled(1)
+    found = assemble(read_study(written(tmp_path, more=pull)).model(), 1)
     assert found.static_force[0, 0] == pytest.approx(-1.5, rel=1e-4)
     assert abs(found.static_gap[0, 0]) < 1e-9
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from small_v2 import changed
 from typer.testing import CliRunner
 
+from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
 from stickslip.contact.facets import KINDS
 from stickslip.contact.mortar import mortar_tie
@@ -97,7 +98,7 @@ def answered(path, analysis="forced_response"):
 def misses(folder, pairing, more, held, quadratic=False):
     """Return how far the pressure of the contact points is off, as a share of the exact one."""
     study = blocks(folder, COARSE, FINE, more.format(pairing) + SHAKEN, held, quadratic)
-    found = read_study(study).model().assembled(1)
+    found = assemble(read_study(study).model(), 1)
     return np.abs(-found.static_force[:, 2] / found.contacts.area / EXACT - 1.0).max()
 
 

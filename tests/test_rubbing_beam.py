@@ -9,6 +9,7 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.forces import force_of
 from stickslip.errors import InputError
 from stickslip.front.result import Result
@@ -89,7 +90,7 @@ def test_the_orbit_of_the_tip_is_that_of_time_integration(tmp_path: Path) -> Non
     at = int(np.flatnonzero(data["frequency_hz"] == HERTZ)[-1])
     found = data["amplitude"].sel(output=["tip.y", "tip.z"]).values[at]
     model = read_study(path).model()
-    whole = model.assembled(1)
+    whole = assemble(model, 1)
     pressed = -float(whole.static_force[0, 2])
     # what the spring of the plate leaves of 10 N when the beam gives way
     axial = SHAPE.material.young_modulus * SHAPE.area / SHAPE.length

@@ -11,6 +11,7 @@ import scipy.sparse
 from newton_bounds import unknowns_bound
 
 from evidence.models.many_contacts import Plates, unreduced_plates
+from stickslip.assembly.assembling import assemble
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.product import harmonic_means
 from stickslip.errors import InputError, SingularError
@@ -249,9 +250,9 @@ def test_parts_kept_whole_are_not_condensed_where_they_are_too_large(tmp_path, m
         shutil.copy(EXAMPLE / name, tmp_path)
     (tmp_path / "study.toml").write_text(text)
     model = read_study(tmp_path / "study.toml").model()
-    condensed = model.assembled(1)
+    condensed = assemble(model, 1)
     monkeypatch.setattr("stickslip.assembly.whole.LARGEST_INTERIOR", 100)
-    whole = model.assembled(1)
+    whole = assemble(model, 1)
     assert not isinstance(condensed.system.structure, Unreduced)
     assert isinstance(whole.system.structure, Unreduced)
     assert relative(whole.static_force, condensed.static_force) < 1e-8

@@ -13,6 +13,7 @@ from newton_bounds import allowed
 from test_assembly_wheel import answered
 
 from evidence.models.annulus import annular_sector
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
@@ -149,7 +150,7 @@ def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
     )  # fmt: skip
     damped = replace(model.parts["ring"], damping=Damping(ratio=0.003, between_hz=(300, 3000)))
     model = replace(model, parts={"ring": damped})
-    found = model.assembled(3)
+    found = assemble(model, 3)
 
     full = damped.damping.of_matrices(model.full(speed), damped.structure.stiffness)
     n = full.n
@@ -178,7 +179,7 @@ def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
         assert one.energy.max() > 1e-4  # else nothing slips
         assert np.abs(one.outputs - every.outputs).max() <= allowed("outputs", one, every)
 
-    few = replace(model, parts={"ring": replace(damped, reduction=Reduction(12))}).assembled(3)
+    few = assemble(replace(model, parts={"ring": replace(damped, reduction=Reduction(12))}), 3)
     for one, every in zip(answered(few.system, few.load, hertz), mine, strict=True):
         assert np.abs(one.outputs - every.outputs).max() < 0.01 * np.abs(every.outputs).max()
 

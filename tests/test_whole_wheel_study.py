@@ -17,6 +17,7 @@ from test_cli import done
 from test_parts_between_sectors import HALF, H, answered, around, brick
 
 import stickslip.harmonic.balance as balance_module
+from stickslip.assembly.assembling import assemble
 from stickslip.model.axis import Axis
 from stickslip.model.deck import write_deck
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -168,7 +169,7 @@ def test_one_sector_from_a_file_answers_as_all(tmp_path: Path) -> None:
 
 def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
     """More friction, two engine orders, Coriolis forces; the slope along the peaks is that of their difference."""
-    found = read_study(write_one_sector(tmp_path / "one") / "study.toml").model().assembled(H)
+    found = assemble(read_study(write_one_sector(tmp_path / "one") / "study.toml").model(), H)
     values, span = (0.2, 0.202), (2 * math.pi * 930, 2 * math.pi * 960)
     how = Discretisation(order=H, samples=128)
     arrays = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip

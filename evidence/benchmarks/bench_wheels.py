@@ -20,6 +20,7 @@ import numpy as np
 
 from evidence.models.mistuned_wheel import mistuned_wheel
 from evidence.models.wheel_sector import Rubbing, rubbing_pair, rubbing_wheel
+from stickslip.assembly.assembling import assemble
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.reduction.aerodynamics import Feedback, InfluenceCoefficients
 from stickslip.reduction.waves import excited_wave
@@ -149,7 +150,7 @@ def mistuned_record() -> dict[str, Any]:
 
     Ten of sixty frequencies around the first stuck resonance, where contacts slip; LU solves the second of them from the first.
     """
-    found = mistuned_wheel(SECTORS, newton=2.0).assembled(H)
+    found = assemble(mistuned_wheel(SECTORS, newton=2.0), H)
     assert found.frequencies is not None
     first = 2 * np.pi * found.frequencies.stuck_reduced[0]
     spacing = (AROUND[1] - AROUND[0]) * first / 60

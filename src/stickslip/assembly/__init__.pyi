@@ -6,6 +6,7 @@ from .assembled import Blades as Blades
 from .assembled import ContactTable as ContactTable
 from .assembled import Frequencies as Frequencies
 from .assembled import Skin as Skin
+from .assembling import assemble as assemble
 from .mistuning import BladeMistuning as BladeMistuning
 from .mistuning import ContactMistuning as ContactMistuning
 from .mistuning import Mistuning as Mistuning

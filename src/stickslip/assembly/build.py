@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -12,11 +12,11 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.asked import Asked, asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.coordinates import coordinates
-from stickslip.assembly.flow import about_static_state, fluid_of
+from stickslip.assembly.flow import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.held import held_warnings
 from stickslip.assembly.joined import KEY, on_shapes
-from stickslip.assembly.model import Model
+from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.pairs import Pairs
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.points import in_points
@@ -77,7 +77,7 @@ class Linear:
     expand: Any = None
 
 
-def assemble(
+def assemble_tuned(
     model: Model,
     harmonics: int,
     store: Store,
@@ -86,7 +86,7 @@ def assemble(
     every_wave: bool = False,
     checked: bool = True,
 ) -> Assembled:
-    """Return a model as solvers see it; see `Model.assembled`. Frequencies of the full model are left out if it is not to be `checked`."""
+    """Return a single structure or a tuned wheel as solvers see it; see `assemble`. Frequencies of the full model are left out if it is not to be `checked`."""
     what = asked(model, harmonics)
     labels = what.labels
     order = what.order if wave_number is None else wave_number
@@ -165,7 +165,7 @@ def linear_side(
     stay
         Outputs, which have to be coordinates of their own.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     more
         Wave numbers that are reduced beside those of the harmonics.
     """
@@ -177,7 +177,8 @@ def linear_side(
         raise input_error(
             KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
         )
-    found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store, more)
+    flow = flow_around(model, store)
+    found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store, more, flow)
     at = model.coordinates
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
@@ -206,6 +207,22 @@ def linear_side(
         return at.untied(found.expand(q, excited_wave(order, model.sectors, harmonic)))
 
     return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave, field, expand)
+
+
+def flow_around(model: Model, store: Store = in_memory, speed: float | None = None) -> Flow | None:
+    """Return the aerodynamic force on a model, at its own speed or at another one in rad/s; None where it has no coefficients.
+
+    Raises
+    ------
+    InputError
+        If the coefficients are those of other speeds.
+    """
+    given = model.aerodynamics
+    if given is None:
+        return None
+    own = model.speed if speed is None else speed
+    holds = holding_points(model, given.contacts)
+    return Flow(model, own, given.influence.at_speed(own), holds, store)
 
 
 def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
@@ -301,9 +318,18 @@ def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, F
     return gap, static_contact_force(system.springs, gap)
 
 
-def pressed_points(model: Model) -> BoolArray:
+def holding_points(model: Model, contacts: ContactsAs) -> BoolArray:
+    """Return the (p,) contact points that hold in small vibrations: all ``stuck``, none ``open``, or those pressed in the ``static`` state."""
+    p = len(model.pairs.names)
+    if contacts != "static" or not p:
+        return np.full(p, contacts == "stuck")
+    if "pressed" not in model.memo:
+        model.memo["pressed"] = _pressed(model.without_aerodynamics())
+    return np.asarray(model.memo["pressed"])
+
+
+def _pressed(model: Model) -> BoolArray:
     """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
-    model = model.without_aerodynamics()
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
     refuse_pulled(model, static_forces(model, forces))
@@ -328,7 +354,8 @@ def frequencies(
     stuck = with_springs(reduced, gaps, springs)
     moving = [int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)]
     count = min(MODES, moving[0], max(moving[1] - held_gaps(model, gaps), 1))
-    full = [partial(model.at, model.speed, number, how) for how in ("open", "stuck")]
+    hows: tuple[Literal["open", "stuck"], ...] = ("open", "stuck")
+    full = [partial(model.at, model.speed, number, how) for how in hows]
     found = [_lowest(model, at(), count, store) for at in full]
     return Frequencies(
         found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count)

@@ -155,7 +155,7 @@ def everywhere(
     model
         As it was solved.
     harmonics, every_wave
-        As in `Model.assembled`: with others of a wheel the number of modes may be another one.
+        As in `assemble`: with others of a wheel the number of modes may be another one.
     wave_number
         Of a tuned wheel that no load drives; None: that of the loads.
     """

@@ -30,7 +30,7 @@ class Extent:
 
 
 def extent_of(model: Model, harmonics: int) -> Extent:
-    """Return how large and stiff a model is; `harmonics` as in `Model.assembled`."""
+    """Return how large and stiff a model is; `harmonics` as in `assemble`."""
     volumes = [_stiff_volume(part) for part in model.parts.values() if part.body is None]
     labels, table = asked(model, harmonics).labels, model.places.dofs
     away = [_from_clamp(model.parts[table.part[d]], table.position[d]) for d in labels.dofs]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.forces import force_at
 from stickslip.assembly.load import Load
@@ -32,7 +32,7 @@ TIE = 1e-4  # share by which components of a mode have to differ for the larger 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The aerodynamic force on a model at a speed; `flow_around` makes it.
+    """The aerodynamic force on a model at a speed; `flow_around` in `build` makes it.
 
     Parameters
     ----------
@@ -42,13 +42,16 @@ class Flow:
         In rad/s.
     influence
         Coefficients at this speed.
+    holds
+        (p,) contact points that hold in the modes of its waves.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     """
 
     model: Model
     speed: float
     influence: InfluenceCoefficients
+    holds: BoolArray
     store: Store = in_memory
 
     def patterns(self, wave_number: int) -> Matrix:
@@ -91,7 +94,7 @@ class Flow:
 
     def _of_wave(self, number: int) -> Matrix:
         """Return ``M φ`` of the modes of a wave; real ones where they are those of all waves."""
-        moving = self.model.at(self.speed, number, self.given.contacts)
+        moving = self.model.at(self.speed, number, self.holds)
         modes = self._modes(moving, f"modes of wave {number}")
         shapes = np.asarray(moving.expand(modes))
         shapes = shapes * phases(shapes, own_dofs(self.model))
@@ -164,7 +167,7 @@ class Flow:
             given.over,
         )
         here, pairs = model.neighbours, model.pairs
-        pressed = model.pressed if given.contacts == "static" and pairs.names else None
+        pressed = self.holds if given.contacts == "static" and pairs.names else None
         met = (pairs.own, pairs.following, repr(pairs.laws), given.contacts, pressed)
         faces = () if here is None else (here.low, here.high, here.weights)
         tie = model.coordinates.tie
@@ -178,20 +181,6 @@ class Flow:
             faces,
             tie,
         )
-
-
-def flow_around(model: Model, store: Store = in_memory, speed: float | None = None) -> Flow | None:
-    """Return the aerodynamic force on a model, at its own speed or at another one in rad/s; None where it has no coefficients.
-
-    Raises
-    ------
-    InputError
-        If the coefficients are those of other speeds.
-    """
-    if model.aerodynamics is None:
-        return None
-    own = model.speed if speed is None else speed
-    return Flow(model, own, model.aerodynamics.influence.at_speed(own), store)
 
 
 def own_dofs(model: Model) -> IntArray:

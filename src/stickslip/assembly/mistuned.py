@@ -12,8 +12,9 @@ from stickslip.assembly.asked import Asked, asked, excitation
 from stickslip.assembly.assembled import Assembled, Blades
 from stickslip.assembly.build import (
     Linear,
-    assemble,
+    assemble_tuned,
     contact_table,
+    flow_around,
     loads_on,
     physical,
     static_state,
@@ -55,10 +56,10 @@ RELATIVE = {
 
 
 def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
-    """Return a wheel with all its sectors as solvers see it; see `Model.assembled`."""
+    """Return a wheel with all its sectors as solvers see it; see `assemble`."""
     assert model.mistuning is not None
     alike, n = replace(model, mistuning=None), model.sectors
-    tuned = assemble(alike, harmonics, store)
+    tuned = assemble_tuned(alike, harmonics, store)
     what = asked(alike, harmonics)
     wheel, (system, held), load = system_of_all(model, what, store)
     gap, force = static_state(held, load.static)
@@ -228,7 +229,7 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     rows = None
     if changes:
         rows = scipy.sparse.vstack([*(c.rows for c in changes), *behind], format="csr")
-    waves = sector_waves(model, range(model.sectors), kept, store, rows)
+    waves = sector_waves(model, range(model.sectors), kept, store, rows, flow_around(model, store))
     sector, gaps = _in_sectors(model, waves, what)
     structures = [sector.wheel.waves[k] for k in range(model.sectors)]
     seen = []

@@ -9,17 +9,17 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.aerodynamics import Aerodynamics
-from stickslip.assembly.assembled import Assembled, Skin
+from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
-from stickslip.assembly.load import Load, Output, refuse_second
+from stickslip.assembly.load import Load, Output
 from stickslip.assembly.loose import without_bodies
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places
-from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, damped, in_memory, steady_of
+from stickslip.assembly.reduced import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.shared_rotation import joined_displacements
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.stages import is_staged, stages_of
@@ -201,11 +201,9 @@ class Model:
         return self._orders[1]
 
     @cached_property
-    def pressed(self) -> BoolArray:
-        """(p,) contact points that stick in small vibrations about the static state at `speed`."""
-        from stickslip.assembly.build import pressed_points
-
-        return pressed_points(self)
+    def memo(self) -> dict[str, Any]:
+        """What is computed of it once; it is left behind by `pickle`."""
+        return {}
 
     @property
     def spread(self) -> tuple[str, ...]:
@@ -267,7 +265,7 @@ class Model:
         self,
         speed: float,
         wave_number: int = 0,
-        contacts: ContactsAs = "static",
+        contacts: Literal["open", "stuck"] | BoolArray = "open",
         *,
         with_damping: bool = False,
     ) -> Structure:
@@ -280,8 +278,8 @@ class Model:
         wave_number
             Modulo the number of sectors; of no meaning for a single structure.
         contacts
-            What contacts do: ``open``: nothing; ``stuck``: all are springs; ``static``: those are that the static state at the
-            model's own speed presses. Rigid bodies that nothing holds then are left out.
+            What contacts do: ``open``: nothing; ``stuck``: all are springs; an array (p,): the points that are springs, as
+            `holding_points` finds them in the static state. Rigid bodies that nothing holds then are left out.
         with_damping
             Whether the parts are damped as far as this follows from their matrices; ratios of modes are left out.
 
@@ -300,7 +298,11 @@ class Model:
             way = structure.basis
             operators = [operator @ way for operator in operators]
             tie = way if tie is None else tie @ way
-        holds = self._holding(contacts)
+        holds = (
+            np.full(len(self.pairs.names), contacts == "stuck")
+            if isinstance(contacts, str)
+            else contacts
+        )
         largest = float(np.abs(structure.stiffness.diagonal()).max())
         stiffness = np.where(np.repeat(holds, 3), self._springs(holds, STIFF * largest), 0.0)
         if holds.any():
@@ -308,12 +310,6 @@ class Model:
         structure = structure if tie is None else replace(structure, basis=tie)
         loose = self._loose(holds)
         return without_bodies(structure, {self.places.dofs.part[dof] for dof in loose})
-
-    def _holding(self, contacts: ContactsAs) -> BoolArray:
-        p = len(self.pairs.names)
-        if contacts == "static" and p:
-            return self.pressed
-        return np.full(p, contacts == "stuck")
 
     def _springs(self, holds: BoolArray, stiff: float) -> FloatArray:
         """Return the (3 p,) stiffnesses t, w, n of contacts that hold; `stiff` of rigid ones."""
@@ -360,41 +356,3 @@ class Model:
         still = {name: load for name, load in self.loads.items() if name not in driven}
         places = tuple(Output(name=name, on=load.on) for name, load in driven.items())
         return replace(self, loads=still, outputs=self.outputs or places)
-
-    def assembled(
-        self,
-        harmonics: int,
-        store: Store | None = None,
-        *,
-        wave_number: int | None = None,
-        every_wave: bool = False,
-    ) -> Assembled:
-        """Reduce the parts, join them, pair the contacts, and place all under the static loads.
-
-        Parameters
-        ----------
-        harmonics
-            Highest harmonic of the response.
-        store
-            Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
-        wave_number
-            Of a wheel: that in which a motion travels that nothing drives; harmonic loads are then left out. None: the loads say.
-        every_wave
-            Whether all waves of a wheel are reduced, as its stability against every one of them needs.
-
-        Raises
-        ------
-        InputError
-            If something of the model does not fit; the message names it.
-        SingularError
-            If nothing holds a body, or the static loads find no equilibrium.
-        """
-        from stickslip.assembly.build import assemble
-        from stickslip.assembly.mistuned import assemble_mistuned
-
-        keep = in_memory if store is None else store
-        model = self if wave_number is None else self.undriven
-        refuse_second(model.loads)
-        if self.mistuning is not None:
-            return assemble_mistuned(model, harmonics, keep)
-        return assemble(model, harmonics, keep, wave_number, every_wave=every_wave)

@@ -5,6 +5,7 @@ from math import ceil
 from typing import Any
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.build import assemble_tuned
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
 from stickslip.errors import StickslipError
@@ -33,15 +34,13 @@ def more_modes(model: Model, harmonics: int, store: Store) -> Assembled | None:
     model
         As it was solved; a wheel whose sectors differ has no such model.
     harmonics, store
-        As in `Model.assembled`.
+        As in `assemble`.
     """
-    from stickslip.assembly.build import assemble
-
     more = with_more_modes(model) if model.mistuning is None else None
     if more is None:
         return None
     try:
-        return assemble(more, harmonics, store, checked=False)
+        return assemble_tuned(more, harmonics, store, checked=False)
     except StickslipError:  # an error of frequencies that takes too many modes
         return None
 

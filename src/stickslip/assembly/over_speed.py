@@ -8,7 +8,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.assembled import Assembled
-from stickslip.assembly.build import assemble
+from stickslip.assembly.build import assemble_tuned
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store, in_memory
 from stickslip.assembly.whole import refuse_whole
@@ -82,7 +82,7 @@ def over_speed(
     harmonics
         Highest harmonic of the response.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     tolerance
         Of the error below which no more speeds are taken; they are 17 at most.
 
@@ -139,7 +139,7 @@ def _assembled(
     def at(speed: float) -> Assembled:
         if speed not in known:
             turning = replace(model, speed=speed)
-            known[speed] = assemble(turning, harmonics, store, checked=speed == speeds[1])
+            known[speed] = assemble_tuned(turning, harmonics, store, checked=speed == speeds[1])
         return known[speed]
 
     for intervals in INTERVALS:

@@ -10,7 +10,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
-from stickslip.assembly.flow import Flow, flow_around
+from stickslip.assembly.flow import Flow
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import (
@@ -55,6 +55,7 @@ def reduced_sector(
     stay: tuple[IntArray, IntArray],
     store: Store,
     more: Sequence[int] = (),
+    flow: Flow | None = None,
 ) -> ReducedSector:
     """Reduce the waves that an engine order excites, and put the aerodynamic force on them.
 
@@ -67,12 +68,14 @@ def reduced_sector(
     kept, stay
         Dofs of all parts that stay physical, and those that have to be coordinates of their own: outputs, rigid bodies.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     more
         Further wave numbers.
+    flow
+        The aerodynamic force on the model; None for nothing.
     """
     numbers = sorted({*wave_numbers(model.sectors, *order), *more})
-    found = sector_waves(model, numbers, kept, store)
+    found = sector_waves(model, numbers, kept, store, flow=flow)
     at = model.coordinates
     pairs = replace(
         model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
@@ -127,6 +130,7 @@ def sector_waves(
     kept: IntArray,
     store: Store,
     rows: Matrix | None = None,
+    flow: Flow | None = None,
 ) -> SectorWaves:
     """Reduce waves of a sector, all to as many coordinates.
 
@@ -139,11 +143,13 @@ def sector_waves(
     kept
         Dofs of all parts that stay physical.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     rows
         (r, N) CSR operator on the dofs of all parts: the loads of its rows stand beside that of steady rotation, one a column.
+    flow
+        The aerodynamic force on the model; None for nothing.
     """
-    at, here, flow = model.coordinates, model.neighbours, flow_around(model, store)
+    at, here = model.coordinates, model.neighbours
     assert here is not None
     spin = model.spin(model.speed)
     structure, steady = _sector_at_speed(model, spin)

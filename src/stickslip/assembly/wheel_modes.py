@@ -6,6 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.assembly.asked import Asked
+from stickslip.assembly.build import holding_points
 from stickslip.assembly.forces import output_labels
 from stickslip.assembly.mistuned import AllSectors, all_sectors, pairs_of_all
 from stickslip.assembly.model import ContactsAs, Model
@@ -47,9 +48,9 @@ def wheel_modes(
     number
         How many; the reduced wheel's at most.
     contacts
-        As in `Model.at`.
+        As in `holding_points`.
     store
-        As in `Model.assembled`.
+        As in `assemble`.
     """
     wheel, structure = _bound(model.without_aerodynamics(), contacts, store)
     massive = int(np.count_nonzero(structure.mass.diagonal()))
@@ -93,17 +94,10 @@ def _bound(model: Model, contacts: ContactsAs, store: Store) -> tuple[AllSectors
     none = Asked(None, {}, {}, labels, (), NO_PLACES)
     wheel = all_sectors(model, none, store)
     structure = wheel.side.of_harmonic(0)
-    stiffness = _springs(model, structure, _held(model, contacts))
+    stiffness = _springs(model, structure, np.tile(holding_points(model, contacts), model.sectors))
     if stiffness.any():
         structure = with_springs(structure, wheel.gaps, stiffness)
     return wheel, structure
-
-
-def _held(model: Model, contacts: ContactsAs) -> BoolArray:
-    p = len(model.pairs.names)
-    if contacts == "static" and p:
-        return np.tile(model.pressed, model.sectors)
-    return np.full(p * model.sectors, contacts == "stuck")
 
 
 def _springs(model: Model, structure: Structure, holds: BoolArray) -> FloatArray:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import input_error
@@ -48,6 +50,10 @@ class Model(Assembly):
     Every key of a study's table is an argument of the method of that name (`forced_response` takes those of [harmonics], [solver]
     and [limits], too), with the same meaning, unit and default. Numbers are the same as those of a study.
     """
+
+    def assembled(self, harmonics: int, *, every_wave: bool = False) -> Assembled:
+        """Return what the functions of the lower layers take; `assemble` of `stickslip.assembly` says of what."""
+        return assemble(self, harmonics, every_wave=every_wave)
 
     def forced_response(
         self,

@@ -128,7 +128,7 @@ def every_sector(problem: ForcedProblem) -> EverySector:
         raise input_error(
             "every_sector: problem",
             "is not that of a tuned wheel with every wave",
-            "Give Model.assembled(every_wave=True), or tuned_wheel all waves.",
+            "Give assemble(every_wave=True), or tuned_wheel all waves.",
         )
     system = problem.system
     found = all_sectors(system, problem.low.linear.load, every=True)

@@ -41,7 +41,7 @@ class Case:
     checks
         Further checks that this run asks for, of those that the analysis names in `Analysis.checks`.
     store
-        Keeps what is expensive of the model: for `Model.assembled`.
+        Keeps what is expensive of the model: for `assemble`.
     digest_at_rest
         As `digest`, without harmonic loads and outputs.
     at

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.assembly.flow import flow_around
+from stickslip.assembly.build import flow_around
 from stickslip.assembly.model import Model
 from stickslip.assembly.wheel_modes import wheel_in_flow
 from stickslip.errors import input_error

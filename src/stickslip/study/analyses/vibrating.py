@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
 from stickslip.contact.evaluators import Evaluator
@@ -35,7 +36,7 @@ def free_to_vibrate(model: Model, harmonics: int, store: Store) -> Assembled:
     still = model.undriven
     wheel = still.sectors > 1 and still.mistuning is None
     wave = 0 if wheel else None
-    return peak_first(still.assembled(harmonics, store, wave_number=wave, every_wave=wheel))
+    return peak_first(assemble(still, harmonics, store, wave_number=wave, every_wave=wheel))
 
 
 def refuse_rigid(analysis: str, model: Assembled) -> None:

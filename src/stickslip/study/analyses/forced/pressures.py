@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from stickslip.arrays import ComplexArray
+from stickslip.assembly.build import holding_points
 from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.load import Load
@@ -43,7 +44,7 @@ def _about(model: Model, name: str, load: Load, count: int) -> list[str]:
     if not load.harmonic or not count:
         return [sums]
     number = excited_wave((load.engine_order or 0) * load.harmonic, model.sectors)
-    moving = model.at(model.speed, number)
+    moving = model.at(model.speed, number, holding_points(model, "static"))
     shapes = normal_modes(moving, count)
     turned = np.asarray(moving.expand(shapes.shapes))
     turned = turned * phases(turned, own_dofs(model))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import static_state
 from stickslip.assembly.extent import Extent, extent_of
 from stickslip.assembly.model import Model
@@ -205,11 +206,11 @@ def question_of(case: Case, model: Model) -> Question:
     harmonics = REACH * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
-    assembled = model.assembled(harmonics, case.store)
+    assembled = assemble(model, harmonics, case.store)
     asked = settings.forced_response
     examined = asked.stability != "off" or asked.bifurcations in ("all", "branches")
     if examined and examines_every_wave(assembled.system):
-        assembled = model.assembled(harmonics, case.store, every_wave=True)
+        assembled = assemble(model, harmonics, case.store, every_wave=True)
     if IN_TIME in case.checks:
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:

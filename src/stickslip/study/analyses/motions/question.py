@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.whole import refuse_whole
 from stickslip.errors import InputError, input_error
@@ -59,7 +60,7 @@ def question_of(case: Case, model: Model) -> Question:
     """
     asked: AllMotionsTable = case.settings.all_motions
     refuse_whole("all_motions", model)
-    assembled = peak_first(model.assembled(REACH * asked.harmonics, case.store))
+    assembled = peak_first(assemble(model, REACH * asked.harmonics, case.store))
     if not any(np.any(f) for f in assembled.load.harmonics.values()):
         raise input_error(
             "all_motions",

@@ -6,6 +6,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
 from stickslip.assembly.whole import refuse_whole
@@ -52,7 +53,7 @@ class OfKey:
 
     def __call__(self, value: float) -> tuple[System, HarmonicLoad]:
         """Return system and load, the output whose peak counts first."""
-        model = peak_first(self.at(self.key, value).assembled(self.harmonics, self.store))
+        model = peak_first(assemble(self.at(self.key, value), self.harmonics, self.store))
         return model.system, model.load
 
 
@@ -107,7 +108,7 @@ def question_of(case: Case, model: Model) -> Question:
     parameter = _parameter(case, asked)
     _accepted(case, asked, parameter)
     refuse_whole("resonance", model)
-    assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
+    assembled = peak_first(assemble(model, more_than(asked.harmonics), case.store))
     refuse_rigid("resonance", assembled)
     evaluator: Evaluator = case.settings.solver.evaluator
     how = represented(asked.harmonics, evaluator)

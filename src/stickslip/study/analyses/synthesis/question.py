@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
@@ -108,7 +109,7 @@ def question_of(case: Case, model: Model) -> Question:
             )
     most = REACH * max(asked.harmonics, asked.most_harmonics)
     refuse_whole(NAME, model)
-    assembled = peak_first(model.assembled(most, case.store))
+    assembled = peak_first(assemble(model, most, case.store))
     refuse_rigid(NAME, assembled)
     facts = facts_of(model, model.speed / RPM)
     _bounded(asked.levels, assembled.load)

@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.whole import refuse_whole
 from stickslip.contact.evaluators import Evaluator
@@ -119,7 +120,7 @@ def question_of(case: Case, model: Model) -> Question:
     if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
         raise refusal
     refuse_whole("residual_tractions", model)
-    assembled = peak_first(model.assembled(REACH * asked.harmonics, case.store))
+    assembled = peak_first(assemble(model, REACH * asked.harmonics, case.store))
     if not any(np.any(force) for force in assembled.load.harmonics.values()):
         name = next(iter(model.driven))
         raise input_error(

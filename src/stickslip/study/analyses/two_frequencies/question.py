@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.assembly.whole import refuse_whole
@@ -136,7 +137,7 @@ def question_of(case: Case, model: Model) -> Question:
         )
     most = max(asked.most_harmonics, *(h for own in keys for h in own.values()))
     refuse_whole(NAME, together)
-    assembled = peak_first(together.assembled(most, case.store, every_wave=wheel))
+    assembled = peak_first(assemble(together, most, case.store, every_wave=wheel))
     static = assembled.load.static
     loads = [
         HarmonicLoad(static if i == 0 else np.zeros_like(static), _of(assembled, own, keys[i]))

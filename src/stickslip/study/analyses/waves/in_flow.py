@@ -1,6 +1,6 @@
 """A wave of a model in the flow: what [flutter] tells of it, and [modes] beside natural frequencies."""
 
-from stickslip.assembly.flow import flow_around
+from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.waves import damping_by_modes
 from stickslip.model.damping import Damping
@@ -26,7 +26,7 @@ def wave_in_flow(
     flow = flow_around(model, speed=speed)
     if flow is None:
         return None
-    moving = model.at(speed, wave_number, contacts, with_damping=True)
+    moving = model.at(speed, wave_number, holding_points(model, contacts), with_damping=True)
     parts = {k: p for k, p in model.parts.items() if p.body is None}
     reduced = any(part.reduction is not None for part in parts.values())
     damping = damping_by_modes(parts, reduced=reduced)

@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.build import holding_points
 from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.reduced import stiffening
@@ -107,9 +108,14 @@ class Question:
         low, high = float(omega.min()), float(omega.max())
         given.influence.require(low, high, f"the question for {self.n_modes} modes of each wave")
 
+    @cached_property
+    def holds(self) -> BoolArray:
+        """(p,) contact points that hold in these vibrations."""
+        return holding_points(self.model, self.contacts)
+
     def at(self, speed: float, wave_number: int) -> Structure:
         """Return the structure at a speed in rad/s as a wave."""
-        return self.model.at(speed, wave_number, self.contacts)
+        return self.model.at(speed, wave_number, self.holds)
 
     @cached_property
     def stiffening(self) -> Matrix:
