@@ -70,9 +70,7 @@ def interpreter(name: str) -> str | None:
     version = re.fullmatch(r"\d+\.\d+", name)
     tried = [shutil.which(f"python{name}")] if version else [shutil.which(name)]
     if version and shutil.which("pyenv"):
-        prefix = subprocess.run(
-            ["pyenv", "prefix", name], check=False, capture_output=True, text=True
-        )
+        prefix = subprocess.run(["pyenv", "prefix", name], check=False, capture_output=True, text=True)
         tried.append(f"{prefix.stdout.strip()}/bin/python" if prefix.returncode == 0 else None)
     for path in map(os.path.abspath, filter(None, tried)):  # used from other folders
         said = subprocess.run([path, "-c", "import venv"], check=False, capture_output=True)
@@ -86,9 +84,7 @@ def journey(python: str, wheel: Path, folder: Path) -> dict[str, list[float]]:
     environment = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "VIRTUAL_ENV"}}
 
     def done(*words: str) -> str:
-        ended = subprocess.run(
-            words, check=False, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True
-        )
+        ended = subprocess.run(words, check=False, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True)
         if ended.returncode:
             sys.exit(f"{' '.join(words)} ended with {ended.returncode}:\n{ended.stdout}")
         return ended.stdout
@@ -110,9 +106,8 @@ def journey(python: str, wheel: Path, folder: Path) -> dict[str, list[float]]:
     for example, package in LACKING.items():
         study = ROOT / "examples" / example / "study.toml"
         ended = subprocess.run(
-            (command, "check", str(study)),
-            check=False, cwd=folder, env=environment, capture_output=True, text=True,
-        )  # fmt: skip
+            (command, "check", str(study)), check=False, cwd=folder, env=environment, capture_output=True, text=True
+        )
         wrong = not_refused(ended.returncode, ended.stdout + ended.stderr, package)
         if wrong:
             sys.exit(f"{example} without {package}: {wrong}")

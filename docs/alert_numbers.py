@@ -50,18 +50,14 @@ def blades(preload: float = 0.0) -> Case:
     for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
         stiffness[[a, b], [a, b]] += k
         stiffness[[a, b], [b, a]] -= k
-    structure = ss.model.lumped(
-        np.array([1.0, 1, 1, 1, 0.1, 0.1]), stiffness, np.diag([20.0, 20, 20, 20, 0, 0])
-    )
+    structure = ss.model.lumped(np.array([1.0, 1, 1, 1, 0.1, 0.1]), stiffness, np.diag([20.0, 20, 20, 20, 0, 0]))
     cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
     gap = np.zeros((6, 6))
     for contact, (blade, turn) in enumerate(((0, sin), (2, -sin))):
         local = np.array([[cos, turn], [turn, -cos]])
         gap[[3 * contact, 3 * contact + 2], 4:] = local
         gap[[3 * contact, 3 * contact + 2], blade : blade + 2] = -local
-    law = ss.ElasticCoulomb(
-        k_t=3e5, k_w=0.0, k_n=3e5, mu=0.5, preload=preload, residual_traction=0.0
-    )
+    law = ss.ElasticCoulomb(k_t=3e5, k_w=0.0, k_n=3e5, mu=0.5, preload=preload, residual_traction=0.0)
     interface = ss.Interface(("left", "right"), (law, law), gap)
     system = ss.System(structure, interface, np.arange(4), free=np.array([4, 5]))
     static = np.array([0, 0, 0, 0, 0, 120.0])
@@ -89,8 +85,13 @@ def pairs(
 ) -> list[Pair]:
     """Solve equally spaced frequencies with few harmonics and with many, whatever the alert says."""
     sweep = ss.Sweep(
-        omega_range=omega_range, low=low, high=high, selection=ss.harmonic.JacobianAlert(threshold=-1.0), frequencies=count, peak_points=0
-    )  # fmt: skip
+        omega_range=omega_range,
+        low=low,
+        high=high,
+        selection=ss.harmonic.JacobianAlert(threshold=-1.0),
+        frequencies=count,
+        peak_points=0,
+    )
     points = list(ss.forced_response(*case, sweep))
     problem = ss.response.forced_problem(*case, sweep)
     again = {p.index: p for p in points if p.stage == "high" and p.converged}
@@ -115,10 +116,20 @@ def forms() -> str:
         ("two blades, friction under a variable normal load", blades(), (160 * HERTZ, 164 * HERTZ), hertz),
         ("the same with 20 N of preload in each contact", blades(20.0), (227 * HERTZ, 228 * HERTZ), hertz),
         ("slider of constant limit 0.1, $k = 0.5$", oscillator(ss.Jenkins(k_t=0.5, limit=0.1)), (1.05, 1.25), plain),
-        ("stop behind a gap of 0.3, $k = 0.5$", oscillator(ss.UnilateralSpring(k_n=0.5, initial_gap=0.3), 2), (0.9, 1.0), plain),
-        ("support pressed by 0.1 N, $k = 1$", oscillator(ss.UnilateralSpring(k_n=1.0, preload=0.1), 2), (1.3, 1.5), plain),
+        (
+            "stop behind a gap of 0.3, $k = 0.5$",
+            oscillator(ss.UnilateralSpring(k_n=0.5, initial_gap=0.3), 2),
+            (0.9, 1.0),
+            plain,
+        ),
+        (
+            "support pressed by 0.1 N, $k = 1$",
+            oscillator(ss.UnilateralSpring(k_n=1.0, preload=0.1), 2),
+            (1.3, 1.5),
+            plain,
+        ),
         ("cubic spring $g^3$", oscillator(ss.CubicSpring(cubic_t=1.0)), (0.7, 0.9), plain),
-    ]  # fmt: skip
+    ]
     rows = []
     for name, case, span, unit in cases:
         for pair in pairs(case, span, 2):
@@ -153,16 +164,16 @@ def supports() -> str:
             odd = "" if high == 5 else number(pair.predicted())
             real = exact.get(pair.few.omega)
             rows.append(
-                (name, few, unit(pair.few.omega), odd, number(pair.predicted(harmonics=every)), "" if real is None else number(real))
-            )  # fmt: skip
-    head = (
-        "case",
-        "solved with",
-        "frequency",
-        "towards 1, 3, 5, %",
-        "towards 1 to 5, %",
-        "real, %",
-    )
+                (
+                    name,
+                    few,
+                    unit(pair.few.omega),
+                    odd,
+                    number(pair.predicted(harmonics=every)),
+                    "" if real is None else number(real),
+                )
+            )
+    head = ("case", "solved with", "frequency", "towards 1, 3, 5, %", "towards 1 to 5, %", "real, %")
     return table(head, rows)
 
 
@@ -173,12 +184,8 @@ def several() -> str:
     for pair in pairs(case, (0.4, 1.3), 10, (1, 3), (1, 3, 5, 7, 9, 11, 13, 15)):
         if pair.real > 1e-3:
             x = pair.problem.low.unknowns(pair.few.coefficients)
-            alert = jacobian_alert(
-                pair.problem.low, pair.problem.high, x, pair.few.omega, pair.problem.measure
-            )
-            rows.append(
-                (plain(pair.few.omega), str(alert.harmonic), f"{100 * alert.error:.3f}", f"{pair.real:.3f}")
-            )  # fmt: skip
+            alert = jacobian_alert(pair.problem.low, pair.problem.high, x, pair.few.omega, pair.problem.measure)
+            rows.append((plain(pair.few.omega), str(alert.harmonic), f"{100 * alert.error:.3f}", f"{pair.real:.3f}"))
     return table(("frequency", "harmonic", "predicted, %", "real, %"), rows)
 
 
@@ -189,14 +196,12 @@ def reference() -> str:
     sweep = ss.Sweep(high=5, selection="jacobian_alert", **shared)
     points = ss.response.accepted_points(list(ss.forced_response(*case, sweep)))
     problem = ss.response.forced_problem(*case, sweep)
-    ten = list(ss.forced_response(*case, ss.Sweep(low=10, high=10, selection="always_low", **shared)))  # fmt: skip
+    ten = list(ss.forced_response(*case, ss.Sweep(low=10, high=10, selection="always_low", **shared)))
     exact = {p.omega: p for p in ten}
     rows = []
     for check, point in zip(ss.response.check_support(problem, points), points, strict=True):
         real = 100 * problem.real_error(point, exact[point.omega])
-        rows.append(
-            (hertz(check.omega), str(check.kept[-1]), number(100 * check.error), number(real), check.label)
-        )  # fmt: skip
+        rows.append((hertz(check.omega), str(check.kept[-1]), number(100 * check.error), number(real), check.label))
     return table(("frequency", "harmonics kept", "predicted, %", "real, %", "dof"), rows)
 
 

@@ -33,9 +33,7 @@ html_static_path: list[str] = []
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
 myst_heading_anchors = 3
 math_number_all = False
-suppress_warnings = [
-    "misc.highlighting_failure"
-]  # sketches of types on the design page are not quite Python
+suppress_warnings = ["misc.highlighting_failure"]  # sketches of types on the design page are not quite Python
 
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "none"  # the numpydoc text has shapes and units, which the annotations lack
@@ -65,9 +63,7 @@ generate.write_all(HERE / "generated")
 def _linked(_app, page, source):
     """Make the names of the table of the interface links to their full text."""
     if page == "api":
-        source[0] = re.sub(
-            r"^\| `ss\.([\w.]+)`", r"| {py:obj}`ss.\1 <stickslip.\1>`", source[0], flags=re.M
-        )
+        source[0] = re.sub(r"^\| `ss\.([\w.]+)`", r"| {py:obj}`ss.\1 <stickslip.\1>`", source[0], flags=re.M)
 
 
 def setup(app):

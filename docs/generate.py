@@ -25,13 +25,23 @@ PAGES_OF_KEYS = {
     "analyses": (
         "Questions",
         (
-            "forced_response", "resonance", "all_motions", "modal_synthesis", "nonlinear_mode",
-            "residual_tractions", "quasi_periodic", "limit_cycle", "run_up", "modes", "campbell",
-            "safe", "flutter",
+            "forced_response",
+            "resonance",
+            "all_motions",
+            "modal_synthesis",
+            "nonlinear_mode",
+            "residual_tractions",
+            "quasi_periodic",
+            "limit_cycle",
+            "run_up",
+            "modes",
+            "campbell",
+            "safe",
+            "flutter",
         ),
     ),
     "settings": ("Harmonics, solver, limits", ("harmonics", "solver", "retention", "limits")),
-}  # fmt: skip
+}
 FIVE = "Two blades and a damper, five harmonics"  # a case of the validation with a table of its own
 STATED = (
     "Where contacts slip much, five harmonics are not enough. A row holds if the error against time integration is the one that more harmonics "
@@ -67,7 +77,7 @@ def kept() -> dict[str, str]:
         "limit_cycle": ("limit cycles", variables_of_cycles()),
         "residual_tractions": ("residual tractions", variables_of_tractions()),
         "model": ("the model, in modes, Campbell and SAFE diagrams and flutter", variables_of_models()),
-    }  # fmt: skip
+    }
     found |= {
         f"variables/{name}.md": f"# Variables of {title}\n\n{MADE} [Results](../results.md) explains where they stand.\n\n{text}"
         for name, (title, text) in variables.items()
@@ -131,13 +141,7 @@ class Keys:
         return lines
 
     def _table(
-        self,
-        title: str,
-        node: dict[str, Any],
-        *,
-        path: str = "",
-        without: tuple[str, ...] = (),
-        flat: bool = False,
+        self, title: str, node: dict[str, Any], *, path: str = "", without: tuple[str, ...] = (), flat: bool = False
     ) -> list[str]:
         rows, below = [], []
         laws = "law" in node["properties"]  # their keys have tables of their own
@@ -149,41 +153,29 @@ class Keys:
             if flat and (nested is not None or every is not None or _is_table(entry)):
                 continue
             if isinstance(every, dict) and not flat:
-                below += self._table(
-                    f"`[{path}.{key}.NAME]`", self._resolved(every), path=f"{path}.{key}.NAME"
-                )
+                below += self._table(f"`[{path}.{key}.NAME]`", self._resolved(every), path=f"{path}.{key}.NAME")
             if _options(entry) and not flat:
                 below += self._below(f"{path}.{key}", entry)
                 continue
             if nested is not None and not (path == "part.NAME" and key in self.common):
                 below += self._table(f"`[{path}.{key}]`", nested, path=f"{path}.{key}")
                 continue
-            rows.append(
-                f"| `{key}` | {_escaped(entry.get('description', ''))} | {_default(key, node)} |"
-            )
+            rows.append(f"| `{key}` | {_escaped(entry.get('description', ''))} | {_default(key, node)} |")
         if not rows:
             return below
         # the dataclass speaks of SI; keys have their units at their ends
         text = "" if flat else re.sub(r"; (lengths in )?metres.*", ".", node["description"])
-        return [
-            f"## {title}", "", text, "",
-            "| key | meaning | default |", "|---|---|---|", *rows, "", *below,
-        ]  # fmt: skip
+        return [f"## {title}", "", text, "", "| key | meaning | default |", "|---|---|---|", *rows, "", *below]
 
     def _of_laws(self) -> set[str]:
         from stickslip.contact.laws import ALL_LAWS
         from stickslip.study.file.quantities import columns_of
 
-        each = (
-            columns_of(law, per_area=area) for law in ALL_LAWS.values() for area in (False, True)
-        )
+        each = (columns_of(law, per_area=area) for law in ALL_LAWS.values() for area in (False, True))
         return {key for found in each for key in found}
 
     def _resolved(self, entry: dict[str, Any]) -> dict[str, Any]:
-        parts = [
-            *entry.get("allOf", []),
-            *entry.get("anyOf", []),
-        ]  # a table that may be left out is one of two
+        parts = [*entry.get("allOf", []), *entry.get("anyOf", [])]  # a table that may be left out is one of two
         reference = entry.get("$ref") or next((p["$ref"] for p in parts if "$ref" in p), None)
         return self.schema["$defs"][reference.rsplit("/", 1)[1]] if reference else entry
 
@@ -222,9 +214,15 @@ def laws() -> str:
             also = "" if of_area == key else f"`{of_area}`"
             rows.append(f"| `{key}` | {also} | {_escaped(column.description)} | {default} |")
         lines += [
-            f"## `law = \"{name}\"`", "", (law.__doc__ or "").partition("\n")[0], "",
-            "| key | with `per = \"area\"` | meaning | default |", "|---|---|---|---|", *rows, "",
-        ]  # fmt: skip
+            f'## `law = "{name}"`',
+            "",
+            (law.__doc__ or "").partition("\n")[0],
+            "",
+            '| key | with `per = "area"` | meaning | default |',
+            "|---|---|---|---|",
+            *rows,
+            "",
+        ]
     return "\n".join(lines)
 
 
@@ -233,8 +231,7 @@ def variables_of_response() -> str:
     from stickslip.study.analyses.forced.quantities import QUANTITIES
 
     rows = [
-        f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |"
-        for name, q in QUANTITIES.items()
+        f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |" for name, q in QUANTITIES.items()
     ]
     return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
 
@@ -296,18 +293,10 @@ def validation() -> str:
 
 def _comparisons(records: list[dict[str, Any]]) -> list[str]:
     """Return the lines of a table of comparisons."""
-    lines = [
-        "| case | quantity | ours | reference | tolerance | holds | source |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    lines = ["| case | quantity | ours | reference | tolerance | holds | source |", "|---|---|---|---|---|---|---|"]
     for record in records:
-        cells = [
-            _number(record[key]) for key in ("case", "quantity", "ours", "reference", "tolerance")
-        ]
-        cells += [
-            {True: "yes", False: "**no**"}.get(record["holds"], record["holds"]),
-            _escaped(record["source"]),
-        ]
+        cells = [_number(record[key]) for key in ("case", "quantity", "ours", "reference", "tolerance")]
+        cells += [{True: "yes", False: "**no**"}.get(record["holds"], record["holds"]), _escaped(record["source"])]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 

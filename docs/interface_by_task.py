@@ -24,15 +24,18 @@ TASKS = {
     "Matrices, modes and rotation": ("model",),
     "Reduction": ("reduction",),
     "Wheels: sectors, waves, stages": (
-        "reduction.cyclic", "reduction.full_wheel", "reduction.tuned", "reduction.waves",
-        "reduction.whole_wheel", "reduction.coupled_stages", "reduction.aerodynamics",
+        "reduction.cyclic",
+        "reduction.full_wheel",
+        "reduction.tuned",
+        "reduction.waves",
+        "reduction.whole_wheel",
+        "reduction.coupled_stages",
+        "reduction.aerodynamics",
     ),
     "Campbell, SAFE and nodal-diameter diagrams, flutter": ("response.rotating",),
     "Forced response": ("response",),
     "Harmonic balance": ("harmonic", "solve"),
-    "Which harmonics are kept": (
-        "harmonic.selection", "response.contributions", "response.verification",
-    ),
+    "Which harmonics are kept": ("harmonic.selection", "response.contributions", "response.verification"),
     "Peaks over a design parameter": ("response.resonances", "response.parameter"),
     "Stability": ("response.stability", "response.time.floquet", "response.free_motion"),
     "Bifurcations and other motions": ("response.bifurcations", "response.all_motions"),
@@ -41,7 +44,7 @@ TASKS = {
     "Two frequencies": ("response.quasi_periodic",),
     "Residual tractions": ("response.residual_tractions",),
     "Time": ("response.time",),
-}  # fmt: skip
+}
 
 _INTRODUCTION = """\
 This page lists the public names of Python by task; [researcher](start/researcher.md) is a first script. `ss` is `import stickslip as ss`. The names for most work stand at its top, the others in one package for each layer, such as `ss.harmonic`.

@@ -39,9 +39,7 @@ def _cross_section(axes: Axes, sector: BladedSector) -> None:
     _box(axes, platform.depth, disk.rim_radius, platform.top_radius, "0.8")
     edge = [np.abs(airfoil.section(s)[:, 1]).max() * MM for s in (0.0, 1.0)]
     base, tip = sector.base_radius * MM, sector.tip_radius * MM
-    axes.fill(
-        [-edge[0], edge[0], edge[1], -edge[1]], [base, base, tip, tip], "0.9", edgecolor="0.3"
-    )
+    axes.fill([-edge[0], edge[0], edge[1], -edge[1]], [base, base, tip, tip], "0.9", edgecolor="0.3")
     half = shroud.thickness / 2
     _box(axes, shroud.depth, sector.shroud_radius - half, sector.shroud_radius + half, "0.8")
     bore = disk.bore_radius * MM
@@ -85,10 +83,7 @@ def _axial_view(axes: Axes, sector: BladedSector) -> None:
     axes.fill(outline[:, 1], outline[:, 0], "0.8", edgecolor="0.3")
     sections = [np.abs(sector.airfoil.section(s)[:, 0]).max() * MM for s in (0.0, 1.0)]
     base, tip = sector.base_radius * MM, sector.tip_radius * MM
-    axes.fill(
-        [-sections[0], sections[0], sections[1], -sections[1]], [base, base, tip, tip],
-        "0.9", edgecolor="0.3",
-    )  # fmt: skip
+    axes.fill([-sections[0], sections[0], sections[1], -sections[1]], [base, base, tip, tip], "0.9", edgecolor="0.3")
     inner = sector.shroud_radius - shroud.thickness / 2
     _ring(axes, inner, inner + shroud.thickness, sector.shroud_angle / 2, "0.8")
     arc = np.linspace(-half, half, 30)
@@ -131,7 +126,5 @@ def _edge(axes: Axes, angle: float, inner: float, outer: float, color: str) -> N
     axes.plot(ends * np.sin(angle), ends * np.cos(angle), color=color, lw=3)
 
 
-def _label(
-    axes: Axes, text: str, at: tuple[float, float], color: str, align: str = "center"
-) -> None:
+def _label(axes: Axes, text: str, at: tuple[float, float], color: str, align: str = "center") -> None:
     axes.text(*at, text, color=color, ha=align, va="center", fontsize=9)

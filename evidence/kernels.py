@@ -22,7 +22,7 @@ from evidence.pytest_run import ROOT, counted
 
 OWN = ""  # the one that OpenBLAS chooses
 # with the word that /proc/cpuinfo has where a processor can run it
-KERNELS = {OWN: "", "Haswell": "avx2", "Prescott": "pni", "Sandybridge": "avx", "Zen": "avx2", "SkylakeX": "avx512f"}  # fmt: skip
+KERNELS = {OWN: "", "Haswell": "avx2", "Prescott": "pni", "Sandybridge": "avx", "Zen": "avx2", "SkylakeX": "avx512f"}
 MARKED = "Haswell"
 OTHERS = re.compile(r"stickslip\.(cli|report)\b|\bsubprocess\b|\btest_cli\b|\bbrowser\b")
 MARK = "mark.kernel"
@@ -55,9 +55,7 @@ def environment(kernel: str, threads: int = 1) -> dict[str, str]:
 def loaded(kernel: str) -> str:
     """Return the names of the kernels that numpy and scipy load; empty where they have another BLAS."""
     command = [sys.executable, "-c", LOADED]
-    return subprocess.run(
-        command, env=environment(kernel), capture_output=True, text=True, check=True
-    ).stdout.strip()
+    return subprocess.run(command, env=environment(kernel), capture_output=True, text=True, check=True).stdout.strip()
 
 
 def processor() -> set[str]:
@@ -103,9 +101,13 @@ def pieces() -> list[tuple[str, Callable[[int], Counter[str]]]]:
     kernels, _ = to_run(tuple(KERNELS))
     found = [(kernel, 1) for kernel in kernels if kernel != OWN]
     return [
-        (f"{kernel or 'own kernel'}, threads {threads}, files {share + 1} of {SHARES}", partial(_numeric, kernel, threads, share))
-        for kernel, threads in [*found, (OWN, 2)] for share in range(SHARES)
-    ]  # fmt: skip
+        (
+            f"{kernel or 'own kernel'}, threads {threads}, files {share + 1} of {SHARES}",
+            partial(_numeric, kernel, threads, share),
+        )
+        for kernel, threads in [*found, (OWN, 2)]
+        for share in range(SHARES)
+    ]
 
 
 def told() -> list[str]:
@@ -115,7 +117,7 @@ def told() -> list[str]:
 
 def _numeric(kernel: str, threads: int, share: int, workers: int) -> Counter[str]:
     files = numeric_files()[share::SHARES]
-    return _counted(kernel, threads, workers, ["-m", "not validation", "-k", f"not ({STOPPED})", *files])  # fmt: skip
+    return _counted(kernel, threads, workers, ["-m", "not validation", "-k", f"not ({STOPPED})", *files])
 
 
 def marked(workers: int) -> Counter[str]:

@@ -18,9 +18,7 @@ import stickslip as ss
 
 @dataclass(frozen=True)
 class Unbalanced:
-    threshold: float = (
-        0.02  # largest force in a missing harmonic that is accepted, by the excitation
-    )
+    threshold: float = 0.02  # largest force in a missing harmonic that is accepted, by the excitation
 
     # a verdict speaks of the solution itself, so that a double passage can be made of it
     verifies = True
@@ -42,9 +40,7 @@ class Unbalanced:
 if __name__ == "__main__":
     one = np.ones((1, 1))
     structure = ss.model.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
-    friction = ss.Interface(
-        ("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]])
-    )
+    friction = ss.Interface(("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]]))
     system = ss.System(structure, friction, outputs=np.array([0]))
     shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
     sweep = ss.Sweep(
@@ -55,9 +51,7 @@ if __name__ == "__main__":
     points = ss.response.accepted_points(solved)
     for point in points:
         kept = ", ".join(str(h) for h in point.support)
-        blade = abs(
-            ss.response.fields(problem, point).outputs[1, 0]
-        )  # point.coefficients: retained coordinates
+        blade = abs(ss.response.fields(problem, point).outputs[1, 0])  # point.coefficients: retained coordinates
         print(f"{point.omega:.3f} rad/s: {blade:.4f} m with harmonics {kept}")
     unknowns = sum(system.retained.size * (2 * len(point.support) - 1) for point in solved)
     print(f"{unknowns} unknowns solved at {len(points)} frequencies")

@@ -46,7 +46,9 @@ plt.show()
 at = found.isel(searched=0)
 for k in np.flatnonzero(at.motion_branch.values >= 0):
     one = at.isel(motion=k)
-    print(f"{float(one.motion_amplitude):.4f} m, {one.motion_stability.values}: {int(one.motion_count)} starts, basin of {float(one.motion_share_low):.0%} to {float(one.motion_share_high):.0%}")  # fmt: skip
+    print(
+        f"{float(one.motion_amplitude):.4f} m, {one.motion_stability.values}: {int(one.motion_count)} starts, basin of {float(one.motion_share_low):.0%} to {float(one.motion_share_high):.0%}"
+    )
 more = model.all_motions(harmonics=3, starts=0, **asked)["all_motions"].isel(case=0)
 
 roots = np.roots([0.625, -1.5, 1.0 - c**2 / 4, -((force / c) ** 2)])

@@ -53,9 +53,7 @@ plt.plot([p.omega for p in points], [problem.amplitude(p) for p in points], labe
 plt.plot(branch.omegas, each[:, 0], "--", label="sectors 0 and 2")
 plt.plot(branch.omegas, each[:, 1], "--", label="sectors 1 and 3")
 plt.plot(first.omega, first.amplitude, "ks", label="branch point")
-plt.gca().set(
-    xlabel="frequency, rad/s", ylabel="amplitude, m", title="Localised motions of a wheel"
-)
+plt.gca().set(xlabel="frequency, rad/s", ylabel="amplitude, m", title="Localised motions of a wheel")
 plt.legend()
 plt.show()
 

@@ -20,18 +20,14 @@ import stickslip as ss
 titanium = ss.Material(young_modulus=114e9, poisson_ratio=0.33, density=4430.0)
 width, thickness, length, hub = 0.054, 0.008, 0.35, 0.25
 flap = ss.model.Beam(length, width * thickness, width * thickness**3 / 12, titanium)
-lag = ss.model.Beam(
-    length, width * thickness, thickness * width**3 / 12, titanium, shear_coefficient=5 / 6
-)
+lag = ss.model.Beam(length, width * thickness, thickness * width**3 / 12, titanium, shear_coefficient=5 / 6)
 
 
 def blade(speed: float) -> ss.Structure:
     """Flap beside lag with stretching, at a speed in rad/s."""
     return ss.model.join(
         flap=ss.model.rotating_beam(flap, 20, speed, hub_radius=hub),
-        lag=ss.model.rotating_beam(
-            lag, 20, speed, hub_radius=hub, bending="y", axial=True, coriolis=True
-        ),
+        lag=ss.model.rotating_beam(lag, 20, speed, hub_radius=hub, bending="y", axial=True, coriolis=True),
     )
 
 
@@ -51,18 +47,18 @@ figure, axes = plt.subplots(layout="constrained")
 for order in diagram.engine_orders:
     axes.plot(speeds / rpm, diagram.engine_order_hz(order), color="0.75", linewidth=1)
     axes.annotate(
-        f" {order}",
-        (speeds[-1] / rpm, diagram.engine_order_hz(order)[-1]),
-        color="0.5",
-        annotation_clip=True,
+        f" {order}", (speeds[-1] / rpm, diagram.engine_order_hz(order)[-1]), color="0.5", annotation_clip=True
     )
 for mode in range(4):
     axes.plot(speeds / rpm, diagram.frequencies_hz[:, mode], marker=".", label=f"mode {mode + 1}")
 at = [(c.speed / rpm, c.frequency_hz) for c in diagram.crossings]
 axes.plot(*np.transpose(at), "o", color="black", fillstyle="none", label="crossings")
 axes.set(
-    xlabel="speed, rpm", ylabel="frequency, Hz", title="Campbell diagram of a blade",
-    xlim=(0, 9300), ylim=(0, 1.1 * diagram.frequencies_hz.max()),
-)  # fmt: skip
+    xlabel="speed, rpm",
+    ylabel="frequency, Hz",
+    title="Campbell diagram of a blade",
+    xlim=(0, 9300),
+    ylim=(0, 1.1 * diagram.frequencies_hz.max()),
+)
 axes.legend()
 plt.show()

@@ -55,7 +55,7 @@ def solved(hertz, mu):
 # :math:`\mu = 0.5` the left one slides in the first period to where the load pushes it, and sticks from then on. Its mean force depends on the
 # place where it stopped and so on all harmonics: the first row. None but the static one feels it.
 
-cases = {"never slid": (155.0, 3.0), "slid into place": (155.0, 0.5), "weak": (220.0, 0.5), "strong": (161.0, 0.5)}  # fmt: skip
+cases = {"never slid": (155.0, 3.0), "slid into place": (155.0, 0.5), "weak": (220.0, 0.5), "strong": (161.0, 0.5)}
 pictures, rows = {}, []
 for name, (hertz, mu) in cases.items():
     problem, low, high = solved(hertz, mu)
@@ -70,17 +70,19 @@ for name, (hertz, mu) in cases.items():
 
 figure, axes = plt.subplots(2, 3, figsize=(13, 8.2), layout="constrained")
 scale, titles = LogNorm(1e-2, 40.0), list(pictures)
-for ax, i in zip(
-    axes.flat, [0, 2, 3, 1, 4, 5], strict=True
-):  # stick on the left, then weak above strong
+for ax, i in zip(axes.flat, [0, 2, 3, 1, 4, 5], strict=True):  # stick on the left, then weak above strong
     title, norms = titles[i], pictures[titles[i]]
     image = ax.imshow(np.ma.masked_less(norms, 1e-9), norm=scale, cmap="YlGnBu")
     for (h, k), value in np.ndenumerate(norms):
         if value > 1e-9:
-            ax.text(
-                k, h, f"{value:.2g}", ha="center", va="center", color="w" if value > 1.0 else "k"
-            )
-    ax.set(title=title, xlabel="motion in harmonic $k$", ylabel="force in harmonic $h$", xticks=range(len(norms)), yticks=range(len(norms)))  # fmt: skip
+            ax.text(k, h, f"{value:.2g}", ha="center", va="center", color="w" if value > 1.0 else "k")
+    ax.set(
+        title=title,
+        xlabel="motion in harmonic $k$",
+        ylabel="force in harmonic $h$",
+        xticks=range(len(norms)),
+        yticks=range(len(norms)),
+    )
 figure.colorbar(image, ax=axes, label="norm of the block", shrink=0.7)
 plt.show()
 
@@ -91,4 +93,4 @@ plt.show()
 print("                 predicted   real   dJ%   trace of Gamma  mean  zeros off the diagonal")
 for name, predicted, true, alike in rows:
     print(f"{name:15s}  {predicted:8.3f} % {true:6.3f} % {100 * alike.change:5.2f}", end="  ")
-    print(f"{alike.trace:8.3f} of {alike.size}  {alike.mean_diagonal:.4f}  {100 * alike.zero_share:.1f} %")  # fmt: skip
+    print(f"{alike.trace:8.3f} of {alike.size}  {alike.mean_diagonal:.4f}  {100 * alike.zero_share:.1f} %")

@@ -62,11 +62,7 @@ for n in samples:
 figure, axes = plt.subplots()
 axes.loglog(samples, errors, "o-", label="sampled")
 axes.loglog(samples, errors[0] * (samples[0] / samples) ** 2, ":", label="second order")
-axes.set(
-    xlabel="samples per period",
-    ylabel="error of the describing function / k",
-    title="Effect of sampling",
-)
+axes.set(xlabel="samples per period", ylabel="error of the describing function / k", title="Effect of sampling")
 axes.legend()
 
 # %%

@@ -25,9 +25,7 @@ examples = {
     "jenkins": ss.Jenkins(k_t=2.0, limit=1.0, k_n=1.0),
     "elastic_coulomb": ss.ElasticCoulomb(k_t=2.0, k_w=2.0, k_n=1.0, mu=0.8, preload=1.0),
     "coupled_coulomb": ss.CoupledCoulomb(k_t=2.0, k_n=1.0, mu=0.8, preload=1.0),
-    "regularised_coulomb": ss.RegularisedCoulomb(
-        mu=0.8, transition_velocity=0.2, k_n=1.0, preload=1.0
-    ),
+    "regularised_coulomb": ss.RegularisedCoulomb(mu=0.8, transition_velocity=0.2, k_n=1.0, preload=1.0),
     "dahl": ss.Dahl(k_t=2.0, limit=1.0, k_n=1.0),
     "bouc_wen": ss.BoucWen(k_t=2.0, beta=1.5, gamma=0.5, alpha=0.1, exponent=2.0, k_n=1.0),
     "iwan": ss.Iwan(k_t=2.0, limit=1.0, k_n=1.0, population=ss.contact.UniformBand(n_sliders=30)),
@@ -60,7 +58,7 @@ for axis, (name, law) in zip(axes.flat, examples.items(), strict=False):
     axis.axhline(0.0, color="0.8", lw=0.6, zorder=0)
     axis.axvline(0.0, color="0.8", lw=0.6, zorder=0)
 axis = axes.flat[len(examples)]
-for name, style in (("bonded", "-"), ("unilateral_spring", "--"), ("cubic_spring", "-."), ("polynomial_spring", ":")):  # fmt: skip
+for name, style in (("bonded", "-"), ("unilateral_spring", "--"), ("cubic_spring", "-."), ("polynomial_spring", ":")):
     at = period(examples[name], 1.5, along="n")
     order = np.argsort(at.gap[0, 2])
     axis.plot(at.gap[0, 2, order], at.force[0, 2, order], style, lw=1.3, label=name)

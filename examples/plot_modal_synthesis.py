@@ -16,16 +16,16 @@ import stickslip as ss
 # Unit mass, unit spring, a dashpot of 0.02, and a damper whose spring of 0.5 slides at 0.1 N.
 
 blade = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1), names=("mass",))
-damper = ss.Contact(
-    between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.1), acts="tangential"
+damper = ss.Contact(between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.1), acts="tangential")
+model = ss.Model(
+    parts={"blade": ss.Part(structure=blade)},
+    contacts={"damper": damper},
+    loads={"shaker": ss.Load(on="blade.mass", newton=0.1)},
 )
-model = ss.Model(parts={"blade": ss.Part(structure=blade)}, contacts={"damper": damper}, loads={"shaker": ss.Load(on="blade.mass", newton=0.1)})  # fmt: skip
 levels = [*np.geomspace(0.3, 5.0, 10), 2.0]
 ends = (0.8 / (2 * np.pi), 1.4 / (2 * np.pi))
 rate = (ends[1] - ends[0]) / 300.0
-result = model.modal_synthesis(
-    levels=levels, frequency_hz=ends, passage_hz_per_s=[rate], harmonics=7, most_harmonics=7
-)
+result = model.modal_synthesis(levels=levels, frequency_hz=ends, passage_hz_per_s=[rate], harmonics=7, most_harmonics=7)
 found = result["modal_synthesis"].isel(case=0)
 
 figure, axes = plt.subplots(layout="constrained")
@@ -41,9 +41,7 @@ axes.legend()
 level, size = found.resonance_level.values, found.backbone_amplitude.values
 best = int(np.nanargmin(size / level))
 damping = found.backbone_damping_ratio.values[best]
-print(
-    f"lowest peak per load {size[best] / level[best]:.4f} m, at level {level[best]:.3f}, damping {damping:.3f}"
-)
+print(f"lowest peak per load {size[best] / level[best]:.4f} m, at level {level[best]:.3f}, damping {damping:.3f}")
 figure, axes = plt.subplots(layout="constrained")
 axes.loglog(level, size / level)
 axes.set(xlabel="level", ylabel="peak over level, m")

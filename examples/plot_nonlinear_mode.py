@@ -18,10 +18,12 @@ import stickslip as ss
 # One mass on a spring, a dashpot of 1 % and a friction damper of half the stiffness.
 
 blade = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1), names=("mass",))
-damper = ss.Contact(
-    between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.1), acts="tangential"
+damper = ss.Contact(between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.1), acts="tangential")
+model = ss.Model(
+    parts={"blade": ss.Part(structure=blade)},
+    contacts={"damper": damper},
+    loads={"shaker": ss.Load(on="blade.mass", newton=0.1)},
 )
-model = ss.Model(parts={"blade": ss.Part(structure=blade)}, contacts={"damper": damper}, loads={"shaker": ss.Load(on="blade.mass", newton=0.1)})  # fmt: skip
 
 # %%
 # The mode, from half the amplitude at which the damper slips to five times that, with as many harmonics as it needs.
@@ -30,9 +32,7 @@ mode = model.nonlinear_mode(modes=[1], amplitude_mm=(100, 1000), most_harmonics=
 curve = mode["nonlinear_mode"].isel(case=0, branch=0)
 print(str(curve.end.values))
 known = curve.status.values == 0
-amplitude, hertz, ratio = (
-    curve[name].values[known] for name in ("amplitude", "frequency_hz", "damping_ratio")
-)
+amplitude, hertz, ratio = (curve[name].values[known] for name in ("amplitude", "frequency_hz", "damping_ratio"))
 
 # %%
 # Frequency responses to three forces, and the backbone over them.
@@ -56,9 +56,7 @@ for top, at, force in peaks:
     on_curve = np.interp(top, amplitude, hertz)
     # what damping takes at resonance
     balance = 2.0 * np.interp(top, amplitude, ratio) * (2 * np.pi * at) ** 2 * top
-    print(
-        f"{force} N: peak at {at:.5f} Hz, backbone {on_curve:.5f}; {balance:.4f} N by its damping"
-    )
+    print(f"{force} N: peak at {at:.5f} Hz, backbone {on_curve:.5f}; {balance:.4f} N by its damping")
     assert abs(at / on_curve - 1.0) < 0.01
     assert abs(balance / force - 1.0) < 0.03
 assert abs(ratio.max() - 0.0738) < 2e-4

@@ -45,7 +45,7 @@ def interface_side(points, offset, n_dofs, *, upward):
     corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     quads = np.stack(corners, axis=-1).reshape(-1, 4)
     facets = quads if upward else quads[:, ::-1]
-    return ss.contact.nodal_surface(points[nodes], offset + 3 * nodes[:, None] + np.arange(3), n_dofs, facets)  # fmt: skip
+    return ss.contact.nodal_surface(points[nodes], offset + 3 * nodes[:, None] + np.arange(3), n_dofs, facets)
 
 
 lower, K_lower, push_lower = block((4, 4), np.linspace(-1.0, 0.0, 4))

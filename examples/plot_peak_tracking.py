@@ -20,10 +20,12 @@ import stickslip as ss
 # Unit mass, unit spring and a dashpot of 0.02; damper spring 0.5, sliding at a limit that is to be chosen.
 
 blade = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1), names=("mass",))
-damper = ss.Contact(
-    between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=2.0), acts="tangential"
+damper = ss.Contact(between=("blade.mass", "ground"), law=ss.Jenkins(k_t=0.5, limit=2.0), acts="tangential")
+model = ss.Model(
+    parts={"blade": ss.Part(structure=blade)},
+    contacts={"damper": damper},
+    loads={"shaker": ss.Load(on="blade.mass", newton=0.1)},
 )
-model = ss.Model(parts={"blade": ss.Part(structure=blade)}, contacts={"damper": damper}, loads={"shaker": ss.Load(on="blade.mass", newton=0.1)})  # fmt: skip
 ends = (0.8 / (2 * np.pi), 1.4 / (2 * np.pi))
 
 # %%
@@ -34,15 +36,15 @@ limits = np.geomspace(2.0, 0.02, 30)
 peaks = {}
 figure, axes = plt.subplots(layout="constrained")
 for by, style in (("horizontal_tangent", "-"), ("phase_quadrature", "--")):
-    found = model.resonance(
-        parameter="limit", values=limits, frequency_hz=ends, by=by, harmonics=5, peaks=1
-    )
+    found = model.resonance(parameter="limit", values=limits, frequency_hz=ends, by=by, harmonics=5, peaks=1)
     peaks[by] = found["resonance"].isel(case=0, peak=0)
     axes.loglog(peaks[by].value, peaks[by].amplitude, style, label=by.replace("_", " "))
 tops = peaks["horizontal_tangent"]
 best = tops.isel(point=int(np.argmin(tops.amplitude.values)))
 lower = 1.0 - peaks["phase_quadrature"].amplitude.values / tops.amplitude.values
-print(f"smallest peak: {float(best.amplitude):.5f} m at {float(best.frequency_hz):.5f} Hz with a limit of {float(best.value):.4f} N")  # fmt: skip
+print(
+    f"smallest peak: {float(best.amplitude):.5f} m at {float(best.frequency_hz):.5f} Hz with a limit of {float(best.value):.4f} N"
+)
 print(f"in quadrature the amplitude is up to {100 * lower.max():.2g} % lower")
 axes.plot(best.value, best.amplitude, "o", label="smallest peak")
 axes.set(xlabel="slip limit, N", ylabel="peak amplitude, m", title="Damper optimisation curve")

@@ -34,9 +34,7 @@ system = ss.System(
     outputs=np.array([3]),
     free=np.array([4, 5]),
 )
-load = ss.HarmonicLoad(
-    np.array([0, 0, 0, 0, 0, 120.0]), {1: -1j * np.array([0, -20, 5, 0, 0, 0.0])}
-)
+load = ss.HarmonicLoad(np.array([0, 0, 0, 0, 0, 120.0]), {1: -1j * np.array([0, -20, 5, 0, 0, 0.0])})
 
 # %%
 # The smallest and the largest amplitude at each frequency. The left contact slips from 214 Hz on, the right one sticks.
@@ -44,9 +42,7 @@ load = ss.HarmonicLoad(
 how = ss.response.Discretisation(order=5, samples=256, evaluator="intervals")
 hertz = np.linspace(205.0, 240.0, 36)
 bounds = list(traction_bounds(system, load, 2 * np.pi * hertz, discretisation=how))
-least, own, most = (
-    np.array([getattr(b, name).amplitude for b in bounds]) for name in ("least", "reference", "most")
-)  # fmt: skip
+least, own, most = (np.array([getattr(b, name).amplitude for b in bounds]) for name in ("least", "reference", "most"))
 
 figure, axes = plt.subplots(layout="constrained")
 axes.fill_between(hertz, 1e6 * least, 1e6 * most, alpha=0.3, label="over all residual tractions")
@@ -63,6 +59,6 @@ plt.show()
 for name, end in (("smallest", at.least), ("largest", at.most)):
     again = confirmed(system, load, at.omega, end, discretisation=how)
     traction = end.multipliers[1, 0]
-    print(f"{name}: {end.amplitude:.6e} m with {traction:+.3f} of the limit at t = 0, again {again.resolved:.6e} m")  # fmt: skip
+    print(f"{name}: {end.amplitude:.6e} m with {traction:+.3f} of the limit at t = 0, again {again.resolved:.6e} m")
 assert abs(at.least.amplitude - 2.725740e-5) < 5e-12
 assert abs(at.most.amplitude - 4.749974e-5) < 5e-12

@@ -30,9 +30,7 @@ load = ss.HarmonicLoad(np.array([0, press]), {1: np.array([force, 0.0 + 0.0j])})
 how = ss.response.Discretisation(order=1)
 omegas = np.linspace(0.94, 1.28, 18)
 bounds = list(traction_bounds(pin, load, omegas, discretisation=how))
-least, own, most = (
-    np.array([getattr(b, name).amplitude for b in bounds]) for name in ("least", "reference", "most")
-)  # fmt: skip
+least, own, most = (np.array([getattr(b, name).amplitude for b in bounds]) for name in ("least", "reference", "most"))
 
 figure, axes = plt.subplots(layout="constrained")
 axes.fill_between(omegas, least, most, alpha=0.3, label="over all forces that the guide may hold")
@@ -63,5 +61,5 @@ for i, omega in enumerate(omegas):
     for found, exact in ((least[i], below.argmin()), (most[i], below.argmax())):
         ends = exact in (0, limits.size - 1)
         assert abs(found / below[exact] - 1.0) < (1e-9 if ends else 3e-4)
-print(f"resonance between {least.max():.4f} and {most.max():.4f} m, with the guide unstretched {own.max():.4f} m")  # fmt: skip
+print(f"resonance between {least.max():.4f} and {most.max():.4f} m, with the guide unstretched {own.max():.4f} m")
 assert most.max() > 9.0 * least.max()

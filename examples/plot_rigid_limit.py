@@ -16,9 +16,7 @@ import numpy as np
 import stickslip as ss
 
 omega, exact = 1.5, 26.786093
-structure = ss.model.lumped(
-    np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
-)
+structure = ss.model.lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]]))
 load = ss.HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
 linear = ss.harmonic.condense(structure, retained=np.array([1]), load=load)
 gap = np.zeros((3, 2))  # rows t, w, n; columns the two masses
@@ -64,9 +62,7 @@ figure, axes = plt.subplots(layout="constrained")
 axes.semilogx(penalties, same / exact - 1.0, "o-", label=f"{2 * order + 1} samples")
 axes.semilogx(moderate, more / exact - 1.0, "s-", label=f"{64 * order} samples")
 axes.axhline(0.0, color="0.6", linewidth=0.8)
-axes.set(
-    xlabel=r"penalty $\varepsilon$ of the method, N/m", ylabel="relative error of the amplitude"
-)
+axes.set(xlabel=r"penalty $\varepsilon$ of the method, N/m", ylabel="relative error of the amplitude")
 axes.legend()
 
 # %%
@@ -80,17 +76,13 @@ stiffnesses = np.logspace(0, 6, 25)
 differences, start = [], limit
 for k in stiffnesses:
     interface = ss.Interface(("rub",), (rigid.softened(k),), gap)
-    start = amplitude(
-        ss.harmonic.harmonic_balance(linear, interface, order, samples, "events"), start
-    )
+    start = amplitude(ss.harmonic.harmonic_balance(linear, interface, order, samples, "events"), start)
     differences.append(abs(abs(start) / exact - 1.0))
 
 figure, axes = plt.subplots(layout="constrained")
 axes.loglog(stiffnesses, differences, "o-", label=f"penalty law, H = {order}")
-axes.loglog(
-    stiffnesses, differences[0] * (stiffnesses / stiffnesses[0]) ** -0.5, ":", label="$k^{-1/2}$"
-)
+axes.loglog(stiffnesses, differences[0] * (stiffnesses / stiffnesses[0]) ** -0.5, ":", label="$k^{-1/2}$")
 axes.axhline(abs(abs(limit) / exact - 1.0), color="C1", label=f"rigid contact, H = {order}")
-axes.set(xlabel="tangential stiffness $k$ of the contact, N/m", ylabel="relative error of the amplitude")  # fmt: skip
+axes.set(xlabel="tangential stiffness $k$ of the contact, N/m", ylabel="relative error of the amplitude")
 axes.legend()
 plt.show()

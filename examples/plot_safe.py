@@ -38,29 +38,15 @@ for near in found.resonances:
 
 figure, axes = plt.subplots(layout="constrained")
 for family in range(3):
-    axes.plot(
-        map_.nodal_diameters, map_.frequencies_hz[:, family], "o-", label=f"family {family + 1}"
-    )
+    axes.plot(map_.nodal_diameters, map_.frequencies_hz[:, family], "o-", label=f"family {family + 1}")
 diameters, lowest = found.speed_line(low)
 _, highest = found.speed_line(high)
 axes.fill_between(diameters, lowest, highest, color="0.85", label="1650 to 1780 rpm")
 for number, near in enumerate(found.resonances):
     label = "resonance" if number == 0 else None
-    axes.plot(
-        near.nodal_diameter,
-        near.frequency_hz,
-        "s",
-        color="black",
-        fillstyle="none",
-        markersize=11,
-        label=label,
-    )
+    axes.plot(near.nodal_diameter, near.frequency_hz, "s", color="black", fillstyle="none", markersize=11, label=label)
 axes.set(
-    xlabel="nodal diameters",
-    ylabel="frequency, Hz",
-    title="SAFE diagram of a blisk",
-    xticks=range(13),
-    ylim=(0, 900),
+    xlabel="nodal diameters", ylabel="frequency, Hz", title="SAFE diagram of a blisk", xticks=range(13), ylim=(0, 900)
 )
 axes.legend()
 plt.show()

@@ -17,9 +17,7 @@ import stickslip as ss
 # A blade of 0.1 kg, tuned to 50 Hz, and a damper of constant pressure: no normal stiffness, a preload of 20 N,
 # friction 0.3.
 
-blade = ss.model.lumped(
-    np.array([0.1]), np.array([[1e4]]), damping=np.array([[0.2]]), names=("blade",)
-)
+blade = ss.model.lumped(np.array([0.1]), np.array([[1e4]]), damping=np.array([[0.2]]), names=("blade",))
 law = ss.ElasticCoulomb(k_t=5e3, k_w=0.0, k_n=0.0, mu=0.3, preload=20.0)
 damper = ss.Interface(("damper",), (law,), np.array([[1.0], [0.0], [0.0]]))  # gaps t, w, n
 system = ss.System(blade, damper, outputs=blade.sets["blade"])
@@ -50,9 +48,7 @@ start = ss.response.start_from_harmonics(motion, peak.omega, damper.gap_operator
 
 def shot(load, omega, start=None):
     """Shoot with the blade and its damper."""
-    return ss.response.shoot(
-        system.structure, damper.gap_operator, damper.laws, load, omega, system.outputs, start
-    )
+    return ss.response.shoot(system.structure, damper.gap_operator, damper.laws, load, omega, system.outputs, start)
 
 
 found = shot(load, peak.omega, start)
@@ -78,9 +74,7 @@ for force in forces:
 figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained", figsize=(6.4, 6.4))
 above.semilogx(forces, np.array(amplitudes) / forces * 1e3, "o-", ms=3)
 above.set(ylabel="amplitude over force, mm/N", title=f"{peak.omega:.1f} rad/s")
-largest = np.array(sizes).T[
-    :3
-]  # the fourth is that of the direction across, which has no stiffness: 0
+largest = np.array(sizes).T[:3]  # the fourth is that of the direction across, which has no stiffness: 0
 for column, name in zip(largest, ("largest", "second", "third"), strict=True):
     below.semilogx(forces, column, "o-", ms=3, label=name)
 below.axhline(1.0, color="0.6", lw=0.8)

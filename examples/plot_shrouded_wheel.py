@@ -68,9 +68,7 @@ for newton in (0.02, 0.2, 1.0, 2.5):
     model = wheel(newton)
     result = model.forced_response(hz=(200, 330), points=20, stability="off")
     table = result.to_dataframe().query("output == 'tip.y'").sort_values("frequency_hz")
-    axis.semilogy(
-        table.frequency_hz, 1e6 * table.amplitude / newton, ".-", label=f"{newton:g} N on each"
-    )
+    axis.semilogy(table.frequency_hz, 1e6 * table.amplitude / newton, ".-", label=f"{newton:g} N on each")
     peaks.append((newton, result.peaks["frequency (Hz)"][0], table.amplitude.max() / newton))
     print("{:g} N: {:.1f} Hz, {:.3g} m/N".format(*peaks[-1]))
 axis.axvline(stuck, color="0.6", linestyle="--", zorder=0)

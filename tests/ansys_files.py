@@ -20,9 +20,7 @@ def record(numbers, *, packed=""):
     else:
         content = numbers.astype(kind).tobytes()
     length = len(content) // 4
-    return (
-        np.array([length, flags], "<u4").tobytes() + content + np.array([length], "<u4").tobytes()
-    )
+    return np.array([length, flags], "<u4").tobytes() + content + np.array([length], "<u4").tobytes()
 
 
 def windows(numbers):
@@ -47,9 +45,7 @@ def windows(numbers):
     return head + b"".join(place + values for place, values in pieces)
 
 
-def full_file(
-    mass, stiffness, nodes, *, held=(), damping=None, kinds=(1, 2, 3), header=None, packed=""
-):
+def full_file(mass, stiffness, nodes, *, held=(), damping=None, kinds=(1, 2, 3), header=None, packed=""):
     """Return the bytes of a ``.full`` file.
 
     Matrices are dense (n, n), equations node by node; `held` equations have a negative flag; `header` overrides items.
@@ -110,10 +106,7 @@ def result_file(frequencies, shapes, nodes, *, angles=None, harmonic=None, secto
     geometry = np.zeros(80, dtype=np.int64)
     geometry[3] = n
     geometry[26] = words + len(body) // 4 + len(record(geometry)) // 4
-    located = [
-        record(np.array([m, *p, *a], dtype=float))
-        for (m, p), a in zip(nodes.items(), angles, strict=True)
-    ]
+    located = [record(np.array([m, *p, *a], dtype=float)) for (m, p), a in zip(nodes.items(), angles, strict=True)]
     place(15, record(geometry) + b"".join(located))
     place(11, record(np.array([*frequencies, *[0.0] * (room - k)])))
     if harmonic is not None:

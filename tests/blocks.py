@@ -31,31 +31,21 @@ class Block:
 
 def block(x, y, z, element="hex"):
     """Mesh the box with grid lines `x`, `y`, `z` by linear hexahedra or tetrahedra."""
-    kind, shape = (
-        (skfem.MeshHex, skfem.ElementHex1)
-        if element == "hex"
-        else (skfem.MeshTet, skfem.ElementTetP1)
-    )
+    kind, shape = (skfem.MeshHex, skfem.ElementHex1) if element == "hex" else (skfem.MeshTet, skfem.ElementTetP1)
     mesh = kind.init_tensor(np.asarray(x), np.asarray(y), np.asarray(z))
     vector = skfem.ElementVector(shape())
     basis = skfem.Basis(mesh, vector, intorder=3)
     order = basis.nodal_dofs.T.ravel()  # their dofs, node by node
     stiffness = linear_elasticity(*lame_parameters(YOUNG, POISSON)).assemble(basis)
-    mass = skfem.BilinearForm(
-        lambda u, v, _: DENSITY * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
-    ).assemble(basis)
+    mass = skfem.BilinearForm(lambda u, v, _: DENSITY * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2])).assemble(basis)
     top = mesh.facets_satisfying(lambda p: np.abs(p[2] - z[-1]) < 1e-12)
-    push = skfem.LinearForm(lambda v, _: -v[2]).assemble(
-        skfem.FacetBasis(mesh, vector, facets=top, intorder=3)
-    )
+    push = skfem.LinearForm(lambda v, _: -v[2]).assemble(skfem.FacetBasis(mesh, vector, facets=top, intorder=3))
     points = mesh.p.T.copy()
     facets = {}
     for name, height, sign in (("bottom", z[0], -1.0), ("top", z[-1], 1.0)):
         found = mesh.facets_satisfying(lambda p, height=height: np.abs(p[2] - height) < 1e-12)
         facets[name] = outward(points, mesh.facets[:, found].T, np.array([0.0, 0.0, sign]))
-    stiffness, mass = (
-        scipy.sparse.csr_array(m.tocsr()[order][:, order]) for m in (stiffness, mass)
-    )
+    stiffness, mass = (scipy.sparse.csr_array(m.tocsr()[order][:, order]) for m in (stiffness, mass))
     return Block(points, mass, stiffness, facets, push[order])
 
 
@@ -91,9 +81,7 @@ def stacked(lower, upper):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    displacement: (
-        np.ndarray
-    )  # largest difference from uniform compression over the largest displacement
+    displacement: np.ndarray  # largest difference from uniform compression over the largest displacement
     pressure: np.ndarray  # at the points of the pairing, over the applied one
 
 
@@ -123,9 +111,7 @@ def patch_test(lower, upper, pairing, per_area=4e13):
 
 def plane(x, y, height=0.0, up=True, kind="quad", offset=0, n=None):
     """Return a plane surface on grid lines: ``tri`` or ``quad``, linear, or ``tri6`` or ``quad8``."""
-    return patch(
-        lambda u, v: np.column_stack([u, v, np.full(u.shape, height)]), x, y, up, kind, offset, n
-    )
+    return patch(lambda u, v: np.column_stack([u, v, np.full(u.shape, height)]), x, y, up, kind, offset, n)
 
 
 def patch(shape, x, y, up=True, kind="quad", offset=0, n=None) -> Surface:

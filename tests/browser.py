@@ -11,14 +11,19 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
-CHROMIUM = (
-    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-)
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
 PATIENCE = 120.0  # s for an answer
 
 
@@ -35,7 +40,7 @@ class Browser:
             os.dup2(13, 3)
             os.dup2(14, 4)
 
-        command = [str(CHROMIUM), *FLAGS, "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]  # fmt: skip
+        command = [str(CHROMIUM), *FLAGS, "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]
         self._process = subprocess.Popen(
             command,
             preexec_fn=lines,  # noqa: PLW1509  no threads here
@@ -59,10 +64,7 @@ class Browser:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._session = ""
         with suppress(OSError, TimeoutError):
@@ -87,18 +89,18 @@ class Browser:
     def open(self, page: Path) -> None:
         """Open a page and wait until it is drawn."""
         self.call("Page.navigate", url=page.as_uri())
-        self.run("new Promise(done => document.readyState === 'complete' ? done() : addEventListener('load', () => done()))")  # fmt: skip
+        self.run(
+            "new Promise(done => document.readyState === 'complete' ? done() : addEventListener('load', () => done()))"
+        )
         self.settle()
 
     def settle(self) -> None:
         """Wait for two frames."""
-        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done())))")  # fmt: skip
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
 
     def run(self, script: str) -> Any:
         """Return the value of an expression in the page."""
-        found = self.call(
-            "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True
-        )
+        found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
@@ -113,9 +115,7 @@ class Browser:
 
     def width(self, pixels: int, height: int = 900) -> None:
         """Make the window as wide."""
-        self.call(
-            "Emulation.setDeviceMetricsOverride", width=pixels, height=height, deviceScaleFactor=1, mobile=False
-        )  # fmt: skip
+        self.call("Emulation.setDeviceMetricsOverride", width=pixels, height=height, deviceScaleFactor=1, mobile=False)
         self.settle()
 
     def scheme(self, name: str) -> None:

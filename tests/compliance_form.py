@@ -82,9 +82,7 @@ class ComplianceForm:
     def _compliant(self, condensed: Condensed, columns: FloatArray) -> FloatArray:
         """Return the columns (size, k) multiplied by the compliance of each harmonic."""
         rows = columns.reshape(2 * self.order + 1, -1, columns.shape[1])
-        return to_real(np.linalg.solve(condensed.stiffness, to_complex(rows))).reshape(
-            columns.shape
-        )
+        return to_real(np.linalg.solve(condensed.stiffness, to_complex(rows))).reshape(columns.shape)
 
     def _check(self, condensed: Condensed, omega: float) -> None:
         diagonal = np.abs(np.diagonal(condensed.stiffness, axis1=1, axis2=2)).max(axis=0)

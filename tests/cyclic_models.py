@@ -31,9 +31,7 @@ def random_sector(sectors, seed=0, *, faces=2, inner=2, hub=0, axis=Z, free=Fals
     """
     rng = np.random.default_rng(seed)
     pitch = 2 * np.pi / sectors
-    first = Axis().turned(
-        np.column_stack([1 + rng.random(faces), np.zeros(faces), rng.random(faces)]), -pitch / 2
-    )
+    first = Axis().turned(np.column_stack([1 + rng.random(faces), np.zeros(faces), rng.random(faces)]), -pitch / 2)
     middle = np.column_stack([1 + rng.random(inner), np.zeros(inner), 2 + rng.random(inner)])
     centre = np.column_stack([np.zeros((hub, 2)), 3 + rng.random(hub)])
     points = np.vstack([first, Axis().turned(first, pitch), middle, centre])
@@ -107,9 +105,7 @@ def wedge(sectors, *, cells=(2, 2, 1), inner=0.5, outer=1.0, height=0.1, start=N
     return SolidMesh(points.reshape(-1, 3), np.array(tets), sets)
 
 
-def unlike_wedge(
-    sectors, low, high, *, inner=0.5, outer=1.0, height=0.2, seed=0, clamp=False, around=2
-):
+def unlike_wedge(sectors, low, high, *, inner=0.5, outer=1.0, height=0.2, seed=0, clamp=False, around=2):
     """One sector of a ring as quadratic tetrahedra, its cut faces meshed with `low` and `high` cells along radius and axis."""
     rng = np.random.default_rng(seed)
     layers = []
@@ -127,9 +123,7 @@ def unlike_wedge(
     tets[volume < 0] = tets[volume < 0][:, [1, 0, 2, 3]]
     tets = tets[np.abs(volume) > 1e-6]  # the others lie flat in a face
     edges = np.array([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)])
-    ends, which = np.unique(
-        np.sort(tets[:, edges].reshape(-1, 2), axis=1), axis=0, return_inverse=True
-    )
+    ends, which = np.unique(np.sort(tets[:, edges].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     cells = np.hstack([tets, len(at) + which.reshape(-1, 6)])
     at = np.vstack([at, at[ends].mean(axis=1)])
     radius = inner + (outer - inner) * at[:, 0]

@@ -53,17 +53,11 @@ class Ended:
 
 
 def command(
-    words: list[str],
-    *,
-    after: float = PATIENCE,
-    group: bool = True,
-    limit: Callable[[], None] | None = None,
+    words: list[str], *, after: float = PATIENCE, group: bool = True, limit: Callable[[], None] | None = None
 ) -> Ended:
     """Run a command in a fork of this process, which has loaded everything; kill it after some seconds."""
     began = time.perf_counter()
-    ours, theirs = (
-        os.pipe()
-    )  # a file would have the limits of the command; 64 kB are more than any says
+    ours, theirs = os.pipe()  # a file would have the limits of the command; 64 kB are more than any says
     pid = os.fork()
     if pid == 0:
         _be(words, theirs, limit)
@@ -199,11 +193,7 @@ def kills(trial: Trial, count: int) -> None:
     while counted.total() < count:
         turn += 1
         # a run goes on until it is whole; each time another one is stopped
-        words = (
-            ["run", study, *runs[turn % len(runs)]]
-            if trial.rng.random() < 0.75
-            else rest[turn % len(rest)]
-        )
+        words = ["run", study, *runs[turn % len(runs)]] if trial.rng.random() < 0.75 else rest[turn % len(rest)]
         if "--workers" in words and trial.rng.random() < 0.5:
             words = [*words, "--fresh"]
         fresh = words == ["new"]
@@ -259,9 +249,7 @@ def limited(trial: Trial, count: int, what: int, sizes: list[int]) -> None:
             resource.setrlimit(what, (base + size, base + size))
             keep.NEEDED_BYTES = 0
 
-        words = [["run", study, "--fresh"], ["run", study], ["report", results], ["check", study]][
-            k % 4
-        ]
+        words = [["run", study, "--fresh"], ["run", study], ["report", results], ["check", study]][k % 4]
         ended = command(words, limit=limit)
         counted[ended.code] += 1
         name = f"{words[0]} with {size} bytes"
@@ -283,9 +271,7 @@ def main(how: str, folder: Path, seed: int, count: int) -> None:
     if how == "kills":
         kills(trial, count)
     elif how == "disk":
-        limited(
-            trial, count, resource.RLIMIT_FSIZE, [0, 500, 5000, 20_000, 100_000, 400_000, 2_000_000]
-        )
+        limited(trial, count, resource.RLIMIT_FSIZE, [0, 500, 5000, 20_000, 100_000, 400_000, 2_000_000])
     else:
         limited(trial, count, resource.RLIMIT_AS, [0, 10**6, 10**7, 3 * 10**7, 10**8])
     print(f"{count} {how}, {len(trial.wrong)} failures", flush=True)

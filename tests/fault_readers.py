@@ -35,9 +35,25 @@ DATA = Path(__file__).parent / "data" / "calculix"
 SECONDS = 20  # for a file that is read in milliseconds: the machine may be busy
 MEMORY = 1_500_000_000  # bytes beside what is loaded
 TEXTS = (
-    b"", b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"99999999999999999999", b"2147483648", b"1,5", b"*", b",",
-    b"\n", b"\xff\xfe", b"\x1b[31m", b"x" * 300, b"9" * 5000,
-)  # fmt: skip
+    b"",
+    b"0",
+    b"-1",
+    b"1e308",
+    b"-1e308",
+    b"1e-320",
+    b"nan",
+    b"inf",
+    b"99999999999999999999",
+    b"2147483648",
+    b"1,5",
+    b"*",
+    b",",
+    b"\n",
+    b"\xff\xfe",
+    b"\x1b[31m",
+    b"x" * 300,
+    b"9" * 5000,
+)
 NUMBERS = (0, 1, -1, 2**31 - 1, -(2**31), 2**24, 1000)
 
 

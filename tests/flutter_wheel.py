@@ -20,10 +20,7 @@ ROOT, MOVED = 1, 3  # root mass of a blade; coordinate of the tip in the wheel
 HOLD = 1e3  # N/m of the ring to the ground
 REFERENCE = 2.0 * np.pi * 620.0  # rad/s
 MODE = 3  # root against tip, near 620 Hz in all waves
-PATTERN = (
-    1.372,
-    -1.155,
-)  # of the force on root and tip: none of it along the first mode of a blade
+PATTERN = (1.372, -1.155)  # of the force on root and tip: none of it along the first mode of a blade
 
 
 def influence(own: float, near: float, far: float) -> InfluenceCoefficients:
@@ -48,13 +45,13 @@ def flutter_wheel(
     own[0, [DISK, RING]] = 1.0, -1.0
     wheel, operator = tuned_wheel(
         sector, wave, harmonics, (own, None), keep=sector.independent, reduce=_damped, waves=range(SECTORS)
-    )  # fmt: skip
+    )
     pattern = np.zeros(sector.structure.n)
     pattern[[ROOT, TIP]] = PATTERN
     feedback = {
         k: Feedback(np.asarray(s.project(pattern))[:, None], 2 * np.pi * k / SECTORS, fluid, REFERENCE)
         for k, s in wheel.waves.items()
-    }  # fmt: skip
+    }
     wheel = wheel.with_aerodynamics(feedback)
     contacts = Interface(("ring",), (Jenkins(k_t=2e7, limit=4.0),), operator)
     load = HarmonicLoad(np.zeros(wheel.n))

@@ -10,10 +10,7 @@ BLADES = 6
 MASSES = 1.0, 0.3  # disk and blade
 SPRINGS = 0.6, 0.5, 1.0  # disk to ground, to the next disk, to the blade
 LOSS = 2e-3  # of a blade's damping to its stiffness
-RATES = (
-    0.9,
-    0.35,
-)  # the fluid of a passage relaxes, and is fed by the passage behind it (lower number)
+RATES = (0.9, 0.35)  # the fluid of a passage relaxes, and is fed by the passage behind it (lower number)
 STRENGTH = 4e-3
 BLADE = 1  # second coordinate of a sector
 
@@ -93,8 +90,6 @@ def modes_of_wave(wave_number, strength=STRENGTH):
     for value, vector in zip(values, vectors.T, strict=True):
         u = vector[: 2 * BLADES].reshape(BLADES, 2)
         part = phases.conj() @ u / BLADES
-        if value.imag > 1e-6 and np.linalg.norm(np.outer(phases, part) - u) < 1e-6 * np.linalg.norm(
-            u
-        ):
+        if value.imag > 1e-6 and np.linalg.norm(np.outer(phases, part) - u) < 1e-6 * np.linalg.norm(u):
             found.append(value)
     return np.array(sorted(found, key=lambda v: v.imag))

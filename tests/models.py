@@ -31,9 +31,7 @@ class Twin:
     force: FloatArray  # (3, samples)
     state: FloatArray  # (2, samples) of the second period
     history: FloatArray  # (2, 2 samples): state times sign of slip, both periods
-    margin: (
-        FloatArray  # (2, samples) distance of the tangential force from the limit, second period
-    )
+    margin: FloatArray  # (2, samples) distance of the tangential force from the limit, second period
 
 
 def twin(gap: FloatArray, law: ElasticCoulomb) -> Twin:
@@ -100,9 +98,7 @@ def lifting() -> tuple[System, HarmonicLoad]:
     one = np.ones((1, 1))
     structure = Structure(one, 0.02 * one, one.copy(), table(("x",)))
     law = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=1.0, mu=0.0, preload=1.0)
-    system = System(
-        structure, Interface(("n",), (law,), np.array([[0.0], [0.0], [1.0]])), np.array([0])
-    )
+    system = System(structure, Interface(("n",), (law,), np.array([[0.0], [0.0], [1.0]])), np.array([0]))
     return system, HarmonicLoad(np.zeros(1), {1: np.array([0.05 + 0j])})
 
 
@@ -116,26 +112,18 @@ def free_body_3d(seed: int = 0, preload: float = 30.0) -> tuple[System, Harmonic
     stiffness[:6, :6] = 1e5 * (grounded @ grounded.T / 6 + 2 * np.eye(6))
     damping = 1e-4 * stiffness + np.diag([3.0] * 6 + [0.0] * 6)
     gap = np.zeros((6, n))
-    for contact, (arm, blade) in enumerate(
-        ((np.array([0.2, -0.1, 0.3]), 0), (np.array([-0.3, 0.2, 0.1]), 3))
-    ):
+    for contact, (arm, blade) in enumerate(((np.array([0.2, -0.1, 0.3]), 0), (np.array([-0.3, 0.2, 0.1]), 3))):
         frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
         cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
         rows = slice(3 * contact, 3 * contact + 3)
         gap[rows, blade : blade + 3] = frame.T
         gap[rows, 6:9] = -frame.T
         gap[rows, 9:12] = frame.T @ cross
-    laws = tuple(
-        ElasticCoulomb(k_t=2e5, k_w=1e5, k_n=3e5, mu=0.4, preload=p)
-        for p in (preload, 0.5 * preload)
-    )
+    laws = tuple(ElasticCoulomb(k_t=2e5, k_w=1e5, k_n=3e5, mu=0.4, preload=p) for p in (preload, 0.5 * preload))
     names = tuple(f"b{i}.{c}" for i in (1, 2) for c in "xyz")
     dofs = table((*names, "x", "y", "z", "rx", "ry", "rz"))
     system = System(
-        Structure(mass, damping, stiffness, dofs),
-        Interface(("1", "2"), laws, gap),
-        np.arange(6),
-        free=np.arange(6, 12),
+        Structure(mass, damping, stiffness, dofs), Interface(("1", "2"), laws, gap), np.arange(6), free=np.arange(6, 12)
     )
     shake = np.zeros(n, dtype=complex)
     shake[:6] = 10.0 * (rng.standard_normal(6) + 1j * rng.standard_normal(6))
@@ -146,18 +134,14 @@ def free_body_3d(seed: int = 0, preload: float = 30.0) -> tuple[System, Harmonic
 
 
 def balance_of(system, load, order=3, samples=SAMPLES):
-    return harmonic_balance(
-        condense(system.structure, system.retained, load), system.interface, order, samples
-    )
+    return harmonic_balance(condense(system.structure, system.retained, load), system.interface, order, samples)
 
 
 def solved(system, load, omega, order=3, samples=SAMPLES, start=None):
     balance = balance_of(system, load, order, samples)
     if start is None:
         start = bonded(system, load, omega, balance)
-    solution = newton(
-        lambda v: balance.linearise(v, omega), balance.unknowns(start), Newton(max_iterations=60)
-    )
+    solution = newton(lambda v: balance.linearise(v, omega), balance.unknowns(start), Newton(max_iterations=60))
     assert solution.status.converged, solution.status
     return balance, solution
 
@@ -171,9 +155,5 @@ def bonded(system, load, omega, balance):
     q = []
     for h in range(balance.order + 1):
         w = h * omega
-        q.append(
-            np.linalg.solve(
-                structure.stiffness + 1j * w * structure.damping - w**2 * structure.mass, f[h]
-            )
-        )
+        q.append(np.linalg.solve(structure.stiffness + 1j * w * structure.damping - w**2 * structure.mass, f[h]))
     return np.array(q)[:, system.retained]

@@ -29,9 +29,7 @@ def unknowns_bound(x: FloatArray, *ends: Evaluation) -> float:
 
 
 def _worth(name: str, bound: float, size: float) -> float:
-    assert bound < WORTH * size, (
-        f"{name}: a bound of {bound / size:.2g} of the largest says nothing"
-    )
+    assert bound < WORTH * size, f"{name}: a bound of {bound / size:.2g} of the largest says nothing"
     return bound
 
 
@@ -91,7 +89,5 @@ def allowed(name: str, *answers: Answer) -> float:
     """Return how far apart the `outputs`, `gaps` or `forces` of answers to one question may lie."""
     bound = sum(answer.off[name] for answer in answers)
     size = max(float(np.abs(getattr(answer, name)).max()) for answer in answers)
-    assert bound < WORTH * size, (
-        f"{name}: a bound of {bound / size:.2g} of the largest says nothing"
-    )
+    assert bound < WORTH * size, f"{name}: a bound of {bound / size:.2g} of the largest says nothing"
     return bound

@@ -157,9 +157,13 @@ def write_example_deck(folder: Path, changes: Mapping[str, str] | None = None) -
 def write_sector_deck(path: Path) -> None:
     """Write a deck of one of eight sectors; nodes of its low shroud face are no partners of those of the high one."""
     geometry = BladedSector(
-        sectors=8, disk_size=0.05, platform_size=0.012, airfoil_size=0.04,
-        platform=None, shroud=Shroud(face_angle=math.radians(-20)),
-    )  # fmt: skip
+        sectors=8,
+        disk_size=0.05,
+        platform_size=0.012,
+        airfoil_size=0.04,
+        platform=None,
+        shroud=Shroud(face_angle=math.radians(-20)),
+    )
     mesh = shifted(mesh_sector(geometry), "shroud_low")
     run = CalculixRun(n_modes=2)
     write_deck(mesh, Material(), path, sectors=geometry.sectors, run=run)
@@ -206,9 +210,7 @@ def _set(text: str, key: str, value: str) -> str:
         at = next(i for i, line in enumerate(lines) if line.split("#")[0].strip() == f"[{head}]")
         end = next((i for i in range(at + 1, len(lines)) if lines[i].startswith("[")), len(lines))
         found = [i for i in range(at + 1, end) if lines[i].split("=")[0].strip() == rest]
-        lines[found[0] if found else at + 1 : found[0] + 1 if found else at + 1] = [
-            f"{rest} = {value}"
-        ]
+        lines[found[0] if found else at + 1 : found[0] + 1 if found else at + 1] = [f"{rest} = {value}"]
         return "\n".join(lines) + "\n"
     if len(names) == 1:
         found = [i for i, line in enumerate(lines) if line.split("=")[0].strip() == key]

@@ -48,18 +48,11 @@ def box(width, size, divisions, bend=0.0):
     steps = 2 * np.array(divisions) + 1
     starts = 2 * np.array(list(itertools.product(*(range(d) for d in divisions))))
     cells = (starts[:, None, None] + places(width)).reshape(-1, width, 3)
-    used, cells = np.unique(
-        np.ravel_multi_index(tuple(cells.transpose(2, 0, 1)), tuple(steps)), return_inverse=True
-    )
+    used, cells = np.unique(np.ravel_multi_index(tuple(cells.transpose(2, 0, 1)), tuple(steps)), return_inverse=True)
     grid = np.stack(np.unravel_index(used, tuple(steps)), axis=1)
     points = grid * np.array(size) / (steps - 1)
-    wave = np.sin(2 * points[:, [1, 2, 0]] / np.max(size)) + np.cos(
-        3 * points[:, [2, 0, 1]] / np.max(size)
-    )
-    sets = {
-        "root": np.flatnonzero(grid[:, 0] == 0),
-        "tip": np.flatnonzero(grid[:, 0] == steps[0] - 1),
-    }
+    wave = np.sin(2 * points[:, [1, 2, 0]] / np.max(size)) + np.cos(3 * points[:, [2, 0, 1]] / np.max(size))
+    sets = {"root": np.flatnonzero(grid[:, 0] == 0), "tip": np.flatnonzero(grid[:, 0] == steps[0] - 1)}
     return SolidMesh(points + bend * wave, cells.reshape(-1, width), sets)
 
 
@@ -111,10 +104,7 @@ def gauss(width):
         if width in (8, 20):
             yield np.array([a, b, c]), weight
         else:  # Duffy's map of the cube on the tetrahedron
-            yield (
-                np.array([a, b * (1 - a), c * (1 - a) * (1 - b)]),
-                weight * (1 - a) ** 2 * (1 - b),
-            )
+            yield (np.array([a, b * (1 - a), c * (1 - a) * (1 - b)]), weight * (1 - a) ** 2 * (1 - b))
 
 
 def reference(width):

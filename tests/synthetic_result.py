@@ -102,18 +102,14 @@ def parts(values: np.ndarray) -> FloatArray:
     return np.stack([values.real, values.imag], axis=-1)
 
 
-def box(
-    lower: Sequence[float], upper: Sequence[float], n: Sequence[int]
-) -> tuple[FloatArray, IntArray]:
+def box(lower: Sequence[float], upper: Sequence[float], n: Sequence[int]) -> tuple[FloatArray, IntArray]:
     """Triangulated surface of a box."""
     points, faces, start = [], [], 0
     for axis in range(3):
         u, v = [a for a in range(3) if a != axis]
         for end in (lower[axis], upper[axis]):
             grid = np.meshgrid(
-                np.linspace(lower[u], upper[u], n[u] + 1),
-                np.linspace(lower[v], upper[v], n[v] + 1),
-                indexing="ij",
+                np.linspace(lower[u], upper[u], n[u] + 1), np.linspace(lower[v], upper[v], n[v] + 1), indexing="ij"
             )
             patch = np.empty((grid[0].size, 3))
             patch[:, axis], patch[:, u], patch[:, v] = end, grid[0].ravel(), grid[1].ravel()
@@ -176,10 +172,15 @@ def branch(ratio: float, n: int, failed: int) -> dict[str, np.ndarray]:
     status = np.zeros(n + 3, dtype=np.int64)
     status[n // 2 : n // 2 + failed] = 1
     return {
-        "frequency_hz": hz, "amplitude": amplitude, "amplitude_low": low, "order": order,
-        "predicted_error_percent": error, "real_error_percent": real, "refinement": refinement,
+        "frequency_hz": hz,
+        "amplitude": amplitude,
+        "amplitude_low": low,
+        "order": order,
+        "predicted_error_percent": error,
+        "real_error_percent": real,
+        "refinement": refinement,
         "status": status,
-    }  # fmt: skip
+    }
 
 
 def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
@@ -187,9 +188,7 @@ def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Varia
     return xr.Variable(tuple(dims.split()), np.asarray(values), attributes)
 
 
-def _case_variables(
-    table: dict[str, np.ndarray], ratios: FloatArray, peak: IntArray
-) -> dict[str, xr.Variable]:
+def _case_variables(table: dict[str, np.ndarray], ratios: FloatArray, peak: IntArray) -> dict[str, xr.Variable]:
     case, status, order = table["point_case"], table["status"], table["order"]
     cases = range(len(ratios))
 
@@ -199,9 +198,12 @@ def _case_variables(
     found = peak >= 0
     seconds = np.array(count(case >= 0)) * 0.004
     counts = {
-        "points": count(case >= 0), "points_low": count(order == 1), "points_high": count(order == HIGH),
-        "points_failed": count(status != 0), "newton_steps": count(case >= 0),
-    }  # fmt: skip
+        "points": count(case >= 0),
+        "points_low": count(order == 1),
+        "points_high": count(order == HIGH),
+        "points_failed": count(status != 0),
+        "newton_steps": count(case >= 0),
+    }
     peaks = {
         "peak_amplitude": ("m", np.where(found, table["amplitude"][peak], np.nan)),
         "peak_frequency_hz": ("Hz", np.where(found, table["frequency_hz"][peak], np.nan)),
@@ -237,11 +239,7 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
     share = np.array([1.0, 0.04, 0.7])
     output = np.zeros((n, HIGH + 1, len(OUTPUTS)), dtype=complex)
     output[:, 1] = amplitude[:, None] * share
-    units = {
-        "frequency_hz": "Hz",
-        "predicted_error_percent": "percent",
-        "real_error_percent": "percent",
-    }
+    units = {"frequency_hz": "Hz", "predicted_error_percent": "percent", "real_error_percent": "percent"}
     plain = (
         "point_case",
         "frequency_hz",
@@ -251,13 +249,8 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
         "real_error_percent",
         "refinement",
     )
-    result = {
-        k: _variable("point", table[k], units.get(k, "1"), k.replace("_", " ")) for k in plain
-    }
-    result["status"].attrs |= {
-        "flag_values": [0, 1, 2],
-        "flag_meanings": "converged max_iterations small_step",
-    }
+    result = {k: _variable("point", table[k], units.get(k, "1"), k.replace("_", " ")) for k in plain}
+    result["status"].attrs |= {"flag_values": [0, 1, 2], "flag_meanings": "converged max_iterations small_step"}
     return result | {
         "newton_iterations": _variable("point", np.full(n, 4), "1", "Newton iterations"),
         "seconds": _variable("point", np.full(n, 0.011), "s", "time of the point"),
@@ -271,12 +264,10 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
         "contact_force": _variable("point harmonic contact direction part", fourier(force), "N", "force"),
         "dissipated_energy": _variable("point contact", energy, "J", "energy lost in a cycle"),
         "harmonic_kept": _variable("point harmonic", np.arange(HIGH + 1) <= table["order"][:, None], "1", "kept"),
-    }  # fmt: skip
+    }
 
 
-def _peak_variables(
-    table: dict[str, np.ndarray], peak: IntArray, preload: FloatArray
-) -> dict[str, xr.Variable]:
+def _peak_variables(table: dict[str, np.ndarray], peak: IntArray, preload: FloatArray) -> dict[str, xr.Variable]:
     gap = contact_motion(table["amplitude"][peak])
     force, state = march(gap, preload)
     time = np.arange(SAMPLES) / SAMPLES / table["frequency_hz"][peak][:, None]
@@ -301,17 +292,17 @@ def _model_variables(preload: FloatArray) -> dict[str, xr.Variable]:
     stuck = np.array([171.2, 188.03, 540.8, 561.2, 988.7])
     slack = 1 + np.array([1e-6, 2e-6, 1e-5, 4e-5, 2e-4])
     modes = {
-        "frequency_full_hz": full, "frequency_reduced_hz": full * slack,
-        "frequency_stuck_full_hz": stuck, "frequency_stuck_reduced_hz": stuck * slack,
-    }  # fmt: skip
+        "frequency_full_hz": full,
+        "frequency_reduced_hz": full * slack,
+        "frequency_stuck_full_hz": stuck,
+        "frequency_stuck_reduced_hz": stuck * slack,
+    }
     result = {k: _variable("mode", v, "Hz", k.replace("_", " ")) for k, v in modes.items()}
     return result | {
         "contact_law": _variable("contact", ["elastic_coulomb"] * 9, "1", "law"),
         "contact_group": _variable("contact", ["flat"] * 6 + ["curved"] * 3, "1", "contact"),
         "static_gap": _variable("contact direction", static, "m", "gap of the static solve"),
-        "static_force": _variable(
-            "contact direction", static - [0, 0, 1] * preload[:, None], "N", "static force"
-        ),
+        "static_force": _variable("contact direction", static - [0, 0, 1] * preload[:, None], "N", "static force"),
         "contact_position": _variable("contact xyz", position, "m", "contact point"),
         "contact_frame": _variable("contact xyz direction", frame, "1", "contact frame"),
         "surface_point": _variable("surface_node xyz", points, "m", "skin of the blades"),
@@ -326,9 +317,7 @@ def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr
     balance = table["amplitude"][first + at]
     return {
         "verify_case": _variable("check", case, "1", "load case"),
-        "verify_frequency_hz": _variable(
-            "check", table["frequency_hz"][first + at], "Hz", "frequency"
-        ),
+        "verify_frequency_hz": _variable("check", table["frequency_hz"][first + at], "Hz", "frequency"),
         "verify_transient": _variable("check", 1.004 * balance, "m", "amplitude by integration"),
         "verify_balance": _variable("check", balance, "m", "amplitude by balance"),
         "verify_difference_percent": _variable("check", np.full(3, -0.4), "percent", "difference"),
@@ -339,21 +328,33 @@ def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr
 
 def _attributes() -> dict[str, object]:
     return {
-        "selection": "jacobian_alert", "alert_threshold_percent": 5.0, "low_order": 1, "high_order": HIGH,
-        "low_harmonics": [0, 1], "high_harmonics": list(range(HIGH + 1)), "selection_threshold": 0.05, "failed": 0,
-        "samples": SAMPLES, "report_output": "tip1.x", "error_over": "tip1.x",
+        "selection": "jacobian_alert",
+        "alert_threshold_percent": 5.0,
+        "low_order": 1,
+        "high_order": HIGH,
+        "low_harmonics": [0, 1],
+        "high_harmonics": list(range(HIGH + 1)),
+        "selection_threshold": 0.05,
+        "failed": 0,
+        "samples": SAMPLES,
+        "report_output": "tip1.x",
+        "error_over": "tip1.x",
         "alert_explanation": "One Newton step with harmonics 0 to 5 moves the outputs by more than 5 %.",
-    }  # fmt: skip
+    }
 
 
 def provenance(**more: object) -> dict[str, object]:
     """Return the attributes of the root."""
     study = 'schema_version = 2\n[damper]\nmass_kg = 0.02  # "flat" & <curved>\n'
     return {
-        "title": "Two blades, one damper <synthetic>", "stickslip_version": "0.1.0", "study_toml": study,
-        "versions": json.dumps({"numpy": "2.4", "scipy": "1.17"}), "created": "2026-01-01T00:00:00+00:00",
-        "wall_seconds": 12.3, "complete": 1,
-    } | more  # fmt: skip
+        "title": "Two blades, one damper <synthetic>",
+        "stickslip_version": "0.1.0",
+        "study_toml": study,
+        "versions": json.dumps({"numpy": "2.4", "scipy": "1.17"}),
+        "created": "2026-01-01T00:00:00+00:00",
+        "wall_seconds": 12.3,
+        "complete": 1,
+    } | more
 
 
 def labelled(data: xr.Dataset, key: str, values: Sequence[float]) -> xr.Dataset:
@@ -365,19 +366,14 @@ def labelled(data: xr.Dataset, key: str, values: Sequence[float]) -> xr.Dataset:
 
 
 def synthetic_result(
-    ratios: Sequence[float] = (200, 50, 20, 10, 5, 3.5, 2),
-    n: int = 46,
-    failed: int = 0,
-    verify: bool = True,
+    ratios: Sequence[float] = (200, 50, 20, 10, 5, 3.5, 2), n: int = 46, failed: int = 0, verify: bool = True
 ) -> xr.Dataset:
     """Build the node ``forced_response``; `failed` points in the middle of the last load case did not converge."""
     runs = [branch(r, n, failed if i == len(ratios) - 1 else 0) for i, r in enumerate(ratios)]
     table = {k: np.concatenate([run[k] for run in runs]) for k in runs[0]}
     table["point_case"] = np.repeat(np.arange(len(ratios)), [len(run["order"]) for run in runs])
     amplitude = np.where(table["status"] == 0, table["amplitude"], -1)
-    peak = np.array(
-        [np.argmax(np.where(table["point_case"] == i, amplitude, -2)) for i in range(len(ratios))]
-    )
+    peak = np.array([np.argmax(np.where(table["point_case"] == i, amplitude, -2)) for i in range(len(ratios))])
     preload = CENTRIFUGAL / np.array([8.0] * 3 + [16.0] * 3 + [6.0] * 3)
     preload *= np.tile([1.1, 1.0, 0.9], 3) / 3 * 2
     variables = _case_variables(table, np.array(ratios, dtype=float), peak)
@@ -386,10 +382,15 @@ def synthetic_result(
     if verify:
         variables |= _check_variables(table, len(ratios))
     coordinates = {
-        "output": list(OUTPUTS), "contact": list(CONTACTS), "retained": list(RETAINED),
-        "harmonic": np.arange(HIGH + 1), "direction": DIRECTIONS, "tangent": DIRECTIONS[:2],
-        "part": ["re", "im"], "xyz": ["x", "y", "z"],
-    }  # fmt: skip
+        "output": list(OUTPUTS),
+        "contact": list(CONTACTS),
+        "retained": list(RETAINED),
+        "harmonic": np.arange(HIGH + 1),
+        "direction": DIRECTIONS,
+        "tangent": DIRECTIONS[:2],
+        "part": ["re", "im"],
+        "xyz": ["x", "y", "z"],
+    }
     return labelled(xr.Dataset(variables, coords=coordinates, attrs=_attributes()), KEY, ratios)
 
 

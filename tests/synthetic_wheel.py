@@ -36,10 +36,20 @@ def waves(numbers: list[int]) -> dict[str, xr.Variable]:
 def facts(**more: object) -> dict[str, xr.Variable]:
     """Return what results of waves say of the model."""
     numbers = {
-        "sectors": SECTORS, "axis_direction": [0.0, 0.0, 1.0], "axis_origin_m": [0.0, 0.0, 0.0], "speed_rpm": 6000.0,
-        "rotation": "6000 rpm, consistent tangent", "contacts": "none", "mass_kg": 0.25, "centre_m": [0.15, 0.0, 0.0],
-        "box_low_m": [0.09, -0.08, 0.0], "box_high_m": [0.2, 0.08, 0.01], "dofs": 108, "nodes": 36, "elements": 50,
-    } | more  # fmt: skip
+        "sectors": SECTORS,
+        "axis_direction": [0.0, 0.0, 1.0],
+        "axis_origin_m": [0.0, 0.0, 0.0],
+        "speed_rpm": 6000.0,
+        "rotation": "6000 rpm, consistent tangent",
+        "contacts": "none",
+        "mass_kg": 0.25,
+        "centre_m": [0.15, 0.0, 0.0],
+        "box_low_m": [0.09, -0.08, 0.0],
+        "box_high_m": [0.2, 0.08, 0.01],
+        "dofs": 108,
+        "nodes": 36,
+        "elements": 50,
+    } | more
     return {k: variable("xyz" if isinstance(v, list) else "", v) for k, v in numbers.items()}
 
 
@@ -59,9 +69,7 @@ def modes_result() -> xr.Dataset:
     points, triangles = skin()
     k, mode = np.meshgrid(np.arange(SECTORS // 2 + 1), np.arange(MODES), indexing="ij")
     angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
-    lift = np.exp(1j * k[..., None] * angle) * np.cos(
-        np.pi * mode[..., None] * (radius - 0.1) / 0.1
-    )
+    lift = np.exp(1j * k[..., None] * angle) * np.cos(np.pi * mode[..., None] * (radius - 0.1) / 0.1)
     shape = np.zeros((*lift.shape, 3), dtype=complex)
     shape[..., 2] = lift
     hz = frequency(k, mode)
@@ -75,9 +83,7 @@ def modes_result() -> xr.Dataset:
             "seconds": variable("wave", np.ones(len(hz)), "s"),
             "reference_hz": variable("wave mode", reference, "Hz"),
             "difference": variable("wave mode", hz / reference - 1),
-            "shape": variable(
-                "wave mode skin_point xyz part", np.stack([shape.real, shape.imag], axis=-1)
-            ),
+            "shape": variable("wave mode skin_point xyz part", np.stack([shape.real, shape.imag], axis=-1)),
             "skin_point": variable("skin_point xyz", points, "m"),
             "skin_triangle": variable("face corner", triangles),
             "skin_cut": variable("face", np.zeros(len(triangles), dtype=int)),
@@ -97,9 +103,7 @@ def campbell_result() -> xr.Dataset:
                 continue
             for m in range(MODES):
                 # (order x)^2 = at rest^2 + slope x^2 with x = rpm / 60
-                x = frequency(np.array(number), np.array(m), 0.0) / np.sqrt(
-                    order**2 - (0.8 + 0.1 * m)
-                )
+                x = frequency(np.array(number), np.array(m), 0.0) / np.sqrt(order**2 - (0.8 + 0.1 * m))
                 if x * 60 <= rpm[-1]:
                     rows.append((w, m, order, x * 60, x * order))
     columns = list(zip(*rows, strict=True))

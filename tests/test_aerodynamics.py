@@ -60,17 +60,13 @@ def test_between_the_rows_of_the_table_and_outside_of_it():
     for omega in (85.0, 99.9, 100.0, 117.0):
         differences = (own.at(omega + step) - own.at(omega - step)) / (2 * step)
         np.testing.assert_allclose(own.slope(omega), differences, atol=1e-4)
-    with pytest.raises(
-        ss.InputError, match=r"12\.7324 to 20\.6901 Hz, asked for 23\.8732 Hz"
-    ) as told:
+    with pytest.raises(ss.InputError, match=r"12\.7324 to 20\.6901 Hz, asked for 23\.8732 Hz") as told:
         own.at(150.0)
     assert "nearest" in told.value.remedy
     held = replace(own, beyond="nearest")
     np.testing.assert_array_equal(held.at(150.0), held.at(130.0))
     assert not held.slope(150.0).any()
-    speeds = InfluenceCoefficients(
-        [0], np.array([1.0, 3.0 - 2j]).reshape(2, 1, 1, 1, 1), speeds=np.array([1.0, 2.0])
-    )
+    speeds = InfluenceCoefficients([0], np.array([1.0, 3.0 - 2j]).reshape(2, 1, 1, 1, 1), speeds=np.array([1.0, 2.0]))
     assert speeds.at_speed(1.25).at(7.0).item() == pytest.approx(1.5 - 0.5j)
     with pytest.raises(ss.InputError, match="turns at"):
         speeds.at_speed(3.0 * RPM)
@@ -125,12 +121,10 @@ def test_the_frozen_force_is_that_of_the_reference_and_its_wheel_is_real():
     n_modes = sector.independent.size - keep.size
     wheel = reduced_wheel(sector, keep, n_modes, feedback=feedback)
     assert not wheel.structure.is_complex
-    by_sector = np.sort_complex(
-        np.linalg.eigvals(np.linalg.solve(wheel.structure.mass, wheel.structure.stiffness))
-    )
+    by_sector = np.sort_complex(np.linalg.eigvals(np.linalg.solve(wheel.structure.mass, wheel.structure.stiffness)))
     by_wave = np.concatenate(
         [np.linalg.eigvals(np.linalg.solve(w.mass.toarray(), forces[k].frozen(w).stiffness)) for k, w in waves.items()]
-    )  # fmt: skip
+    )
     for value in by_wave:
         assert np.abs(by_sector - value).min() < 1e-9 * np.abs(by_wave).max()
 
@@ -142,9 +136,7 @@ def test_the_balance_takes_the_coefficients_at_the_frequency_of_each_harmonic():
     wheel = TunedWheel({k: waves[k] for k in (0, 2, 4, 1)}, SECTORS, order, high)
     wheel = wheel.with_aerodynamics({k: forces[k] for k in wheel.waves})
     n = wheel.n
-    load = ss.HarmonicLoad(
-        RNG.standard_normal(n), {1: RNG.standard_normal(n) + 1j * RNG.standard_normal(n)}
-    )
+    load = ss.HarmonicLoad(RNG.standard_normal(n), {1: RNG.standard_normal(n) + 1j * RNG.standard_normal(n)})
     retained = np.array([1, 4, 7])
     side = condense_side(wheel, retained, load, high)
     omega = 1.07
@@ -159,9 +151,7 @@ def test_the_balance_takes_the_coefficients_at_the_frequency_of_each_harmonic():
             D = force.frozen(own).stiffness.real
         rest = np.setdiff1d(np.arange(n), retained)
         a, b = np.ix_(retained, rest), np.ix_(rest, retained)
-        condensed = D[np.ix_(retained, retained)] - D[a] @ np.linalg.solve(
-            D[np.ix_(rest, rest)], D[b]
-        )
+        condensed = D[np.ix_(retained, retained)] - D[a] @ np.linalg.solve(D[np.ix_(rest, rest)], D[b])
         np.testing.assert_allclose(found.stiffness[h], condensed, atol=1e-11 * np.abs(D).max())
     step = 1e-5
     there, back = (side.condensed(omega + d, high) for d in (step, -step))
@@ -192,9 +182,7 @@ def lumped_wheel(influence, reference):
     M = np.diag([*fluid.MASSES, 0.0])
     dofs = ss.model.lumped(np.ones(3), np.eye(3)).dofs
     structure = ss.Structure(M, fluid.LOSS * K, K, dofs)
-    sector = ss.reduction.CyclicSector(
-        structure, fluid.BLADES, np.array([0]), np.array([2]), axis=None
-    )
+    sector = ss.reduction.CyclicSector(structure, fluid.BLADES, np.array([0]), np.array([2]), axis=None)
     gaps = np.zeros((3, 3))
     gaps[0, fluid.BLADE] = 1.0
     wheel, operator = tuned_wheel(sector, 1, 3, (gaps, None), relative=False)
@@ -211,20 +199,14 @@ def of_one_moved_blade(omega):
     """Coefficients as a user records them: blade 0 is moved, the force on blade p is that of the neighbour j = −p."""
     force = fluid.recorded_in_time(omega)
     j = -np.arange(fluid.BLADES)
-    return InfluenceCoefficients(
-        np.where(j < -fluid.BLADES // 2, j + fluid.BLADES, j), force.reshape(1, 1, -1, 1, 1)
-    )
+    return InfluenceCoefficients(np.where(j < -fluid.BLADES // 2, j + fluid.BLADES, j), force.reshape(1, 1, -1, 1, 1))
 
 
 def eigenvalue_near(structure, place):
     """Return the eigenvalue of a wave of disk and blade that is nearest to a place."""
-    M, C, K = (
-        np.asarray(m)[:2, :2] for m in (structure.mass, structure.damping, structure.stiffness)
-    )
+    M, C, K = (np.asarray(m)[:2, :2] for m in (structure.mass, structure.damping, structure.stiffness))
     inverse = np.linalg.inv(M)
-    values = np.linalg.eigvals(
-        np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]])
-    )
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]]))
     return values[np.argmin(np.abs(values - place))]
 
 
@@ -241,9 +223,7 @@ def test_each_wave_decays_as_on_the_whole_wheel_with_its_fluid(number):
     assert abs(exact.real - structural.real) > 1e-4
     # frozen at iω instead of at λ: second order in the force
     # frozen at iω instead of at λ, which the structure's damping alone moves by 5e-3
-    assert ours.real - structural.real == pytest.approx(
-        exact.real - structural.real, rel=0.02, abs=1e-5
-    )
+    assert ours.real - structural.real == pytest.approx(exact.real - structural.real, rel=0.02, abs=1e-5)
     assert ours.imag == pytest.approx(exact.imag, abs=2e-5)
 
 
@@ -258,9 +238,7 @@ def test_all_sectors_in_time_have_the_waves_of_both_directions():
     assert np.abs(s.stiffness - s.stiffness.T).max() > 1e-4
     inverse = np.linalg.inv(s.mass)
     zero, one = np.zeros_like(inverse), np.eye(len(inverse))
-    values = np.linalg.eigvals(
-        np.block([[zero, one], [-inverse @ s.stiffness, -inverse @ s.damping]])
-    )
+    values = np.linalg.eigvals(np.block([[zero, one], [-inverse @ s.stiffness, -inverse @ s.damping]]))
     blades = [fluid.modes_of_wave(k)[-1] for k in range(fluid.BLADES)]
     for exact in blades:
         near = values[np.argmin(np.abs(values - exact))]

@@ -20,14 +20,7 @@ from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
 HZ = 2 * np.pi
-STEPS = Sweep(
-    omega_range=(155 * HZ, 166 * HZ),
-    samples=64,
-    frequencies=8,
-    peak_points=0,
-    threshold=np.inf,
-    high=5,
-)
+STEPS = Sweep(omega_range=(155 * HZ, 166 * HZ), samples=64, frequencies=8, peak_points=0, threshold=np.inf, high=5)
 SIZE = 1e-5  # gap amplitudes, m
 
 
@@ -51,9 +44,7 @@ def run(system, load, selection, sweep=STEPS):
 # ---- the alert ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "sweep", [STEPS, replace(STEPS, frequencies=0, points=6)], ids=["frequencies", "arc length"]
-)
+@pytest.mark.parametrize("sweep", [STEPS, replace(STEPS, frequencies=0, points=6)], ids=["frequencies", "arc length"])
 def test_the_alert_evaluates_no_contact(evaluations, sweep):
     system, load = blades_and_damper()
     plain = run(system, load, "always_low", sweep)
@@ -69,7 +60,7 @@ def test_the_alert_evaluates_no_contact(evaluations, sweep):
 def test_contacts_on_samples_are_evaluated_once_a_point(evaluations):
     """Their events are not known: the price is one evaluation with many harmonics."""
     system, load = griffin(0.1)
-    sweep = Sweep(omega_range=(1.05, 1.2), samples=64, frequencies=4, peak_points=0, evaluator="intervals", high=5)  # fmt: skip
+    sweep = Sweep(omega_range=(1.05, 1.2), samples=64, frequencies=4, peak_points=0, evaluator="intervals", high=5)
     run(system, load, "always_low", sweep)
     without = len(evaluations)
     evaluations.clear()
@@ -81,7 +72,7 @@ def test_a_repeat_asks_for_no_second_verdict(monkeypatch):
     system, load = blades_and_damper()
     asked = []
     judge = JacobianAlert.judge
-    monkeypatch.setattr(JacobianAlert, "judge", lambda self, step: asked.append(step.omega) or judge(self, step))  # fmt: skip
+    monkeypatch.setattr(JacobianAlert, "judge", lambda self, step: asked.append(step.omega) or judge(self, step))
     points = run(system, load, JacobianAlert(threshold=0.002))
     low = [p for p in points if p.stage == "low"]
     assert any(p.stage == "high" for p in points), "nothing was repeated: nothing was shown"
@@ -113,9 +104,7 @@ def test_a_resumed_run_repeats_from_the_same_start(stop):
 )
 def test_forces_of_more_harmonics_need_no_other_evaluation(seed, order, more, preload):
     rng = np.random.default_rng(seed)
-    laws = [
-        ElasticCoulomb(k_t=2e7, k_w=1e7, k_n=3e7, mu=mu, preload=preload) for mu in (0.3, 0.5, 0.0)
-    ]
+    laws = [ElasticCoulomb(k_t=2e7, k_w=1e7, k_n=3e7, mu=mu, preload=preload) for mu in (0.3, 0.5, 0.0)]
     contacts = compile_contacts(laws, weights=np.array([1.0, 2.0, 0.5]), evaluator="events")
     gaps = SIZE * rng.standard_normal((2 * order + 1, 9))
     found = contact_forces(gaps, contacts, 0, history=False)
@@ -179,8 +168,7 @@ def test_the_natural_test_does_not_see_the_scales_of_equations():
     scales = 2.0 ** np.array([0, 8, -7, 3, 10, -9])
     start = np.array([-3.0, 2.0, 0.0, 8.0, -1.0, 4.0])
     one, other = (
-        newton(chain(s), start, Newton(tolerance=1e-9 * s.min()), NaturalLevel())
-        for s in (np.ones(6), scales)
+        newton(chain(s), start, Newton(tolerance=1e-9 * s.min()), NaturalLevel()) for s in (np.ones(6), scales)
     )
     assert one.status is other.status is Status.CONVERGED
     reached = chain(np.ones(6))(one.x), chain(scales)(other.x)

@@ -55,7 +55,7 @@ def found():
     system, load = duffing()
     search = MotionSearch(
         omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=1, samples=32, points=15, starts=24, steps=128, most_periods=300
-    )  # fmt: skip
+    )
     return all_motions(system, load, search)
 
 
@@ -132,9 +132,7 @@ def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
     system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.0, SOFT, 0.0, HARD)), WEAK, PUSH)
     low, high = isola()
     omega = float(np.sqrt(stiffness(high**2) - WEAK**2 / 2.0))
-    search = MotionSearch(
-        omega_range=(0.1, 1.3), at=(omega,), harmonics=1, samples=32, points=40, tries=20, starts=0
-    )
+    search = MotionSearch(omega_range=(0.1, 1.3), at=(omega,), harmonics=1, samples=32, points=40, tries=20, starts=0)
     result = all_motions(system, load, search)
     assert len(result.isolas) == 1
     ring = result.isolas[0]
@@ -158,13 +156,7 @@ def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
 
 # ---- an absorber ---------------------------------------------------------------------------------------------------------------
 
-TUNED = {
-    "knl2": 0.0042,
-    "k2": 0.0454,
-    "c2": 0.0128,
-    "m2": 0.05,
-    "c1": 0.002,
-}  # of Habib, Detroux and others
+TUNED = {"knl2": 0.0042, "k2": 0.0454, "c2": 0.0128, "m2": 0.05, "c1": 0.002}  # of Habib, Detroux and others
 
 
 def absorber(force: float) -> tuple[System, HarmonicLoad]:
@@ -197,9 +189,7 @@ def absorber_amplitudes(omega: float, force: float) -> np.ndarray:
 def test_the_detached_curve_of_an_absorber_is_found_where_there_is_one(force, isolas):
     system, load = absorber(force)
     omega = 1.9
-    search = MotionSearch(
-        omega_range=(0.8, 2.4), at=(omega,), harmonics=1, samples=32, points=12, tries=12, starts=0
-    )
+    search = MotionSearch(omega_range=(0.8, 2.4), at=(omega,), harmonics=1, samples=32, points=12, tries=12, starts=0)
     found = all_motions(system, load, search)
     own = np.sort([m.amplitude for m in found.at[0].motions])
     np.testing.assert_allclose(own, absorber_amplitudes(omega, force), rtol=1e-6)
@@ -231,9 +221,7 @@ def thirds(omega: float) -> np.ndarray:
         size = np.sqrt(np.maximum(big, 0.0))
         # both components turn into one equation for the phase ψ of A against a: 3/4 a A e^{iψ} = -(d + 1.5 B + i damp)
         turn = -(d + 1.5 * big + 1j * damp) / np.maximum(0.75 * a * size, 1e-300)
-        rest = (
-            1.0 - omega**2 + 0.75 * big + 1.5 * a**2 + 1j * THIRD_C * omega
-        ) * size * turn + 0.25 * a**3
+        rest = (1.0 - omega**2 + 0.75 * big + 1.5 * a**2 + 1j * THIRD_C * omega) * size * turn + 0.25 * a**3
         miss = np.where((root > 0.0) & (big > 0.0), np.abs(rest) - THIRD_F, np.nan)
         there = np.flatnonzero(miss[:-1] * miss[1:] < 0.0)
         found += [a[i] - miss[i] * (a[i + 1] - a[i]) / (miss[i + 1] - miss[i]) for i in there]
@@ -245,7 +233,7 @@ def test_motions_of_a_third_of_the_frequency_are_an_isola_and_those_of_two_harmo
     system, load = one_mass(CubicSpring(cubic_t=1.0, k_t=1e-12), THIRD_C, THIRD_F)
     search = MotionSearch(
         omega_range=(3.9, 4.4), at=(omega,), periods=3, harmonics=1, samples=32, points=8, tries=18, starts=0, seed=1
-    )  # fmt: skip
+    )
     found = all_motions(system, load, search).at[0].motions
     sizes = [np.abs(m.coefficients[:, 0]) for m in found]
     own = np.sort([q[1] for q in sizes if q[1] > 1e-6])
@@ -275,23 +263,14 @@ def impacting(y0, periods):
         return [y[1], DRIVE * np.cos(FAST * t) - DAMPING * y[1] - y[0] + push]
 
     times = np.linspace(periods - 1, periods, 65) * period
-    y = solve_ivp(
-        rate, (0.0, periods * period), y0, rtol=1e-8, atol=1e-10, t_eval=times, max_step=period / 40
-    ).y[0]
+    y = solve_ivp(rate, (0.0, periods * period), y0, rtol=1e-8, atol=1e-10, t_eval=times, max_step=period / 40).y[0]
     return 2.0 * abs(np.mean(y[:-1] * np.exp(-1j * FAST * times[:-1])))
 
 
 def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
     system, load = stop()
     search = MotionSearch(
-        omega_range=(0.8, 1.5),
-        at=(FAST,),
-        harmonics=9,
-        points=12,
-        tries=6,
-        starts=16,
-        steps=256,
-        most_periods=300,
+        omega_range=(0.8, 1.5), at=(FAST,), harmonics=9, points=12, tries=6, starts=16, steps=256, most_periods=300
     )
     at = all_motions(system, load, search).at[0]
     stable = sorted((m for m in at.motions if m.stability == "stable"), key=lambda m: m.amplitude)
@@ -300,10 +279,7 @@ def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
     assert free < CLEARANCE
     assert stable[0].amplitude == pytest.approx(free, rel=1e-9), "without impacts it is linear"
     motion = stable[1].coefficients[:, 0]
-    begin = [
-        float(np.sum(motion.real)),
-        float(np.sum((1j * FAST * np.arange(motion.size) * motion).real)),
-    ]
+    begin = [float(np.sum(motion.real)), float(np.sum((1j * FAST * np.arange(motion.size) * motion).real))]
     assert impacting(begin, 60) == pytest.approx(stable[1].amplitude, rel=2e-3)
     assert min(at.basins.count(at.motions.index(m)) for m in stable) > 0
 
@@ -316,10 +292,10 @@ def test_the_third_order_subharmonic_isola_of_a_duffing_oscillator_is_found():
     one, gap = np.ones((1, 1)), np.array([[1.0], [0.0], [0.0]])
     structure = Structure(one, 4.0 * one, 1e4 * one, table(("q",)))
     contact = Interface(("c",), (CubicSpring(cubic_t=1e8),), gap)
-    system, load = System(structure, contact, np.array([0])), HarmonicLoad(np.zeros(1), {1: np.array([100.0 + 0j])})  # fmt: skip
+    system, load = System(structure, contact, np.array([0])), HarmonicLoad(np.zeros(1), {1: np.array([100.0 + 0j])})
     search = MotionSearch(
         omega_range=(300.0, 500.0), at=(400.0,), periods=3, harmonics=3, samples=72, points=10, tries=1, starts=0
-    )  # fmt: skip
+    )
     found = all_motions(system, load, search)
     (isola,) = (b for b in found.branches if b.isola)
     assert isola.origin == "deflation"
@@ -337,9 +313,7 @@ def test_the_third_order_subharmonic_isola_of_a_duffing_oscillator_is_found():
 
 def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
     system, load = duffing()
-    result = all_motions(
-        system, load, MotionSearch(omega_range=(0.6, 1.7), harmonics=1, points=20, solves=1)
-    )
+    result = all_motions(system, load, MotionSearch(omega_range=(0.6, 1.7), harmonics=1, points=20, solves=1))
     assert result.spent
     assert result.tries == result.starts == 0
     assert len(result.at) == 5
@@ -352,7 +326,7 @@ def test_an_interrupted_search_goes_on_to_the_same_stages():
     system, load = stop()
     search = MotionSearch(
         omega_range=(1.1, 1.2), at=(FAST,), harmonics=3, points=8, tries=1, starts=2, steps=64, most_periods=60
-    )  # fmt: skip
+    )
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))
     assert [s.kind for s in whole[:3]] == ["branch", "branch", "searched"]
@@ -370,8 +344,16 @@ def test_an_interrupted_search_goes_on_to_the_same_stages():
 def test_an_interrupted_search_draws_the_same_states_after_a_motion_was_found():
     system, load = stop()
     search = MotionSearch(
-        omega_range=(1.1, 1.2), at=(FAST,), harmonics=3, points=8, tries=1, starts=5, spread=6.0, steps=64, most_periods=400
-    )  # fmt: skip
+        omega_range=(1.1, 1.2),
+        at=(FAST,),
+        harmonics=3,
+        points=8,
+        tries=1,
+        starts=5,
+        spread=6.0,
+        steps=64,
+        most_periods=400,
+    )
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))
     kinds = [(s.kind, s.origin) for s in whole]
@@ -386,16 +368,23 @@ def test_a_start_that_still_rings_at_half_the_frequency_has_not_settled():
     """A spring with a square feeds what rings at half of the frequency: a multiplier of 0.997, while the driven harmonic hardly changes."""
     system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.56, 0.4)), 0.043, 0.271)
     search = MotionSearch(
-        omega_range=(1.9, 2.0), at=(1.97,), periods=2, harmonics=2, points=8, tries=1, starts=3, steps=64, most_periods=60, seed=3
-    )  # fmt: skip
+        omega_range=(1.9, 2.0),
+        at=(1.97,),
+        periods=2,
+        harmonics=2,
+        points=8,
+        tries=1,
+        starts=3,
+        steps=64,
+        most_periods=60,
+        seed=3,
+    )
     assert all_motions(system, load, search).at[0].basins.ends == 3 * (APERIODIC,)
 
 
 def test_starts_that_grow_without_bound_are_counted_as_that():
     system, load = one_mass(CubicSpring(cubic_t=CUBIC, k_t=1e-12), -0.6, FORCE)
-    search = MotionSearch(
-        omega_range=(0.8, 1.6), at=(OMEGA,), harmonics=1, points=8, tries=1, starts=2, steps=64
-    )
+    search = MotionSearch(omega_range=(0.8, 1.6), at=(OMEGA,), harmonics=1, points=8, tries=1, starts=2, steps=64)
     at = all_motions(system, load, search).at[0]
     assert at.basins.ends == (DIVERGED, DIVERGED)
 
@@ -403,9 +392,7 @@ def test_starts_that_grow_without_bound_are_counted_as_that():
 def test_what_more_harmonics_would_change_is_told_of_each_motion(found):
     """The change by a Newton step is about the distance from the motions with nine harmonics."""
     system, load = duffing()
-    search = MotionSearch(
-        omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=9, samples=72, points=10, tries=1, starts=0
-    )
+    search = MotionSearch(omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=9, samples=72, points=10, tries=1, starts=0)
     more = sorted(all_motions(system, load, search).at[0].motions, key=lambda m: m.amplitude)
     few = sorted(found.at[0].motions, key=lambda m: m.amplitude)
     for one, other in zip(few, more, strict=True):

@@ -45,9 +45,7 @@ def test_a_study_names_the_isola_that_reaches_higher(result):
     words = set(case["motion_stability"].values.reshape(-1)) - {""}
     assert words <= {"stable", "unstable", "undecided"}
     counts = case["motion_count"].values[0]
-    assert (
-        counts[counts >= 0].sum() + case["aperiodic"].values[0] + case["unsolved"].values[0] == 12
-    )
+    assert counts[counts >= 0].sum() + case["aperiodic"].values[0] + case["unsolved"].values[0] == 12
     low, share, high = (case[f"motion_{n}"].values[0] for n in ("share_low", "share", "share_high"))
     assert np.all(low <= share)
     assert np.all(share <= high)
@@ -72,9 +70,7 @@ def test_a_finished_run_searches_nothing_again_and_gives_the_same(result, folder
 
 def test_python_gives_the_motions_of_a_study(folder):
     model = Study.from_file(folder / "study.toml").model()
-    found = model.all_motions(
-        frequency_hz=(0.016, 0.2), at_hz=[0.055], harmonics=1, tries=3, starts=0
-    )
+    found = model.all_motions(frequency_hz=(0.016, 0.2), at_hz=[0.055], harmonics=1, tries=3, starts=0)
     data = found.data["all_motions"]
     hertz = data["searched_hz"].values.reshape(-1)
     assert hertz == pytest.approx([0.055])
@@ -106,13 +102,11 @@ def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
     told = {name: case[name].variable for name in case.variables}
     for name in ("seconds", "solves", "budget_solves", "tries", "spent", "unmarched"):
         told[name] = xr.Variable((), case.attrs[name])
-    stable = np.where(case["motion_stability"].values[0] == "stable", case["motion_amplitude"].values[0], np.nan)  # fmt: skip
+    stable = np.where(case["motion_stability"].values[0] == "stable", case["motion_amplitude"].values[0], np.nan)
     count = case["motion_count"].values.copy()
     for reached in (3, 0):
         count[0, int(np.nanargmax(stable))] = reached
-        found = case_verdicts(
-            "", told | {"motion_count": xr.Variable(("searched", "motion"), count)}
-        )
+        found = case_verdicts("", told | {"motion_count": xr.Variable(("searched", "motion"), count)})
         notes = [v for v in found if "was reached by none of 12 starts" in v.why]
         assert [v.word for v in notes] == ["note"] * (reached == 0)
 
@@ -131,9 +125,7 @@ def test_what_the_budget_left_and_where_a_branch_was_lost_are_said(result):
     }
     said = [v.why for v in case_verdicts("", told) if v.level == "doubtful"]
     assert any("at 1 of 1 frequencies (0.055 Hz) not all was tried" in why for why in said)
-    assert any(
-        f"branch {lost.size} (deflation) is not known to its end: lost" in why for why in said
-    )
+    assert any(f"branch {lost.size} (deflation) is not known to its end: lost" in why for why in said)
 
 
 def test_motions_that_need_more_harmonics_are_doubtful(result):

@@ -20,9 +20,7 @@ SOURCE = ROOT / "src" / "stickslip"
 MODULES = sorted(SOURCE.rglob("*.py"))
 STUBS = sorted(SOURCE.rglob("__init__.pyi"))
 MOST_NAMES = 45
-LONGEST_FUNCTION = (
-    60  # lines of code without the docstring; the 90th percentile has its own, smaller limit
-)
+LONGEST_FUNCTION = 60  # lines of code without the docstring; the 90th percentile has its own, smaller limit
 USUAL_FUNCTION = 40
 
 
@@ -47,9 +45,7 @@ PUBLIC = [(name, package_of(stub), home) for stub in STUBS for name, home in nam
 
 def functions(path: Path) -> list[ast.FunctionDef]:
     """Return every function and method of a module."""
-    return [
-        node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)
-    ]
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
 
 
 def body_lines(node: ast.FunctionDef) -> int:
@@ -61,9 +57,7 @@ def body_lines(node: ast.FunctionDef) -> int:
 def tracked_files() -> list[Path]:
     """Return what git tracks; skips where there is no repository, as in an unpacked archive."""
     try:
-        listed = subprocess.run(
-            ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
-        )
+        listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("not a git checkout")
     return [ROOT / name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
@@ -95,17 +89,13 @@ def test_modules_import_each_other_in_no_circle():
 
 def test_type_checking_imports_do_not_hide_from_the_contracts():
     # import-linter leaves such imports out; the command line is on top of all layers, and `reading` names its own layer alone
-    hidden = {
-        str(path.relative_to(SOURCE)) for path in MODULES if "TYPE_CHECKING" in path.read_text()
-    }
+    hidden = {str(path.relative_to(SOURCE)) for path in MODULES if "TYPE_CHECKING" in path.read_text()}
     assert hidden <= {"cli.py", "front/reading.py"}
 
 
 def test_functions_are_short():
     lengths = {
-        f"{path.relative_to(SOURCE)}:{node.name}": body_lines(node)
-        for path in MODULES
-        for node in functions(path)
+        f"{path.relative_to(SOURCE)}:{node.name}": body_lines(node) for path in MODULES for node in functions(path)
     }
     too_long = {name: lines for name, lines in lengths.items() if lines > LONGEST_FUNCTION}
     assert not too_long
@@ -114,11 +104,7 @@ def test_functions_are_short():
 
 
 def test_no_module_for_leftovers():
-    assert not [
-        path
-        for path in MODULES
-        if path.stem in {"utils", "util", "common", "core", "helpers", "misc"}
-    ]
+    assert not [path for path in MODULES if path.stem in {"utils", "util", "common", "core", "helpers", "misc"}]
 
 
 @pytest.mark.parametrize("module", ["stickslip", "stickslip.cli"])
@@ -148,11 +134,7 @@ def test_a_public_name_has_one_home():
 
 def test_no_module_bears_the_name_of_a_public_name_beside_it():
     # else the module, once imported, hides the function
-    clashes = [
-        f"{package}.{name}"
-        for name, package, _ in PUBLIC
-        if importlib.util.find_spec(f"{package}.{name}")
-    ]
+    clashes = [f"{package}.{name}" for name, package, _ in PUBLIC if importlib.util.find_spec(f"{package}.{name}")]
     assert clashes == []
 
 
@@ -197,19 +179,12 @@ def test_parameters_stand_in_the_nomenclature():
 def test_nomenclature_gives_one_row_to_each_name():
     page = (ROOT / "docs" / "nomenclature.md").read_text()
     rows = page.split("## Parameters in the code")[1].splitlines()
-    names = [
-        word
-        for row in rows
-        if row.startswith("| `")
-        for word in re.findall(r"`(\w+)`", row.split("|")[1])
-    ]
+    names = [word for row in rows if row.startswith("| `") for word in re.findall(r"`(\w+)`", row.split("|")[1])]
     assert names
     assert len(names) == len(set(names)), sorted({name for name in names if names.count(name) > 1})
 
 
-@pytest.mark.parametrize(
-    "pattern", ["evidence/benchmarks/bench_*.py", "evidence/validation/case_*.py"]
-)
+@pytest.mark.parametrize("pattern", ["evidence/benchmarks/bench_*.py", "evidence/validation/case_*.py"])
 def test_modules_found_by_name_can_be_run(pattern):
     for path in ROOT.glob(pattern):
         run = next((node for node in functions(path) if node.name == "run"), None)

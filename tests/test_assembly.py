@@ -28,12 +28,7 @@ from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import join
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.system import System
 
 COARSE = {"airfoil_size": 0.012, "platform_size": 0.012, "foot_size": 0.016}
@@ -63,12 +58,7 @@ def answered(system, load, hertz, order, **settings):
 def blades():
     damper = FlatCurvedDamper()
     mesh = mesh_blade_pair(BladePair(**COARSE), damper.contact_points())
-    part = solid_part(
-        mesh,
-        Material(),
-        reduction=Reduction(10),
-        damping=Damping(ratio=0.003, between_hz=(150, 300)),
-    )
+    part = solid_part(mesh, Material(), reduction=Reduction(10), damping=Damping(ratio=0.003, between_hz=(150, 300)))
     return damper, mesh, part
 
 
@@ -76,12 +66,8 @@ def two_blades(damper, part):
     return Model(
         parts={"blades": part, "damper": damper_part(damper)},
         contacts={
-            "flat": Contact(
-                between=("damper.flat", "blades.underside_1"), law=FLAT, share="interface"
-            ),
-            "curved": Contact(
-                between=("damper.curved", "blades.underside_2"), law=CURVED, share="interface"
-            ),
+            "flat": Contact(between=("damper.flat", "blades.underside_1"), law=FLAT, share="interface"),
+            "curved": Contact(between=("damper.curved", "blades.underside_2"), law=CURVED, share="interface"),
         },
         loads={
             "pull": Load(on="damper", newton=442.0, direction=(0, 0, 1), harmonic=0),
@@ -147,12 +133,7 @@ def four_masses():
         contacts={
             "ring": Contact(between=("chain.m2", "ground"), law=friction, acts="tangential"),
             "between": Contact(between=("chain.m3", "chain.m4"), law=friction, acts="tangential"),
-            "stop": Contact(
-                between=("chain.m4", "ground"),
-                law=UnilateralSpring(k_n=1e5),
-                acts="normal",
-                gap=1e-5,
-            ),
+            "stop": Contact(between=("chain.m4", "ground"), law=UnilateralSpring(k_n=1e5), acts="normal", gap=1e-5),
         },
         loads={
             "shaker": Load(on="chain.m1", newton=3.0),
@@ -224,17 +205,13 @@ def test_what_is_wrong_with_a_model_is_named():
     law = Jenkins(k_t=1.0, limit=1.0)
     one = Contact(between=("chain.m9", "ground"), law=law, acts="tangential")
     refused(
-        r"contact.a.between: there is no surface or set 'chain.m9'. Did you mean .*Known: chain",
-        contacts={"a": one},
+        r"contact.a.between: there is no surface or set 'chain.m9'. Did you mean .*Known: chain", contacts={"a": one}
     )
     refused(
         "contact.a.between: there is no part 'chian'. Did you mean 'chain'",
         contacts={"a": replace(one, between=("chian.m1", "ground"))},
     )
-    refused(
-        "is no sector of a wheel",
-        contacts={"a": replace(one, between=("chain.m1", "next.chain.m2"))},
-    )
+    refused("is no sector of a wheel", contacts={"a": replace(one, between=("chain.m1", "next.chain.m2"))})
     with pytest.raises(InputError, match=r"contact.a.acts: is missing"):  # before anything is asked
         replace(model, contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)})
     refused(
@@ -247,14 +224,6 @@ def test_what_is_wrong_with_a_model_is_named():
         loads={"a": Load(on="chain.m1", newton=1.0, engine_order=2)},
     )
     refused("load.second.harmonic: is 2, and harmonics up to 1", harmonics=1)
-    refused(
-        "output.points.tip: there is no surface or set 'chain.tip'",
-        outputs=(Output(name="tip", on="chain.tip"),),
-    )
-    refused(
-        "alert_over: there is no place 'shaker.y'. Did you mean 'shaker.x'",
-        alert_over=("shaker.y",),
-    )
-    refused(
-        "join.a.between: needs two surfaces", joins={"a": Join(between=("chain.m1", "chain.m2"))}
-    )
+    refused("output.points.tip: there is no surface or set 'chain.tip'", outputs=(Output(name="tip", on="chain.tip"),))
+    refused("alert_over: there is no place 'shaker.y'. Did you mean 'shaker.x'", alert_over=("shaker.y",))
+    refused("join.a.between: needs two surfaces", joins={"a": Join(between=("chain.m1", "chain.m2"))})

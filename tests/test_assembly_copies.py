@@ -32,20 +32,7 @@ STEEL = Material()
 LAW = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=5e6, mu=0.3, preload=30.0)
 OBLIQUE = Axis(direction=(0.3, -0.5, 1.0), origin=(0.1, 0.2, 0.0))
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-EDGES = [
-    (0, 1),
-    (1, 2),
-    (3, 2),
-    (0, 3),
-    (4, 5),
-    (5, 6),
-    (7, 6),
-    (4, 7),
-    (0, 4),
-    (1, 5),
-    (2, 6),
-    (3, 7),
-]
+EDGES = [(0, 1), (1, 2), (3, 2), (0, 3), (4, 5), (5, 6), (7, 6), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7)]
 
 
 def bar(cells=(3, 1, 1), *, start=0.0, length=0.3, clamp=True, quadratic=False):
@@ -80,8 +67,12 @@ def answered(model, hertz=(300.0, 330.0), order=3):
     found = assemble(model, order)
     sweep = Sweep(
         omega_range=(2 * math.pi * hertz[0], 2 * math.pi * hertz[1]),
-        low=order, high=order, selection="always_low", frequencies=2, peak_points=0,
-    )  # fmt: skip
+        low=order,
+        high=order,
+        selection="always_low",
+        frequencies=2,
+        peak_points=0,
+    )
     problem = forced_problem(found.system, found.load, sweep)
     points = list(forced_response(found.system, found.load, sweep))
     assert all(point.converged for point in points)
@@ -116,8 +107,7 @@ def pair(first, second):
     return Model(
         parts=ends,
         contacts={
-            name: Contact(between=(f"{name}.right", "ground"), law=LAW, tangent=(0.0, 0.2, 1.0))
-            for name in ends
+            name: Contact(between=(f"{name}.right", "ground"), law=LAW, tangent=(0.0, 0.2, 1.0)) for name in ends
         },
         loads={name: Load(on=f"{name}.right", newton=60.0, direction=(0, 0.3, 1)) for name in ends},
         outputs=(Output(name="a", on="one.right"), Output(name="b", on="two.right")),
@@ -224,9 +214,7 @@ def test_two_halves_tied_are_the_whole(pairing):
     same(tied, whole)
     few = assemble(replace(halves(pairing, n_modes=12), speed=300.0), 3)
     full = assemble(replace(whole, speed=300.0), 3)
-    np.testing.assert_allclose(
-        few.static_gap, full.static_gap, atol=1e-9 * np.abs(full.static_gap).max()
-    )
+    np.testing.assert_allclose(few.static_gap, full.static_gap, atol=1e-9 * np.abs(full.static_gap).max())
     assert few.frequencies.warnings() == []
 
 
@@ -246,9 +234,7 @@ def test_points_of_an_interface_share_its_law_by_their_areas():
     points = mesh.points.copy()
     points[mesh.node_sets["right"][2:4], 1] -= 0.005  # facets of different widths
     part = solid_part(replace(mesh, points=points), STEEL)
-    touch = Contact(
-        between=("bar.right", "ground"), law=LAW, tangent=(0, 0, 1), share="interface", gap=2e-6
-    )
+    touch = Contact(between=("bar.right", "ground"), law=LAW, tangent=(0, 0, 1), share="interface", gap=2e-6)
     model = Model(parts={"bar": part}, contacts={"touch": touch})
     pairs = model.pairs
     assert pairs.area.sum() == pytest.approx(0.03 * 0.02, rel=1e-9)

@@ -55,9 +55,7 @@ def test_friction_loads_and_speed_of_sound_parts_reduce_nothing_again(reductions
     assert len(reductions) == 1
     assert second.system.interface.laws[0].mu == 0.5
     assemble(replace(model, speed=100.0), 3)
-    assert (
-        len(reductions) == 3
-    )  # the copy stands beside the axis: the rotation stresses it differently
+    assert len(reductions) == 3  # the copy stands beside the axis: the rotation stresses it differently
     elsewhere = {**model.loads, "new": replace(model.loads["one"], on="one.top")}
     assemble(replace(model, loads=elsewhere), 3)
     assert len(reductions) == 4
@@ -94,19 +92,11 @@ def test_waves_are_reduced_once(reductions):
     for k, wave in first.system.structure.waves.items():
         np.testing.assert_array_equal(wave.stiffness, again.system.structure.waves[k].stiffness)
     assert first.frequencies.warnings() == []
-    assert (
-        np.abs(first.static_gap - assemble(sector_model(shrouded_sector()), 3).static_gap).max()
-        < 1e-12
-    )
+    assert np.abs(first.static_gap - assemble(sector_model(shrouded_sector()), 3).static_gap).max() < 1e-12
 
 
 def reduced_sector_model():
     model = sector_model(shrouded_sector())
     return replace(
-        model,
-        parts={
-            "blade": solid_part(
-                shrouded_sector(), STEEL, sectors=5, **OWN | {"reduction": Reduction(20)}
-            )
-        },
+        model, parts={"blade": solid_part(shrouded_sector(), STEEL, sectors=5, **OWN | {"reduction": Reduction(20)})}
     )

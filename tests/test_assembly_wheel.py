@@ -50,21 +50,14 @@ def shrouded_sector():
     half = math.pi / SECTORS
     angle, depth = np.array([-half, -0.3 * half, 0.35 * half, half]), (-0.02, 0.004, 0.02)
     number = np.arange(4 * 4 * 3).reshape(4, 4, 3)
-    points = np.array(
-        [[r * math.cos(a), r * math.sin(a), z] for r in RADII for a in angle for z in depth]
-    )
+    points = np.array([[r * math.cos(a), r * math.sin(a), z] for r in RADII for a in angle for z in depth])
     for i in (2, 3):  # the middle nodes of the high face lie elsewhere
         points[number[i, 3, 1], 2] = -0.006
     cells = []
     for i, columns in ((0, range(3)), (1, (1,)), (2, range(3))):
         for j in columns:
             for k in range(2):
-                a, b, c, d = (
-                    number[i, j, k],
-                    number[i + 1, j, k],
-                    number[i + 1, j + 1, k],
-                    number[i, j + 1, k],
-                )
+                a, b, c, d = (number[i, j, k], number[i + 1, j, k], number[i + 1, j + 1, k], number[i, j + 1, k])
                 top = [
                     number[i, j, k + 1],
                     number[i + 1, j, k + 1],
@@ -95,9 +88,7 @@ def whole_wheel(mesh):
     for s in range(SECTORS):
         place[s, high] = place[(s + 1) % SECTORS, low]
     axis = Axis()
-    points = np.vstack(
-        [axis.turned(mesh.points, 2 * math.pi * s / SECTORS) for s in range(SECTORS)]
-    )
+    points = np.vstack([axis.turned(mesh.points, 2 * math.pi * s / SECTORS) for s in range(SECTORS)])
     used, cells = np.unique(place[:, mesh.cells].reshape(-1, 8), return_inverse=True)
     nodes = np.searchsorted(used, place)
     sets = {"root": np.unique(nodes[:, root])}
@@ -106,18 +97,19 @@ def whole_wheel(mesh):
 
 def dofs_of(structure, nodes):
     """Return the (k, 3) dofs of nodes of a structure assembled from a mesh without numbers."""
-    place = {
-        (int(n), c): i
-        for i, (n, c) in enumerate(zip(structure.dofs.node, structure.dofs.component, strict=True))
-    }
+    place = {(int(n), c): i for i, (n, c) in enumerate(zip(structure.dofs.node, structure.dofs.component, strict=True))}
     return np.array([[place.get((int(n), c), -1) for c in "xyz"] for n in nodes])
 
 
 def answered(system, load, hertz):
     sweep = Sweep(
         omega_range=(2 * math.pi * hertz[0], 2 * math.pi * hertz[1]),
-        low=H, high=H, selection="always_low", frequencies=2, peak_points=0,
-    )  # fmt: skip
+        low=H,
+        high=H,
+        selection="always_low",
+        frequencies=2,
+        peak_points=0,
+    )
     problem = forced_problem(system, load, sweep)
     points = list(forced_response(system, load, sweep))
     assert all(point.converged for point in points)
@@ -138,14 +130,7 @@ def sector_model(mesh, **changes):
         },
         loads={
             "gas": Load(on="blade.tip", newton=2000.0, direction=(0.2, 1, 0.3), engine_order=ORDER),
-            "more": Load(
-                on="blade.tip",
-                newton=600.0,
-                direction=(1, 0, 0),
-                harmonic=2,
-                phase=0.4,
-                engine_order=ORDER,
-            ),
+            "more": Load(on="blade.tip", newton=600.0, direction=(1, 0, 0), harmonic=2, phase=0.4, engine_order=ORDER),
             "lean": Load(on="blade.tip", newton=15.0, direction=(0, 1, 1), harmonic=0),
         },
         outputs=(Output(name="tip", on="blade.tip"),),
@@ -217,13 +202,9 @@ def test_waves_of_unsymmetric_parts_are_not_each_others_mirror():
     more = scipy.sparse.random_array((free.n, free.n), density=0.01, rng=np.random.default_rng(3))
     for aside in (0.3 * more, 0.3j * more):
         stiffness = scipy.sparse.csr_array(free.stiffness + abs(free.stiffness).max() * aside)
-        part = replace(
-            blade, structure=replace(free, stiffness=stiffness), solid=None, damping=None
-        )
+        part = replace(blade, structure=replace(free, stiffness=stiffness), solid=None, damping=None)
         own = replace(model, parts={"blade": part}, speed=0.0)
-        side = linear_side(
-            own, ORDER, H, np.zeros(0, dtype=int), np.zeros(0, dtype=int), in_memory
-        ).side
+        side = linear_side(own, ORDER, H, np.zeros(0, dtype=int), np.zeros(0, dtype=int), in_memory).side
         sector = own.neighbours.sector(part.structure, own.coordinates)
         for h, k in enumerate((0, 2, 4, 1)):
             mine, theirs = (spectrum(s) for s in (side.of_harmonic(h), travelling_wave(sector, k)))
@@ -231,10 +212,7 @@ def test_waves_of_unsymmetric_parts_are_not_each_others_mirror():
 
 
 def spectrum(structure):
-    dense = [
-        m.toarray() if scipy.sparse.issparse(m) else m
-        for m in (structure.mass, structure.stiffness)
-    ]
+    dense = [m.toarray() if scipy.sparse.issparse(m) else m for m in (structure.mass, structure.stiffness)]
     return np.sort_complex(np.linalg.eigvals(np.linalg.solve(*dense)))
 
 
@@ -295,14 +273,10 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
     for side, sign in (("left", -1), ("right", 1)):
         normal = tilt @ np.array([math.cos(0.6), sign * math.sin(0.6), 0.0])
         frames[side] = np.column_stack([np.cross(normal, [0, 0, 1]), [0, 0, -1], normal])
-        frames[side] = np.column_stack(
-            [frames[side][:, 0], np.cross(normal, frames[side][:, 0]), normal]
-        )
+        frames[side] = np.column_stack([frames[side][:, 0], np.cross(normal, frames[side][:, 0]), normal])
     places = {"left": mesh.points[high], "right": axis.turned(mesh.points[low], pitch)}
     surfaces = {
-        side: BodyPoints(
-            tuple(f"{side}.{i}" for i in range(3)), places[side], np.tile(frames[side], (3, 1, 1))
-        )
+        side: BodyPoints(tuple(f"{side}.{i}" for i in range(3)), places[side], np.tile(frames[side], (3, 1, 1)))
         for side in frames
     }
     body = replace(BODY, centre=(0.185, 0.0, 0.0)).moved(tilt, np.zeros(3))
@@ -313,9 +287,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
                 mesh,
                 STEEL,
                 sectors=SECTORS,
-                damping=Damping(
-                    ratio=0.003, between_hz=(3000 / (2 * math.pi), 20000 / (2 * math.pi))
-                ),
+                damping=Damping(ratio=0.003, between_hz=(3000 / (2 * math.pi), 20000 / (2 * math.pi))),
             ),
             "damper": rigid_part(body, surfaces),
         },
@@ -323,9 +295,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
             "left": Contact(between=("damper.left", "blade.left"), law=law),
             "right": Contact(between=("damper.right", "next.blade.right"), law=law),
         },
-        loads={
-            "gas": Load(on="blade.tip", newton=1400.0, direction=(0, 1, 0.2), engine_order=ORDER)
-        },
+        loads={"gas": Load(on="blade.tip", newton=1400.0, direction=(0, 1, 0.2), engine_order=ORDER)},
         outputs=(
             Output(name="tip", on="blade.tip"),
             Output(name="damper", on="damper"),
@@ -336,9 +306,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
         retention=1e5,
     )
     found = assemble(model, H)
-    assert found.output_labels[3:9] == tuple(
-        f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz")
-    )
+    assert found.output_labels[3:9] == tuple(f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))
     assert np.all(found.static_force[:, 2] < 0)
 
     whole, nodes = whole_wheel(mesh)
@@ -398,17 +366,11 @@ def test_shrouds_joined_from_sector_to_sector_are_one_ring():
     part = solid_part(mesh, STEEL, sectors=SECTORS)
     joined = Model(
         parts={"blade": part},
-        joins={
-            "ring": Join(
-                between=("blade.shroud_high", "next.blade.shroud_low"), pairing="node_to_node"
-            )
-        },
+        joins={"ring": Join(between=("blade.shroud_high", "next.blade.shroud_low"), pairing="node_to_node")},
     )
     sets = dict(mesh.node_sets)
     for side in ("low", "high"):
-        sets[f"cyclic_{side}"] = np.unique(
-            np.concatenate([sets[f"cyclic_{side}"], sets[f"shroud_{side}"]])
-        )
+        sets[f"cyclic_{side}"] = np.unique(np.concatenate([sets[f"cyclic_{side}"], sets[f"shroud_{side}"]]))
     ring = Model(parts={"blade": solid_part(replace(mesh, node_sets=sets), STEEL, sectors=SECTORS)})
     for k in range(3):
         found, expected = (natural_frequencies(m.at(SPEED, k), 6) for m in (joined, ring))
@@ -432,17 +394,10 @@ def test_what_is_wrong_with_a_wheel_is_named():
         ("load.gas.engine_order: is missing", {"loads": plain}),
         ("engine order 0 beside others .load.gas: 2, load.more: 0", {"loads": other}),
         ("part.second.sectors: is 6, and the part 'blade' is one of 5", {"parts": two}),
-        (
-            "part.second.sectors: is 1, and",
-            {"parts": {**model.parts, "second": solid_part(mesh, STEEL)}},
-        ),
+        ("part.second.sectors: is 1, and", {"parts": {**model.parts, "second": solid_part(mesh, STEEL)}}),
         (
             "part.blade: .*there is no set 'nowhere'",
-            {
-                "parts": {
-                    "blade": solid_part(mesh, STEEL, sectors=5, faces=("nowhere", "cyclic_high"))
-                }
-            },
+            {"parts": {"blade": solid_part(mesh, STEEL, sectors=5, faces=("nowhere", "cyclic_high"))}},
         ),
     ):
         with pytest.raises(InputError, match=match):
@@ -470,13 +425,11 @@ def test_an_output_on_the_high_face_is_refused_by_name():
         ([Reduction(ModesBelow(900.0)), Reduction(ModesBelow(900.0)), Reduction(ModesBelow(901.0))], "c"),
         ([Reduction(ModesBelow(900.0)), Reduction(ModesBelow(900.0), "rubin")], "b"),
     ],
-)  # fmt: skip
+)
 def test_reductions_of_the_parts_of_a_sector_are_one(ways, found):
     named = dict(zip("abc", ways, strict=False))
     if isinstance(found, Reduction):
         assert _one_of(named) == found
         return
-    with pytest.raises(
-        InputError, match=rf"part\.{found}\.reduction: differs from that of part\.a.*same frequency"
-    ):
+    with pytest.raises(InputError, match=rf"part\.{found}\.reduction: differs from that of part\.a.*same frequency"):
         _one_of(named)

@@ -18,9 +18,7 @@ OMEGA = 400.0
 # ---- derivatives --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("preload", "size"), [(30.0, 0.02), (30.0, 1.0), (5.0, 2.0), (-5.0, 2.0), (-1e9, 1.0)]
-)
+@pytest.mark.parametrize(("preload", "size"), [(30.0, 0.02), (30.0, 1.0), (5.0, 2.0), (-5.0, 2.0), (-1e9, 1.0)])
 def test_jacobian_of_a_free_body_on_two_contacts(preload, size):
     """From full stick through slip and lift-off to contacts that never touch."""
     system, load = free_body_3d(preload=preload)
@@ -35,9 +33,7 @@ def test_jacobian_of_a_free_body_on_two_contacts(preload, size):
         at = balance.linearise(x, OMEGA)
         here = balance.contacts(x, OMEGA)
         states |= set(np.unique(here.state).tolist())
-        step = (
-            1e-6 * size * unit
-        )  # piecewise linear: exact but for rounding, unless a state changes
+        step = 1e-6 * size * unit  # piecewise linear: exact but for rounding, unless a state changes
         for column in range(balance.size):
             move = np.zeros(balance.size)
             move[column] = step
@@ -59,9 +55,9 @@ def test_derivative_by_frequency():
     x = np.random.default_rng(0).standard_normal(balance.size)
     at = balance.linearise(x, OMEGA)
     step = 1e-3
-    difference = (
-        balance.linearise(x, OMEGA + step).residual - balance.linearise(x, OMEGA - step).residual
-    ) / (2 * step)
+    difference = (balance.linearise(x, OMEGA + step).residual - balance.linearise(x, OMEGA - step).residual) / (
+        2 * step
+    )
     # all coordinates but none of the body's are retained: Z is quadratic in ω, the difference is exact but for rounding
     assert np.allclose(at.jac_p, difference, rtol=0, atol=1e-6 * np.abs(difference).max())
 
@@ -87,22 +83,14 @@ def test_residual_against_the_complex_equations():
     period = balance.contacts(x, OMEGA)
     spectrum = np.fft.rfft(period.force.reshape(6, SAMPLES)) / SAMPLES
     spectrum[:, 1:] *= 2.0
-    residual = (
-        balance.coefficients(balance.linearise(x, OMEGA).residual) / balance.displacement_scale
-    )
+    residual = balance.coefficients(balance.linearise(x, OMEGA).residual) / balance.displacement_scale
     for h in range(order + 1):
         w = h * OMEGA
         z = structure.stiffness + 1j * w * structure.damping - w**2 * structure.mass
-        want = (
-            z @ q[h]
-            + system.interface.gap_operator.T @ spectrum[:, h]
-            - load.coefficients(order)[h]
-        )
+        want = z @ q[h] + system.interface.gap_operator.T @ spectrum[:, h] - load.coefficients(order)[h]
         if h == 0:
             want = want.real
-        assert np.allclose(
-            residual[h] * balance.force_scale, want, rtol=0, atol=1e-10 * np.abs(want).max()
-        )
+        assert np.allclose(residual[h] * balance.force_scale, want, rtol=0, atol=1e-10 * np.abs(want).max())
 
 
 def test_unknowns_and_coefficients_round_trip():
@@ -122,8 +110,7 @@ def held(system, mu=1e3, preload=1e3):
     from dataclasses import replace
 
     laws = tuple(
-        ElasticCoulomb(k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=mu, preload=preload)
-        for law in system.interface.laws
+        ElasticCoulomb(k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=mu, preload=preload) for law in system.interface.laws
     )
     return replace(system, interface=replace(system.interface, laws=laws)).with_retention(1e4)
 
@@ -139,9 +126,7 @@ def test_full_stick_is_the_linear_solution():
     assert np.allclose(got, want, rtol=0, atol=1e-10 * np.abs(want).max())
 
 
-FREQUENCY = (
-    2 * np.pi * 162.0
-)  # both contacts slip and open at this frequency: nothing is remembered from the start
+FREQUENCY = 2 * np.pi * 162.0  # both contacts slip and open at this frequency: nothing is remembered from the start
 
 
 @pytest.mark.kernel
@@ -186,11 +171,7 @@ def test_tangents_may_point_either_way():
 
 @pytest.mark.parametrize(
     ("frequency", "low", "high"),
-    [
-        (160, 1.986549e-4, 2.000666e-4),
-        (162, 2.588833e-4, 2.251094e-4),
-        (164, 1.906946e-4, 1.896742e-4),
-    ],
+    [(160, 1.986549e-4, 2.000666e-4), (162, 2.588833e-4, 2.251094e-4), (164, 1.906946e-4, 1.896742e-4)],
 )
 def test_published_amplitudes(frequency, low, high):
     """Benchmark B7: amplitude of y2 with one and with five harmonics, 256 samples, printed to seven figures."""
@@ -222,13 +203,10 @@ def test_a_preload_is_a_load():
 def test_what_the_balance_cannot_keep_or_does_not_know_is_refused():
     system, load = free_body_3d()
     high = HarmonicLoad(load.static, {**load.harmonics, 3: load.harmonics[1]})
-    with pytest.raises(
-        InputError, match=r"excites harmonic 3, but only 0, 1, 2 are kept\. Keep 3 or more"
-    ):
+    with pytest.raises(InputError, match=r"excites harmonic 3, but only 0, 1, 2 are kept\. Keep 3 or more"):
         balance_of(system, high, 2)
     with pytest.raises(
-        InputError,
-        match="order: must be the highest harmonic or a list of harmonics from 0 on, got -1",
+        InputError, match="order: must be the highest harmonic or a list of harmonics from 0 on, got -1"
     ):
         balance_of(system, load, -1)
     linear = condense(system.structure, system.retained, load)
@@ -241,10 +219,7 @@ def test_what_the_balance_cannot_keep_or_does_not_know_is_refused():
 @pytest.mark.parametrize(("order", "samples", "least"), [(5, 20, 40), (1, 4, 16)])
 def test_too_few_samples_are_refused(order, samples, least):
     system, load = free_body_3d()
-    with pytest.raises(
-        InputError,
-        match=rf"{samples} samples a period for {order} harmonics.*Give at least {least}",
-    ):
+    with pytest.raises(InputError, match=rf"{samples} samples a period for {order} harmonics.*Give at least {least}"):
         balance_of(system, load, order, samples)
     with pytest.raises(InputError, match="samples a period"):
         balance_of(system, load, 1, samples).with_order(order)
@@ -253,6 +228,4 @@ def test_too_few_samples_are_refused(order, samples, least):
 def test_contact_dofs_must_be_retained():
     system, load = free_body_3d()
     with pytest.raises(InputError, match=r"contact dofs \[1\] are not retained"):
-        harmonic_balance(
-            condense(system.structure, np.delete(np.arange(12), 1), load), system.interface, 1, 32
-        )
+        harmonic_balance(condense(system.structure, np.delete(np.arange(12), 1), load), system.interface, 1, 32)

@@ -25,12 +25,7 @@ SENTENCE = "a stable peak"
 
 
 def fake_tree(
-    folder: Path,
-    second: float = 2.0,
-    seconds: float = 2.5,
-    sentence: str = SENTENCE,
-    *,
-    phase: bool = True,
+    folder: Path, second: float = 2.0, seconds: float = 2.5, sentence: str = SENTENCE, *, phase: bool = True
 ) -> Tree:
     """Return sources whose every answer is two amplitudes, two phases, two times and a sentence."""
     node = xr.Dataset(
@@ -42,22 +37,18 @@ def fake_tree(
         attrs={"verdict": sentence},
     )
     root = xr.Dataset(attrs={"created": f"at {seconds}", "title": "Two points"})
-    xr.DataTree.from_dict(
-        {"/": root, "/forced_response": node if phase else node.drop_vars("phase")}
-    ).to_netcdf(folder / "result.nc", engine="h5netcdf")
-    page = f"<p>{sentence}</p><table><tr><th>peak</th><th>time (s)</th></tr><tr><td>1</td><td>{seconds}</td></tr></table>"
+    xr.DataTree.from_dict({"/": root, "/forced_response": node if phase else node.drop_vars("phase")}).to_netcdf(
+        folder / "result.nc", engine="h5netcdf"
+    )
+    page = (
+        f"<p>{sentence}</p><table><tr><th>peak</th><th>time (s)</th></tr><tr><td>1</td><td>{seconds}</td></tr></table>"
+    )
     log = f"2026-11-27T11:00:{seconds:02.0f}+00:00 {sentence} ({seconds} s)"
-    answers = {
-        "result.nc": (folder / "result.nc").read_bytes(),
-        "report.html": page.encode(),
-        "run.log": log.encode(),
-    }
+    answers = {"result.nc": (folder / "result.nc").read_bytes(), "report.html": page.encode(), "run.log": log.encode()}
     sources = {"__init__.py": b"", "__main__.py": PACKAGE} | {
         f"answers/{name}": content for name, content in answers.items()
     }
-    return unpacked(
-        "fake", {f"src/stickslip/{name}": content for name, content in sources.items()}, folder
-    )
+    return unpacked("fake", {f"src/stickslip/{name}": content for name, content in sources.items()}, folder)
 
 
 @pytest.mark.parametrize(
@@ -65,26 +56,30 @@ def fake_tree(
     [
         ({}, []),
         ({"seconds": 31.0}, []),
-        ({"second": 2.0000000000000004}, ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"]),
+        (
+            {"second": 2.0000000000000004},
+            ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"],
+        ),
         ({"phase": False}, ["/forced_response/phase: no such variable any more"]),
         (
             {"sentence": "an unstable peak"},
             [
-                "-a stable peak", "+an unstable peak",
+                "-a stable peak",
+                "+an unstable peak",
                 "/forced_response@verdict: 1 of 1 values differ, first []: 'a stable peak', now 'an unstable peak'",
-                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
-                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)",
+                "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)",
+                "+<time> an unstable peak (<time>)",
             ],
         ),
     ],
     ids=["the same", "a time", "a bit", "a variable", "a sentence"],
-)  # fmt: skip
+)
 def test_two_trees_are_told_apart_by_all_but_times(tmp_path, changes, found):
     trees = (fake_tree(tmp_path), fake_tree(tmp_path, **changes))
     comparison = compared(Example("four_masses"), trees, tmp_path)
-    assert [
-        line for line in comparison.differences if not line.startswith(("---", "+++", "@@", " "))
-    ] == found
+    assert [line for line in comparison.differences if not line.startswith(("---", "+++", "@@", " "))] == found
     assert comparison.compared == 3
 
 
@@ -92,10 +87,7 @@ def test_a_file_that_one_tree_alone_writes_is_found(tmp_path):
     for side in ("old", "new"):
         (tmp_path / side).mkdir()
     (tmp_path / "old" / "report.html").write_text("<p>a page</p>")
-    assert differing_folders(tmp_path / "old", tmp_path / "new") == (
-        ["report.html: written by the old tree alone"],
-        0,
-    )
+    assert differing_folders(tmp_path / "old", tmp_path / "new") == (["report.html: written by the old tree alone"], 0)
 
 
 def test_kinds_dimensions_bits_and_texts_of_variables_count():
@@ -106,9 +98,7 @@ def test_kinds_dimensions_bits_and_texts_of_variables_count():
     assert lines(values, values) == []
     assert lines(values, ("y", values[1])) == ["//a: dimensions {'x': 2}, now {'y': 2}"]
     assert lines(values, ("x", values[1].astype(np.float32))) == ["//a: kind float64, now float32"]
-    assert lines(values, ("x", np.array([-0.0, np.nan]))) == [
-        "//a: 1 of 2 values differ, first [0]: 0.0, now -0.0"
-    ]
+    assert lines(values, ("x", np.array([-0.0, np.nan]))) == ["//a: 1 of 2 values differ, first [0]: 0.0, now -0.0"]
     assert lines(("x", ["for 3 s", "b"]), ("x", ["for 12 s", "c"])) == [
         "//a: 1 of 2 values differ, first [1]: 'b', now 'c'"
     ]
@@ -130,13 +120,13 @@ def test_a_table_of_the_terminal_is_the_same_whatever_its_time_makes_of_its_widt
 """
 
     one, slow, other = (
-        terminal_lines(table(*row))
-        for row in (("1.25", "   0.45"), ("1.25", "  1230.45"), ("1.26", "   0.45"))
+        terminal_lines(table(*row)) for row in (("1.25", "   0.45"), ("1.25", "  1230.45"), ("1.26", "   0.45"))
     )
     assert differing_lines("t", one, slow) == []
     assert [line for line in differing_lines("t", one, other)[2:] if line[0] in "+-"] == [
-        "-load = 300 | 1.25 | <time>", "+load = 300 | 1.26 | <time>"
-    ]  # fmt: skip
+        "-load = 300 | 1.25 | <time>",
+        "+load = 300 | 1.26 | <time>",
+    ]
 
 
 def test_data_of_figures_and_columns_beside_a_time_count():
@@ -163,6 +153,4 @@ def test_sources_at_work_are_those_of_the_commit_where_nothing_was_changed():
 
 def changed_since_head():
     asked = ["git", "diff", "--name-only", "HEAD", "--", "src/stickslip"]
-    return set(
-        subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    )
+    return set(subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split())

@@ -25,15 +25,7 @@ ROTATING = [
     (1, 5, 8.940358, 29.352835, 7.411477),
     (1, 10, 16.606363, 44.368224, 13.257876),
 ]
-THIRD = {
-    0: 61.697215,
-    1: 61.841763,
-    2: 62.273185,
-    3: 62.984968,
-    4: 63.966761,
-    5: 65.205041,
-    10: 74.649295,
-}
+THIRD = {0: 61.697215, 1: 61.841763, 2: 62.273185, 3: 62.984968, 4: 63.966761, 5: 65.205041, 10: 74.649295}
 FAR_HUB = {1: 4.085336, 2: 5.439948, 3: 7.133713, 4: 8.966379, 5: 10.861596, 10: 20.611190}
 
 
@@ -44,18 +36,14 @@ def omega(structure, n):
 @pytest.mark.parametrize(("hub", "speed", "flap_1", "flap_2", "lag_1"), ROTATING)
 def test_rotating_cantilever_to_the_printed_digits(hub, speed, flap_1, flap_2, lag_1):
     # one unit of the last digit, made with 120 elements as well; two for lag, which in the table is off lag² = flap² - speed² by that
-    flap, lag = (
-        ss.model.rotating_beam(SLENDER, 120, speed, hub_radius=hub, bending=d) for d in "zy"
-    )
+    flap, lag = (ss.model.rotating_beam(SLENDER, 120, speed, hub_radius=hub, bending=d) for d in "zy")
     np.testing.assert_allclose(omega(flap, 2), (flap_1, flap_2), rtol=0, atol=1e-6)
     assert omega(lag, 1)[0] == pytest.approx(lag_1, abs=2e-6)
 
 
 def test_third_flap_and_the_farthest_hub():
     for speed, third in THIRD.items():
-        assert omega(ss.model.rotating_beam(SLENDER, 120, speed), 3)[2] == pytest.approx(
-            third, abs=1e-6
-        )
+        assert omega(ss.model.rotating_beam(SLENDER, 120, speed), 3)[2] == pytest.approx(third, abs=1e-6)
     for speed, first in FAR_HUB.items():
         found = omega(ss.model.rotating_beam(SLENDER, 120, speed, hub_radius=2.0), 1)[0]
         assert found == pytest.approx(first, abs=1e-6)
@@ -136,9 +124,7 @@ def test_thick_cantilever_against_the_differential_equation():
     S = 5 / 6 * A / 2.5
 
     def at_tip(w):
-        rates = np.array(
-            [[0, 1, 0, 1 / S], [0, 0, 1 / I, 0], [0, -I * w**2, 0, -1], [-A * w**2, 0, 0, 0]]
-        )
+        rates = np.array([[0, 1, 0, 1 / S], [0, 0, 1 / I, 0], [0, -I * w**2, 0, -1], [-A * w**2, 0, 0, 0]])
         return np.linalg.det(scipy.linalg.expm(rates)[2:, 2:])
 
     found = omega(ss.model.beam(ss.model.Beam(**THICK, material=RUBBER), 60), 3)
@@ -164,15 +150,11 @@ def test_static_deflection_is_exact_however_thin(thickness, elements):
 def test_thin_beam_with_shear_is_the_slender_one():
     shape = {"length": 1.0, "area": 1e-3, "second_moment": 1e-9 / 12, "material": UNIT}
     thin, slender = ss.model.Beam(**shape, shear_coefficient=5 / 6), ss.model.Beam(**shape)
-    np.testing.assert_allclose(
-        omega(ss.model.beam(thin, 20), 3), omega(ss.model.beam(slender, 20), 3), rtol=1e-4
-    )
+    np.testing.assert_allclose(omega(ss.model.beam(thin, 20), 3), omega(ss.model.beam(slender, 20), 3), rtol=1e-4)
 
 
 def test_mass_and_names():
-    structure = ss.model.beam(
-        ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, axial=True
-    )
+    structure = ss.model.beam(ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, axial=True)
     for name in ("deflection", "axial"):
         unit = np.zeros(structure.n)
         unit[structure.sets[name]] = 1.0
@@ -181,14 +163,10 @@ def test_mass_and_names():
     np.testing.assert_allclose(structure.dofs.position[structure.sets["tip"][0]], [2.0, 0, 0])
     # turning about the middle, right-handed: z = -θ (x - 1), ry = θ costs no energy
     turn = np.zeros(structure.n)
-    turn[structure.sets["deflection"]] = -(
-        structure.dofs.position[structure.sets["deflection"], 0] - 1
-    )
+    turn[structure.sets["deflection"]] = -(structure.dofs.position[structure.sets["deflection"], 0] - 1)
     turn[structure.sets["rotation"]] = 1.0
     assert abs(turn @ structure.stiffness @ turn) < 1e-6 * structure.stiffness.max()
-    lag = ss.model.beam(
-        ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, bending="y"
-    )
+    lag = ss.model.beam(ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, bending="y")
     turn = np.zeros(lag.n)
     turn[lag.sets["deflection"]] = lag.dofs.position[lag.sets["deflection"], 0] - 1
     turn[lag.sets["rotation"]] = 1.0
@@ -206,9 +184,7 @@ def test_lag_is_flap_less_the_square_of_the_speed():
 def test_turning_bar_stretches_at_lower_frequencies():
     # axial motion alone: ω² = ω₀² - Ω², whatever the hub
     stiff = ss.model.Beam(1.0, 1.0, 1e6, UNIT)  # bending far above
-    at_rest, turning = (
-        ss.model.rotating_beam(stiff, 40, s, axial=True, hub_radius=0.3) for s in (0.0, 1.0)
-    )
+    at_rest, turning = (ss.model.rotating_beam(stiff, 40, s, axial=True, hub_radius=0.3) for s in (0.0, 1.0))
     assert omega(turning, 1)[0] ** 2 == pytest.approx(omega(at_rest, 1)[0] ** 2 - 1, rel=1e-6)
 
 
@@ -229,18 +205,14 @@ def polynomial_frequencies(shape, speed, hub, terms=9):
 
     M = scipy.linalg.block_diag(integral(u, u, rho * A), integral(v, v, rho * A))
     K = (
-        scipy.linalg.block_diag(
-            integral(du, du, E * A), integral(ddv, ddv, E * I) + integral(dv, dv, tension)
-        )
+        scipy.linalg.block_diag(integral(du, du, E * A), integral(ddv, ddv, E * I) + integral(dv, dv, tension))
         - speed**2 * M
     )
     G = np.zeros_like(M)
     G[:terms, terms:] = -2 * speed * integral(u, v, rho * A)
     G -= G.T
     n = len(M)
-    state = np.block(
-        [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]]
-    )
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]])
     rates = np.linalg.eigvals(state)
     return np.sort(rates.imag[rates.imag > 0])
 
@@ -249,17 +221,13 @@ def test_coriolis_forces_couple_lag_and_stretching():
     # thick enough that the bar's frequencies lie among those of bending
     shape = ss.model.Beam(1.0, 1.0, 0.02, UNIT)
     exact = polynomial_frequencies(shape, 0.9, 0.2)[:4]
-    structure = ss.model.rotating_beam(
-        shape, 60, 0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True
-    )
+    structure = ss.model.rotating_beam(shape, 60, 0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True)
     found = 2 * np.pi * ss.model.gyroscopic_modes(structure, 4).frequencies_hz
     # linear bar elements: (π/2 5/60)²/24 of the third bar mode
     np.testing.assert_allclose(found, exact, rtol=1e-3)
     without = omega(structure, 4)
     assert np.max(np.abs(without / exact - 1)) > 0.05  # it matters
-    back = ss.model.rotating_beam(
-        shape, 60, -0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True
-    )
+    back = ss.model.rotating_beam(shape, 60, -0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True)
     np.testing.assert_allclose(back.damping, -structure.damping)
 
 
@@ -286,9 +254,7 @@ def test_campbell_diagram_of_a_blade():
         (lambda: ss.model.rotating_beam(SLENDER, 3, np.nan), "speed"),
         (lambda: ss.model.rotating_beam(SLENDER, 3, 1.0, coriolis=True), "coriolis"),
         (
-            lambda: ss.model.rotating_beam(
-                ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=("pinned", "free")), 3, 1.0
-            ),
+            lambda: ss.model.rotating_beam(ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=("pinned", "free")), 3, 1.0),
             "tension depends",
         ),
     ],

@@ -21,17 +21,11 @@ DAMPING, STOP = 0.05, 10.0  # of a mass that meets a stop ten times as stiff as 
 
 def impacting(omega_range, *, highest=15, points=20):
     """Return the response of a mass of 1 kg on a spring of 1 N/m, driven by 1 N, with an elastic stop at rest: problem and points."""
-    structure = ss.model.lumped(
-        np.ones(1), np.ones((1, 1)), damping=np.array([[2 * DAMPING]]), names=("mass",)
-    )
-    stop = ss.Interface(
-        ("stop",), (ss.UnilateralSpring(k_n=STOP),), np.array([[0.0], [0.0], [1.0]])
-    )
+    structure = ss.model.lumped(np.ones(1), np.ones((1, 1)), damping=np.array([[2 * DAMPING]]), names=("mass",))
+    stop = ss.Interface(("stop",), (ss.UnilateralSpring(k_n=STOP),), np.array([[0.0], [0.0], [1.0]]))
     system = ss.System(structure, stop, outputs=structure.sets["mass"])
     load = ss.HarmonicLoad(np.zeros(1), {1: np.ones(1, dtype=complex)})
-    sweep = ss.Sweep(
-        omega_range=omega_range, low=highest, high=highest, selection="always_high", points=points
-    )
+    sweep = ss.Sweep(omega_range=omega_range, low=highest, high=highest, selection="always_high", points=points)
     problem = ss.response.forced_problem(system, load, sweep)
     return problem, ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
 
@@ -48,9 +42,7 @@ def marched(omega, state, periods=1):
 
     def rate(stiffness):
         matrix = np.array([[0.0, 1.0], [-stiffness, -2 * DAMPING]])
-        return lambda t, y: np.append(
-            matrix @ y[:2] + [0.0, np.cos(omega * t)], (matrix @ y[2:].reshape(2, 2)).ravel()
-        )
+        return lambda t, y: np.append(matrix @ y[:2] + [0.0, np.cos(omega * t)], (matrix @ y[2:].reshape(2, 2)).ravel())
 
     def crossing(t, y):
         return y[0]
@@ -62,7 +54,7 @@ def marched(omega, state, periods=1):
         crossing.direction = 1.0 if touches else -1.0
         found = scipy.integrate.solve_ivp(
             rate(1.0 + STOP * touches), (t, end), y, "DOP853", events=crossing, rtol=1e-9, atol=1e-11
-        )  # fmt: skip
+        )
         t, y, touches = found.t[-1], found.y[:, -1], touches ^ (found.status == 1)
     return y[:2], y[2:].reshape(2, 2)
 
@@ -135,17 +127,12 @@ def test_a_doubled_branch_between_two_doublings_is_followed_from_one_to_the_othe
     stiffness = np.array([[1.5051, -0.2573], [-0.2573, 1.5127]])
     damping = np.array([[0.1096, -0.0153], [-0.0153, 0.1101]])
     structure = ss.model.lumped(np.ones(2), stiffness, damping=damping, names=("first", "second"))
-    stops = (
-        ss.UnilateralSpring(k_n=7.5928, initial_gap=0.3367),
-        ss.UnilateralSpring(k_n=3.1849, initial_gap=0.5688),
-    )
+    stops = (ss.UnilateralSpring(k_n=7.5928, initial_gap=0.3367), ss.UnilateralSpring(k_n=3.1849, initial_gap=0.5688))
     gaps = np.zeros((6, 2))
     gaps[2, 0], gaps[5, 1] = 1.0, -1.0
     system = ss.System(structure, ss.Interface(("below", "above"), stops, gaps), np.array([0]))
     load = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.6086 + 0j, 0.0])})
-    sweep = ss.Sweep(
-        omega_range=(0.6, 0.7), low=21, high=21, selection="always_high", points=8, peak_points=0
-    )  # fmt: skip
+    sweep = ss.Sweep(omega_range=(0.6, 0.7), low=21, high=21, selection="always_high", points=8, peak_points=0)
     problem = ss.response.forced_problem(system, load, sweep)
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     lower, upper = bifurcations(problem, points).found
@@ -165,9 +152,7 @@ def ring():
 
     def of_wave(k):
         stiffness = 1.0 + 2 * COUPLING * (1 - np.cos(2 * np.pi * k / SECTORS))
-        return ss.model.lumped(
-            np.ones(1), np.array([[stiffness]]), damping=np.array([[0.02]]), names=("mass",)
-        )
+        return ss.model.lumped(np.ones(1), np.array([[stiffness]]), damping=np.array([[0.02]]), names=("mass",))
 
     wheel = TunedWheel({k: of_wave(k) for k in range(SECTORS)}, SECTORS, SECTORS // 2, 8)
     stop = ss.UnilateralSpring(k_n=1.0, initial_gap=CLEARANCE)
@@ -175,9 +160,7 @@ def ring():
     gaps[[2, 5], 0] = 1.0, -1.0
     system = ss.System(wheel, ss.Interface(("above", "below"), (stop, stop), gaps), np.array([0]))
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.008 + 0j])})
-    sweep = ss.Sweep(
-        omega_range=(1.0, 1.06), low=[1, 3, 5], high=[1, 3, 5], selection="always_high", points=12
-    )
+    sweep = ss.Sweep(omega_range=(1.0, 1.06), low=[1, 3, 5], high=[1, 3, 5], selection="always_high", points=12)
     problem = ss.response.forced_problem(system, load, sweep)
     return problem, ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
 
@@ -194,7 +177,7 @@ def marched_ring(omega, state, periods):
         return np.append(v, 0.008 * against * np.cos(omega * t) - 0.02 * v - stiffness @ x - stop)
 
     end = 2 * np.pi / omega * periods
-    return scipy.integrate.solve_ivp(rate, (0.0, end), state, "DOP853", rtol=1e-6, atol=1e-9).y[:, -1]  # fmt: skip
+    return scipy.integrate.solve_ivp(rate, (0.0, end), state, "DOP853", rtol=1e-6, atol=1e-9).y[:, -1]
 
 
 def test_a_wheel_loses_its_symmetry_where_a_localised_branch_leaves():
@@ -212,24 +195,18 @@ def test_a_wheel_loses_its_symmetry_where_a_localised_branch_leaves():
     point = branch.points[there]
     assert stability(branch.problem, point).verdict == "stable"
     rows = np.arange(len(point.coefficients))[:, None] * 1j * point.omega
-    state = np.concatenate([point.coefficients.real.sum(axis=0), (rows * point.coefficients).real.sum(axis=0)])  # fmt: skip
+    state = np.concatenate([point.coefficients.real.sum(axis=0), (rows * point.coefficients).real.sum(axis=0)])
     after = marched_ring(point.omega, 1.01 * state, 30)
     assert np.abs(after - state).max() < 3e-3 * np.abs(state).max()
 
 
 def cubic_mass(omega_range, *, force, highest, points):
     """Return the forced response of a damped mass on a spring with a cubic part."""
-    structure = ss.model.lumped(
-        np.ones(1), np.ones((1, 1)), damping=np.array([[0.02]]), names=("mass",)
-    )
-    spring = ss.Interface(
-        ("spring",), (ss.CubicSpring(cubic_t=1.0),), np.array([[1.0], [0.0], [0.0]])
-    )
+    structure = ss.model.lumped(np.ones(1), np.ones((1, 1)), damping=np.array([[0.02]]), names=("mass",))
+    spring = ss.Interface(("spring",), (ss.CubicSpring(cubic_t=1.0),), np.array([[1.0], [0.0], [0.0]]))
     system = ss.System(structure, spring, outputs=structure.sets["mass"])
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
-    sweep = ss.Sweep(
-        omega_range=omega_range, low=highest, high=highest, selection="always_high", points=points
-    )
+    sweep = ss.Sweep(omega_range=omega_range, low=highest, high=highest, selection="always_high", points=points)
     return ss.response.forced_problem(system, load, sweep)
 
 
@@ -247,7 +224,7 @@ def test_a_subharmonic_motion_closes_after_three_periods():
     def rate(t, y):
         return [y[1], 3.0 * np.cos(3 * point.omega * t) - 0.02 * y[1] - y[0] - y[0] ** 3]
 
-    course = scipy.integrate.solve_ivp(rate, (0.0, period), state, "DOP853", rtol=1e-9, t_eval=[period / 3, period]).y  # fmt: skip
+    course = scipy.integrate.solve_ivp(rate, (0.0, period), state, "DOP853", rtol=1e-9, t_eval=[period / 3, period]).y
     assert np.abs(course[:, 0] - state).max() > 0.3
     assert np.abs(course[:, 1] - state).max() < 1e-3
 
@@ -281,9 +258,7 @@ def folded():
     """Return a response of one harmonic with two folds, its points, and a phase that falls along the whole branch at both and their neighbours."""
     problem = cubic_mass((0.8, 1.6), force=0.02, highest=1, points=30)
     load = problem.low.linear.load
-    every = ss.response.accepted_points(
-        list(ss.forced_response(problem.system, load, problem.sweep))
-    )
+    every = ss.response.accepted_points(list(ss.forced_response(problem.system, load, problem.sweep)))
     points = [p for p in every if p.stage != "peak"]
     return problem, points, bifurcations(problem, points, examine=None).found
 
@@ -321,9 +296,7 @@ def test_a_branch_point_in_the_step_of_a_fold_is_found():
         return with_multipliers(1.0 + 0.1 * beyond, 1.0 + 0.1 * (phase(point) - there), error=1e-9)
 
     found = bifurcations(problem, points, examine=examine).found
-    assert [(b.kind, b.before, b.after) for b in found] == [
-        ("fold", 1, 2), ("branch point", 2, 1), ("fold", 1, 0)
-    ]  # fmt: skip
+    assert [(b.kind, b.before, b.after) for b in found] == [("fold", 1, 2), ("branch point", 2, 1), ("fold", 1, 0)]
     assert phase(found[1].point) == pytest.approx(there, abs=1e-5)
 
 
@@ -347,9 +320,7 @@ def test_a_torus_of_an_absorber_lies_where_shooting_has_it():
     system = ss.System(structure, ss.Interface(("ground", "link"), springs, gaps), np.array([0]))
     load = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.11, 0.0j])})
     odd = [1, 3]
-    sweep = ss.Sweep(
-        omega_range=(1.08, 1.13), low=odd, high=odd, selection="always_high", points=2, peak_points=0
-    )  # fmt: skip
+    sweep = ss.Sweep(omega_range=(1.08, 1.13), low=odd, high=odd, selection="always_high", points=2, peak_points=0)
     problem = ss.response.forced_problem(system, load, sweep)
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     ends = [points[0], points[-1]]

@@ -89,7 +89,7 @@ def test_structural_damping_is_located_by_hill(tmp_path, monkeypatch):
     damped = damped.replace("[25.0, 42.0]\npoints = 20", "[36.0, 38.2]\npoints = 2")
     damped = damped.replace("= 15", "= 7")
     # the loss of the viscous one at half the frequency of the load, at which the doubled motion vibrates most
-    study.write_text(damped.replace("[contact.stop]", "[damping]\nloss_factor = 0.1\n\n[contact.stop]"))  # fmt: skip
+    study.write_text(damped.replace("[contact.stop]", "[damping]\nloss_factor = 0.1\n\n[contact.stop]"))
     asked, response = asked_of(study)
     found = located(asked, response, Kept())
     assert [b.kind for b in found.found] == ["period doubling"]
@@ -112,7 +112,7 @@ def test_what_is_refused_is_told_and_not_taken_for_none(monkeypatch):
 def test_check_names_the_cost(tmp_path):
     shutil.copy(EXAMPLE, tmp_path)
     said = CliRunner().invoke(app, ["check", str(tmp_path / EXAMPLE.name)]).output
-    assert "bifurcations: multipliers along the branch, of at most 300 motions" in " ".join(said.split())  # fmt: skip
+    assert "bifurcations: multipliers along the branch, of at most 300 motions" in " ".join(said.split())
 
 
 class Kept(dict):

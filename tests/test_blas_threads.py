@@ -49,9 +49,7 @@ def counts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return own
 
 
-def test_each_step_of_a_generator_has_one_thread_and_what_happens_between_has_all(
-    counts: list[int],
-) -> None:
+def test_each_step_of_a_generator_has_one_thread_and_what_happens_between_has_all(counts: list[int]) -> None:
     ended = []
 
     @by_one_thread
@@ -102,9 +100,7 @@ def test_the_lower_layer_takes_one_thread(function: object) -> None:
     assert hasattr(function, "__wrapped__")
 
 
-def test_a_response_of_the_lower_layer_is_solved_by_one_thread(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_response_of_the_lower_layer_is_solved_by_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blas_threads, "SAID", False)
     before = [get() for get, _ in blas_threads.loaded()]
     seen: set[int] = set()

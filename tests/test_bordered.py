@@ -43,12 +43,10 @@ class GivenAmplitude:
     amplitude: float
 
     def value(self, state: State) -> float:
-        return float(np.log(np.linalg.norm(self.driven.motion(state.setting.balance, state.x)) / self.amplitude))  # fmt: skip
+        return float(np.log(np.linalg.norm(self.driven.motion(state.setting.balance, state.x)) / self.amplitude))
 
     def gradient(self, state: State) -> FloatArray:
-        return np.append(
-            self.driven.gradient(state.setting.balance, state.x), np.zeros(state.extra.size)
-        )
+        return np.append(self.driven.gradient(state.setting.balance, state.x), np.zeros(state.extra.size))
 
 
 def at_level(balance: HarmonicBalance) -> PeriodicProblem:
@@ -84,11 +82,7 @@ def block() -> tuple[System, HarmonicLoad]:
     """A mass that moves in three directions on a contact that slips; two harmonics act."""
     stiffness = np.array([[1.0, 0.1, 0.15], [0.1, 1.3, 0.1], [0.15, 0.1, 1.1]])
     law = ElasticCoulomb(k_t=0.4, k_w=0.3, k_n=0.5, mu=0.5, preload=1.0)
-    system = System(
-        lumped(np.eye(3), stiffness, 0.03 * stiffness),
-        Interface(("c",), (law,), np.eye(3)),
-        np.arange(3),
-    )
+    system = System(lumped(np.eye(3), stiffness, 0.03 * stiffness), Interface(("c",), (law,), np.eye(3)), np.arange(3))
     force = {1: np.array([0.2, 0.1j, 0.12]), 2: np.array([0.05j, 0.0, 0.1])}
     return system, HarmonicLoad(np.array([0, 0, -0.2]), force)
 
@@ -113,7 +107,7 @@ PROBLEMS = {
     "quadrature of the second harmonic": lambda b, f: peak(b, PhaseQuadrature(Driven(0, (2, 1)), 0.3), f),
     "amplitude by level": lambda b, _: at_level(b),
     "peak of an amplitude": peak_at_level,
-}  # fmt: skip
+}
 CASES = {"block": (block, "mu", 0.5), "duffing": (duffing, "cubic_t", 0.4)}
 
 
@@ -134,8 +128,7 @@ def test_derivatives_are_those_of_the_residual(case, name):
     assert at.jac.shape == (y.size, y.size)
     step = 1e-5
     columns = [
-        (problem.residual(y + step * e, p) - problem.residual(y - step * e, p)) / (2 * step)
-        for e in np.eye(y.size)
+        (problem.residual(y + step * e, p) - problem.residual(y - step * e, p)) / (2 * step) for e in np.eye(y.size)
     ]
     found, expected = array_of(at.jac), np.array(columns).T
     size = np.max(np.abs(expected), axis=1)
@@ -148,9 +141,7 @@ def test_derivatives_are_those_of_the_residual(case, name):
     assert np.max(np.abs(at.jac_p - by_p)) < 1e-4 * max(np.max(np.abs(by_p)), 1e-3)
 
 
-@given(
-    st.integers(0, 2**31), st.integers(1, 6), st.lists(st.integers(1, 3), min_size=1, max_size=3)
-)
+@given(st.integers(0, 2**31), st.integers(1, 6), st.lists(st.integers(1, 3), min_size=1, max_size=3))
 @settings(max_examples=40, deadline=None)
 def test_borders_around_borders_are_one_matrix(seed, n, widths):
     rng = np.random.default_rng(seed)
@@ -172,9 +163,7 @@ def test_borders_around_borders_are_one_matrix(seed, n, widths):
 # ---- closed forms --------------------------------------------------------------------------------------------------------
 
 
-@given(
-    st.floats(0.2, 5.0), st.floats(0.2, 5.0), st.floats(0.005, 0.2), st.integers(1, 4), st.floats(-3.0, 3.0)
-)  # fmt: skip
+@given(st.floats(0.2, 5.0), st.floats(0.2, 5.0), st.floats(0.005, 0.2), st.integers(1, 4), st.floats(-3.0, 3.0))
 @settings(max_examples=12, deadline=None)
 def test_peaks_of_one_mass_are_those_of_the_formula(mass, stiffness, ratio, harmonic, phase):
     # a stuck damper beside the spring: the oscillator is linear, whichever harmonic of the frequency drives it
@@ -281,9 +270,7 @@ def test_at_a_fold_the_border_is_solved_by_iteration_as_by_lu():
         at = balance.linearise(fold.x, fold.p)
         sizes = np.linalg.svd(at.jac.dense(), compute_uv=False)
         assert sizes[-1] < 1e-6 * sizes[-2]  # singular, as far as a fold can be located
-        problem = PeriodicProblem(
-            unknown_frequency(lambda _: balance, fold.p), (PhaseQuadrature(driven, 0.0),), LU
-        )
+        problem = PeriodicProblem(unknown_frequency(lambda _: balance, fold.p), (PhaseQuadrature(driven, 0.0),), LU)
         border = problem.linearise(np.append(fold.x, 0.0), 0.0).jac
         more = rng.standard_normal((2, border.shape[0]))
         for jac in (border, Bordered(border, more[0], more[1], 0.5)):
@@ -303,7 +290,7 @@ def test_a_corrector_that_leaves_the_frequencies_is_told_so():
     problem = peak(balance, HorizontalTangent(Driven(0, (1,))), "cubic_t")
     at = problem.linearise(np.append(np.ones(balance.size), 3.5), 0.4)
     assert np.all(np.isinf(at.residual))
-    solution = newton(lambda v: problem.linearise(v, 0.4), np.append(np.ones(balance.size), 3.5), FINE)  # fmt: skip
+    solution = newton(lambda v: problem.linearise(v, 0.4), np.append(np.ones(balance.size), 3.5), FINE)
     assert solution.status is Status.NOT_FINITE
 
 

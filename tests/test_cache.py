@@ -48,9 +48,7 @@ def test_what_is_read_is_what_was_computed(wave, tmp_path):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)
     assert read.dofs.labels == made.dofs.labels
-    assert {k: v.tolist() for k, v in read.sets.items()} == {
-        k: v.tolist() for k, v in made.sets.items()
-    }
+    assert {k: v.tolist() for k, v in read.sets.items()} == {k: v.tolist() for k, v in made.sets.items()}
 
 
 def variants(structure):
@@ -76,12 +74,7 @@ def test_any_change_is_computed_anew(wave, tmp_path):
         cached(counted, other, keep, 5, folder=tmp_path)
         assert counted.calls == i + 2
     last = counted.calls
-    for arguments in (
-        (keep, 6),
-        (keep[::-1].copy(), 5),
-        (keep, ModesBelow(0.1)),
-        (keep, ModesBelow(0.2)),
-    ):
+    for arguments in ((keep, 6), (keep[::-1].copy(), 5), (keep, ModesBelow(0.1)), (keep, ModesBelow(0.2))):
         cached(counted, wave, *arguments, folder=tmp_path)
         last += 1
         assert counted.calls == last

@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg
 
-from evidence.validation.calculix_stored import (
-    CASES,
-    lowest_frequencies,
-    plain_tie,
-    static_difference,
-    stored_sector,
-)
+from evidence.validation.calculix_stored import CASES, lowest_frequencies, plain_tie, static_difference, stored_sector
 from evidence.validation.reference_data import COMPLETE
 from stickslip.model.readers.calculix import read_calculix_matrices
 
@@ -48,18 +42,13 @@ def test_textbook_tangent_is_off_by_what_it_leaves_out(coarse):
     assert 1e-3 < off.max() < 1e-2
 
 
-@pytest.mark.skipif(
-    not FOLDER.is_dir(),
-    reason="the folder with CalculiX results does not lie beside the repository",
-)
+@pytest.mark.skipif(not FOLDER.is_dir(), reason="the folder with CalculiX results does not lie beside the repository")
 def test_matrices_at_rest_and_preloaded(coarse):
     """One untied sector; the difference is that of the mesh's printed digits."""
     mesh = coarse.solid.mesh
     rest = read_calculix_matrices(FOLDER / "n24_coarse_matrix_free.sti", mesh=mesh)
     preloaded = read_calculix_matrices(
-        FOLDER / "n24_coarse_matrix_pre.sti",
-        mesh=mesh,
-        mass=FOLDER / "n24_coarse_matrix_free.mas.gz",
+        FOLDER / "n24_coarse_matrix_pre.sti", mesh=mesh, mass=FOLDER / "n24_coarse_matrix_free.mas.gz"
     )
     turning = coarse.solid.at_speed(coarse.speed)
     for ours, theirs in ((coarse.solid.structure, rest), (turning, preloaded)):

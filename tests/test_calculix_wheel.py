@@ -10,12 +10,7 @@ from small_v2 import EXAMPLES, changed
 from test_cli import done
 
 from stickslip.assembly.assembling import assemble
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import fields
 from stickslip.study.models.study import read_study
 
@@ -50,7 +45,9 @@ def test_the_wheel_of_a_calculix_deck_rubs_at_its_platforms(tmp_path: Path) -> N
     assert found.engine_order == 13
     assert (found.static_force[:, 2] < 0).sum() == 18  # of 27: at speed the rest has opened
     omega = 2 * np.pi * np.array(HERTZ)
-    sweep = Sweep(omega_range=(omega[0], omega[-1]), at=tuple(omega), low=1, high=1, selection="always_low", peak_points=0)  # fmt: skip
+    sweep = Sweep(
+        omega_range=(omega[0], omega[-1]), at=tuple(omega), low=1, high=1, selection="always_low", peak_points=0
+    )
     tip = found.output_labels.index("tip.y")
     amplitude, lost = [], []
     for newton in (0.1, 5.0):

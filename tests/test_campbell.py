@@ -51,24 +51,14 @@ def test_modes_that_veer_do_not_change_places(steps):
 def test_crossings_to_the_tolerance():
     # (mΩ)² = 1 + 2Ω² and = 4: closed forms
     found = ss.response.campbell(stiffened, np.linspace(0.0, 3.0, 4), 2, (1, 2, 3), tolerance=1e-9)
-    exact = {
-        (2, 0): np.sqrt(1 / 2),
-        (3, 0): np.sqrt(1 / 7),
-        (1, 1): 2.0,
-        (2, 1): 1.0,
-        (3, 1): 2 / 3,
-    }
+    exact = {(2, 0): np.sqrt(1 / 2), (3, 0): np.sqrt(1 / 7), (1, 1): 2.0, (2, 1): 1.0, (3, 1): 2 / 3}
     speeds = {(c.engine_order, c.mode): c.speed for c in found.crossings}
     assert speeds.keys() == exact.keys()  # order 1 never meets the first: 1 + 2Ω² > Ω²
     for which, speed in exact.items():
         assert speeds[which] == pytest.approx(speed, rel=1e-8), which
     for crossing in found.crossings:
-        assert crossing.frequency_hz * TWO_PI == pytest.approx(
-            crossing.engine_order * crossing.speed
-        )
-    assert [c.engine_order for c in found.crossings] == sorted(
-        c.engine_order for c in found.crossings
-    )
+        assert crossing.frequency_hz * TWO_PI == pytest.approx(crossing.engine_order * crossing.speed)
+    assert [c.engine_order for c in found.crossings] == sorted(c.engine_order for c in found.crossings)
 
 
 def test_a_crossing_on_a_speed_counts_once():
@@ -83,9 +73,7 @@ def test_a_crossing_on_a_speed_counts_once():
 @pytest.mark.parametrize("order", [2, 30, 3000])
 def test_tolerance_is_relative_to_the_crossing(order):
     """Which may lie far below the first speeds: 1 + Ω²/2 = m²Ω²."""
-    met = ss.response.campbell(
-        lambda w: of_squares(1 + w**2 / 2), [0.0, 100.0], 1, (order,), tolerance=1e-3
-    )
+    met = ss.response.campbell(lambda w: of_squares(1 + w**2 / 2), [0.0, 100.0], 1, (order,), tolerance=1e-3)
     exact = 1 / np.sqrt(order**2 - 0.5)
     assert [c.speed for c in met.crossings] == [pytest.approx(exact, rel=1e-3)]
 
@@ -120,9 +108,7 @@ def test_rotor_beyond_its_critical_speed_is_stable_by_coriolis_forces_alone():
     modes = ss.model.gyroscopic_modes(rotor(25.0), 2)
     np.testing.assert_allclose(modes.frequencies_hz * TWO_PI, [15.0, 35.0], rtol=1e-9)
     np.testing.assert_allclose(modes.growth, 0.0, atol=1e-6)
-    assert np.all(
-        ss.response.campbell(rotor, [25.0], 2).frequencies_hz < 0
-    )  # diverges without them
+    assert np.all(ss.response.campbell(rotor, [25.0], 2).frequencies_hz < 0)  # diverges without them
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -141,9 +127,7 @@ def test_what_diverges_grows(seed):
 
 def gyroscopic_chain(n, speed=1.0):
     """Sparse chain of n planar masses with Coriolis forces between their two directions."""
-    K = scipy.sparse.diags_array(
-        [-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1]
-    )
+    K = scipy.sparse.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
     K = scipy.sparse.kron(K, np.diag([1.0, 1.7])) * 1e4
     # as if the masses lay farther and farther from the axis of rotation: not the same for all, so that modes mix
     G = scipy.sparse.kron(scipy.sparse.diags_array(np.linspace(0.0, 1.0, n)), SPIN) * 2 * speed
@@ -155,9 +139,7 @@ def gyroscopic_chain(n, speed=1.0):
 def quadratic(structure):
     """All frequencies of the quadratic problem, from the general companion matrix."""
     M, C, K = (a.toarray() for a in (structure.mass, structure.damping, structure.stiffness))
-    state = np.block(
-        [[np.zeros_like(K), np.eye(len(K))], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]
-    )
+    state = np.block([[np.zeros_like(K), np.eye(len(K))], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     rates = scipy.linalg.eigvals(state)
     return np.sort(rates.imag[rates.imag > 0]) / TWO_PI
 
@@ -223,16 +205,12 @@ def test_waves_of_both_senses_are_the_whole_wheel():
     assert np.all(table.forward_hz[0] == table.frequencies_hz[0])
     both = [table.frequencies_hz, table.forward_hz[1:]]
     whole = ss.model.gyroscopic_modes(ss.reduction.wheel(sector), 14).frequencies_hz
-    np.testing.assert_allclose(
-        np.sort(np.concatenate([b.ravel() for b in both])), whole, rtol=1e-10
-    )
+    np.testing.assert_allclose(np.sort(np.concatenate([b.ravel() for b in both])), whole, rtol=1e-10)
 
 
 def test_engine_orders_meet_the_wave_they_excite():
     # orders 2 and 5 excite waves 2 and 5: backward and forward with two nodal diameters on seven sectors
-    diagrams = ss.response.cyclic_campbell(
-        turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True
-    )
+    diagrams = ss.response.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True)
     assert [d.wave_number for d in diagrams] == [2, 5]
     assert [d.nodal_diameter for d in diagrams] == [2, 2]
     assert {c.engine_order for c in diagrams[0].crossings} == {2, 9}
@@ -245,9 +223,14 @@ def test_engine_orders_meet_the_wave_they_excite():
 def test_waves_may_be_named_and_watched():
     seen = []
     diagrams = ss.response.cyclic_campbell(
-        turning_ring, [0.0, 0.5, 1.0], 1, (2,), wave_numbers=(0, 6), coriolis=True,
+        turning_ring,
+        [0.0, 0.5, 1.0],
+        1,
+        (2,),
+        wave_numbers=(0, 6),
+        coriolis=True,
         progress=lambda wave, speed: seen.append((wave, speed)),
-    )  # fmt: skip
+    )
     assert [d.wave_number for d in diagrams] == [0, 6]
     assert not diagrams[0].crossings + diagrams[1].crossings  # order 2 excites neither
     assert seen == [(0, 0.5), (0, 1.0), (6, 0.5), (6, 1.0)]
@@ -260,9 +243,7 @@ def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
     def hub(speed, sectors=5):
         structure = rotor(speed)
         dofs = ss.model.Dofs(np.zeros(2, dtype=int), ("x", "y"), np.zeros((2, 3)))
-        return ss.reduction.CyclicSector(
-            replace(structure, dofs=dofs), sectors, np.arange(2), np.arange(2)
-        )
+        return ss.reduction.CyclicSector(replace(structure, dofs=dofs), sectors, np.arange(2), np.arange(2))
 
     # each sector has its share of the hub, here all of its mass and stiffness: frequencies do not change
     speeds = np.linspace(0.0, 8.0, 5)

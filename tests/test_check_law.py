@@ -22,10 +22,7 @@ RIGHT = {
     "jenkins": (ss.Jenkins(k_t=2e6, k_w=1e6, k_n=3e6, limit=10.0), 1e-5),
     "elastic_coulomb": (ss.ElasticCoulomb(k_t=2e6, k_w=1e6, k_n=3e6, mu=0.4, preload=10.0), 1e-5),
     "coupled_coulomb": (ss.CoupledCoulomb(k_t=2e6, k_n=3e6, mu=0.4, preload=10.0), 1e-5),
-    "regularised_coulomb": (
-        ss.RegularisedCoulomb(mu=0.4, transition_velocity=0.5, k_n=3.0, preload=0.3),
-        1.0,
-    ),
+    "regularised_coulomb": (ss.RegularisedCoulomb(mu=0.4, transition_velocity=0.5, k_n=3.0, preload=0.3), 1.0),
     "dahl": (ss.Dahl(k_t=2.0, k_w=1.5, k_n=1.0, limit=0.4), 1.0),
     "bouc_wen": (ss.BoucWen(k_t=2.0, beta=0.5, gamma=0.2, alpha=0.1, a=0.7, k_n=1.0), 1.0),
     "iwan": (ss.Iwan(k_t=2.0, limit=1.0), 1.0),
@@ -127,9 +124,7 @@ class _NoNormal(_Own):
 def test_wrong_laws_are_told_where():
     with pytest.raises(InputError, match=r"_Forgetful: the step does not fill force\[1\]"):
         check_law(_Forgetful())
-    with pytest.raises(
-        InputError, match=r"_Wrong: jac\[0, 0\], force\[0\] by displacement\[0\], is 1,"
-    ):
+    with pytest.raises(InputError, match=r"_Wrong: jac\[0, 0\], force\[0\] by displacement\[0\], is 1,"):
         check_law(_Wrong())
     with pytest.raises(InputError, match=r"pairs = 5 leaves out jac\[0, 1\]"):
         check_law(_Coupled(n_state=1))
@@ -152,9 +147,7 @@ def test_a_pressure_that_grows_as_the_bodies_part_is_told_with_numbers(preload):
 
 def test_a_stuck_stiffness_that_the_law_has_nowhere_is_told():
     numbers = {"k_t": 2e6, "k_w": 1e6, "k_n": 3e6, "mu": 0.4, "preload": 10.0}
-    with pytest.raises(
-        InputError, match=r"stuck_stiffness\[0\] is 9e\+09 N/m, .* is 2e\+06 N/m where"
-    ):
+    with pytest.raises(InputError, match=r"stuck_stiffness\[0\] is 9e\+09 N/m, .* is 2e\+06 N/m where"):
         check_law(_Stiffer(**numbers), size=1e-5)
     with pytest.raises(InputError, match=r"stuck_stiffness\[2\] is 1 N/m, .* is 3e\+06 N/m where"):
         check_law(_NoNormal(**numbers), size=1e-5)

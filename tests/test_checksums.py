@@ -46,9 +46,7 @@ def test_content_of_other_programs_is_read_unless_a_checksum_has_to_be_there() -
         checked(b"abc\n")
 
 
-def test_a_damaged_part_is_made_anew_with_one_line(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_damaged_part_is_made_anew_with_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     made: list[int] = []
 
     def make() -> Mapping[str, Any]:
@@ -73,9 +71,7 @@ def test_a_damaged_part_is_made_anew_with_one_line(
 def test_a_flipped_bit_of_a_structure_takes_nothing_from_it(tmp_path: Path) -> None:
     """Fields that may be left out (loss, basis) were lost with the name in zip's directory."""
     dofs = Dofs(np.array([1, 2]), ("x", "x"), np.zeros((2, 3)), ("", ""))
-    structure = Structure(
-        MATRIX, 0 * MATRIX, MATRIX, dofs, {"tip": np.array([1])}, np.eye(2), 0.1 * MATRIX
-    )
+    structure = Structure(MATRIX, 0 * MATRIX, MATRIX, dofs, {"tip": np.array([1])}, np.eye(2), 0.1 * MATRIX)
     path = tmp_path / "a.npz"
     save_structure(structure, path)
     whole = path.read_bytes()
@@ -93,9 +89,7 @@ def test_a_flipped_bit_of_a_structure_takes_nothing_from_it(tmp_path: Path) -> N
     assert {place.partition(": array")[0] for place in places} == {str(path)}
 
 
-def test_a_result_whose_checksum_was_cut_is_refused_and_not_replaced_by_another(
-    tmp_path: Path,
-) -> None:
+def test_a_result_whose_checksum_was_cut_is_refused_and_not_replaced_by_another(tmp_path: Path) -> None:
     path = tmp_path / "result.nc"
     tree = xr.DataTree(xr.Dataset({"a": ("x", np.arange(3.0))}, attrs={"study_file": "b.toml"}))
     write_tree(tree, path)

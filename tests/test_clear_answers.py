@@ -63,15 +63,9 @@ def negative():
         (lambda: Newton(tolerance=math.nan), r"Newton.tolerance"),
         (lambda: Newton(max_iterations=0), r"Newton.max_iterations"),
         (lambda: sweep(omega_range=(50.0, 50.0)), r"got 50 to 50 rad/s. Widen the range"),
-        (
-            lambda: forced_problem(system(touched=()), LOAD, sweep()),
-            r"touches no dof that can move",
-        ),
+        (lambda: forced_problem(system(touched=()), LOAD, sweep()), r"touches no dof that can move"),
         (lambda: forced_problem(system(negative()), LOAD, sweep()), r"has the mass -1 at node1.x"),
-        (
-            lambda: forced_problem(system(), ss.HarmonicLoad(np.zeros(2)), sweep()),
-            r"HarmonicLoad: is zero",
-        ),
+        (lambda: forced_problem(system(), ss.HarmonicLoad(np.zeros(2)), sweep()), r"HarmonicLoad: is zero"),
     ],
 )
 def test_wrong_arguments_are_named(make, message):
@@ -147,11 +141,12 @@ def test_a_package_that_lacks_another_is_not_called_missing(package, lacking, sa
 
 def test_a_deck_says_what_of_it_is_not_taken(tmp_path: Path) -> None:
     deck = write_deck(tmp_path / "deck.inp")
-    more = "*BOUNDARY\nFOOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n*DLOAD\nE, CENTRIF, 10000., 0., 0., 0., 0., 0., 1.\n*END STEP\n"
+    more = (
+        "*BOUNDARY\nFOOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n*DLOAD\nE, CENTRIF, 10000., 0., 0., 0., 0., 0., 1.\n*END STEP\n"
+    )
     deck.write_text(deck.read_text() + more)
-    assert (
-        "rotation.speed_rpm: is missing, and the file of part.stub turns at 954.93 rpm"
-        in refused("check", str(file_study(tmp_path)))
+    assert "rotation.speed_rpm: is missing, and the file of part.stub turns at 954.93 rpm" in refused(
+        "check", str(file_study(tmp_path))
     )
     path = file_study(tmp_path, "[rotation]\nspeed_rpm = 954.93")
     assert "rpm" not in done("check", str(path))
@@ -183,9 +178,7 @@ def test_engine_orders_that_sectors_cannot_tell_apart_are_told(tmp_path: Path) -
     (said,) = [w for w in read_study(path).model().warnings if "engine_order" in w]
     assert said.startswith("load.gas.engine_order is 10, and 8 sectors see it as 2")
     text = path.read_text().replace("engine_order = 10", "engine_order = 0")
-    path.write_text(
-        text.replace("frequency_hz = [200.0, 260.0]", 'over = "speed"\nspeed_rpm = [100.0, 200.0]')
-    )
+    path.write_text(text.replace("frequency_hz = [200.0, 260.0]", 'over = "speed"\nspeed_rpm = [100.0, 200.0]'))
     assert "load.gas.engine_order: is 0, and with over" in refused("check", str(path))
 
 
@@ -193,11 +186,7 @@ def test_parts_of_unlike_units_are_told() -> None:
     mesh = bar((1, 1, 1), length=0.1)
     steel, soft = Material(), Material(young_modulus=2.1e8)
     small = replace(mesh, points=1e-3 * mesh.points)
-    parts = {
-        "a": solid_part(mesh, steel),
-        "b": solid_part(small, steel),
-        "c": solid_part(mesh, soft),
-    }
+    parts = {"a": solid_part(mesh, steel), "b": solid_part(small, steel), "c": solid_part(mesh, soft)}
     found = unlike_units(parts)
     assert len(found) == 4
     assert found[0].startswith("part.a has a size of 0.111 m, part.b 0.000111 m")
@@ -213,9 +202,7 @@ def test_a_faint_excitation_is_measured_as_a_whole(share):
     gaps = np.zeros((3, n))
     gaps[0, -1] = -1.0
     law = ss.Jenkins(k_t=1e3, limit=1e6)
-    held = System(
-        structure, Interface(("c",), (law,), scipy.sparse.csr_array(gaps)), outputs=np.array([0])
-    )
+    held = System(structure, Interface(("c",), (law,), scipy.sparse.csr_array(gaps)), outputs=np.array([0]))
     static = np.zeros(n)
     static[0] = 1.0
 

@@ -13,13 +13,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from small_v2 import (
-    write_example_deck,
-    write_four_masses,
-    write_shrouded_deck,
-    write_shrouded_sector,
-    write_two_blades,
-)
+from small_v2 import write_example_deck, write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
 from typer.testing import CliRunner, Result
 
 import stickslip
@@ -81,9 +75,7 @@ def test_light_commands_load_nothing_heavy(tmp_path: Path, words: list[str]) -> 
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
         f"print([m for m in {heavy!r} if m in sys.modules], file=sys.stderr)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path
-    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert ended.stderr.strip() == "[]"
 
 
@@ -94,9 +86,16 @@ def test_a_wrong_study_is_refused_before_what_computes_and_draws_is_loaded(tmp_p
     text = part.read_text(encoding="utf-8")
     part.write_text(text.replace('"chain.m2", "ground"', '"chian.m2", "ground"'), encoding="utf-8")
     late = (
-        "numba", "scipy.sparse", "xarray", "pandas", "plotly", "stickslip.front.study", "stickslip.assembly.model",
-        "stickslip.response.system", "stickslip.harmonic.balance",
-    )  # fmt: skip
+        "numba",
+        "scipy.sparse",
+        "xarray",
+        "pandas",
+        "plotly",
+        "stickslip.front.study",
+        "stickslip.assembly.model",
+        "stickslip.response.system",
+        "stickslip.harmonic.balance",
+    )
     program = (
         "import sys\nfrom stickslip.cli import main\n"
         f"for study in {[str(title), str(part)]!r}:\n"
@@ -104,9 +103,7 @@ def test_a_wrong_study_is_refused_before_what_computes_and_draws_is_loaded(tmp_p
         "    try:\n        main()\n    except SystemExit as end:\n        assert end.code == 2, end.code\n"
         f"print([m for m in {late!r} if m in sys.modules])\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == "[]"
     assert "title: must be a text, got 3" in ended.stderr
     assert "there is no part 'chian'. Did you mean 'chain'?" in ended.stderr
@@ -158,20 +155,14 @@ def test_new_writes_the_example_and_overwrites_nothing(tmp_path: Path) -> None:
     assert (folder / "study.toml").read_text(encoding="utf-8") == example_text()
     (folder / "study.toml").write_text("mine")
     said = refused("new", str(folder))
-    assert (
-        said
-        == f"{folder / 'study.toml'}: exists already. Give another name: nothing is overwritten."
-    )
+    assert said == f"{folder / 'study.toml'}: exists already. Give another name: nothing is overwritten."
     assert (folder / "study.toml").read_text() == "mine"
 
 
 def test_new_in_a_place_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     said = refused("new", str(tmp_path / "file" / "two"))
-    assert (
-        "study.toml: cannot be written (Not a directory). A file stands where a folder has to be"
-        in said
-    )
+    assert "study.toml: cannot be written (Not a directory). A file stands where a folder has to be" in said
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
@@ -205,15 +196,11 @@ def test_output_folder_that_cannot_be_made(tmp_path: Path) -> None:
     assert "results: is a file, and a run makes a folder" in refused("run", str(path))
 
 
-def test_full_disk_is_told_before_anything_is_computed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_full_disk_is_told_before_anything_is_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     usage = namedtuple("usage", "total used free")(10**9, 10**9 - 10**6, 10**6)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
     with (
-        pytest.raises(
-            InputError, match=r"its disk has 1 MB free, a run needs up to 200 MB\. Make room"
-        ),
+        pytest.raises(InputError, match=r"its disk has 1 MB free, a run needs up to 200 MB\. Make room"),
         locked_folder(tmp_path / "results"),
     ):
         pass
@@ -266,9 +253,7 @@ def test_two_blades_answer_and_can_be_read_without_this_package(tmp_path: Path) 
         "peak = tree['forced_response'].sel(vary='load.shaker.ratio')\n"
         "print(peak.vary_value.values.tolist(), float(peak.peak_frequency_hz[0]) > 100, 'stickslip' in sys.modules)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path
-    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert ended.stdout.strip() == "[2000.0, 1000.0] True False"
 
 
@@ -293,9 +278,7 @@ def test_a_deck_from_inspect_to_modes(tmp_path: Path) -> None:
     assert not (tmp_path / "results" / "report.html").exists()
 
 
-def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(
-    tmp_path: Path,
-) -> None:
+def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(tmp_path: Path) -> None:
     path = write_example_deck(tmp_path)
     said = done("run", str(path))
     for table in ("Forced response", "Natural frequencies in Hz", "Crossings", "near resonances"):
@@ -314,12 +297,8 @@ def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(
 
 def test_only_names_what_there_is(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path)
-    assert "Did you mean 'forced_response'?" in refused(
-        "run", str(path), "--only", "force_response"
-    )
-    assert f"{path}: modes: is missing. Add the table [modes]" in refused(
-        "run", str(path), "--only", "modes"
-    )
+    assert "Did you mean 'forced_response'?" in refused("run", str(path), "--only", "force_response")
+    assert f"{path}: modes: is missing. Add the table [modes]" in refused("run", str(path), "--only", "modes")
 
 
 def test_exit_codes_tell_points_without_solution_and_interruptions(

@@ -21,15 +21,8 @@ CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dty
 def write_deck(path: Path, length: float = 1.0) -> Path:
     """Write a cantilever of two cubes of a tenth of a metre (SI) or of other units as a deck."""
     points = 0.1 * np.vstack([CUBE, CUBE[[1, 3, 5, 7]] + [1, 0, 0]]) / length
-    lines = [
-        "*NODE, NSET=ALL",
-        *(f"{i + 1}, {', '.join(map(repr, map(float, p)))}" for i, p in enumerate(points)),
-    ]
-    lines += [
-        "*ELEMENT, TYPE=C3D8, ELSET=E",
-        "1, 1, 2, 4, 3, 5, 6, 8, 7",
-        "2, 2, 9, 10, 4, 6, 11, 12, 8",
-    ]
+    lines = ["*NODE, NSET=ALL", *(f"{i + 1}, {', '.join(map(repr, map(float, p)))}" for i, p in enumerate(points))]
+    lines += ["*ELEMENT, TYPE=C3D8, ELSET=E", "1, 1, 2, 4, 3, 5, 6, 8, 7", "2, 2, 9, 10, 4, 6, 11, 12, 8"]
     lines += ["*NSET, NSET=FOOT", "1, 3, 5, 7", "*NSET, NSET=TIP", "9, 10, 11, 12"]
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850."]
     lines += ["*SOLID SECTION, ELSET=E, MATERIAL=STEEL"]
@@ -62,9 +55,7 @@ def test_inspect_says_what_is_in_a_file(tmp_path: Path) -> None:
     assert "none.inp" in refused("inspect", str(tmp_path / "none.inp"))
     (tmp_path / "notes.txt").write_text("x")
     assert "no reader for files '.txt'" in refused("inspect", str(tmp_path / "notes.txt"))
-    assert "unknown unit system 'furlong'" in refused(
-        "inspect", str(tmp_path / "deck.inp"), "--units", "furlong"
-    )
+    assert "unknown unit system 'furlong'" in refused("inspect", str(tmp_path / "deck.inp"), "--units", "furlong")
 
 
 def test_inspect_gives_the_whole_mass_and_names_what_sets_hold(tmp_path: Path) -> None:
@@ -106,10 +97,7 @@ def test_remedies_are_options_and_keys_not_arguments(tmp_path: Path) -> None:
     deck = write_deck(tmp_path / "deck.inp")
     deck.write_text(deck.read_text() + "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n")
     said = refused("check", str(file_study(tmp_path)))
-    assert (
-        "*EQUATION changes the model and is not read. Let the solver write its matrices and read those."
-        in said
-    )
+    assert "*EQUATION changes the model and is not read. Let the solver write its matrices and read those." in said
     assert "ignore" not in said + refused("inspect", str(deck))
     (tmp_path / "job.sti").write_text("1 1 1.0\n")
     (tmp_path / "job.dof").write_text("1.1\n")
@@ -162,19 +150,12 @@ def without_tie(path: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("low", "high", "sectors", "said"),
-    [
-        ("CYCLIC_LOW", "CYCLIC_HIGH", 23, "15.6522°"),
-        ("CYCLIC_LOW", "CYCLIC_HIHG", 24, "Did you mean 'CYCLIC_HIGH'?"),
-    ],
+    [("CYCLIC_LOW", "CYCLIC_HIGH", 23, "15.6522°"), ("CYCLIC_LOW", "CYCLIC_HIHG", 24, "Did you mean 'CYCLIC_HIGH'?")],
 )
 def test_faces_that_do_not_match_are_told_by_the_keys_of_the_study(
     tmp_path: Path, low: str, high: str, sectors: int, said: str
 ) -> None:
-    faces = {
-        "part.blade.low_face": f'"{low}"',
-        "part.blade.high_face": f'"{high}"',
-        "part.blade.sectors": str(sectors),
-    }
+    faces = {"part.blade.low_face": f'"{low}"', "part.blade.high_face": f'"{high}"', "part.blade.sectors": str(sectors)}
     text = refused("check", str(without_tie(write_example_deck(tmp_path, faces))))
     assert "study.toml: part.blade" in text
     assert said in text

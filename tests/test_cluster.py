@@ -28,7 +28,7 @@ from stickslip.study.keep.attempts import reached
 from stickslip.study.keep.workers import LOOPBACK
 from stickslip.study.run import run_study
 
-if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):  # fmt: skip
+if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):
     pytest.skip("the extra cluster is not installed", allow_module_level=True)
 psutil = import_module("psutil")  # comes with the extra
 
@@ -64,9 +64,7 @@ def modules_of_tests_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
 
 
-def start(
-    folder: Path, *, kind: str = "", processes: int = 1, shard: str = ""
-) -> subprocess.Popen[str]:
+def start(folder: Path, *, kind: str = "", processes: int = 1, shard: str = "") -> subprocess.Popen[str]:
     """Start a run of the study, in which one case kills its process."""
     script = folder / "run.py"
     if not script.exists():  # another run may be reading it
@@ -124,9 +122,7 @@ def listening(processes: list[int]) -> set[str]:
             first = psutil.Process(number)
             for one in [first, *first.children(True)]:
                 with suppress(psutil.Error):
-                    found |= {
-                        c.laddr.ip for c in one.net_connections("tcp") if c.status == "LISTEN"
-                    }
+                    found |= {c.laddr.ip for c in one.net_connections("tcp") if c.status == "LISTEN"}
     return found
 
 
@@ -143,9 +139,7 @@ def dask_cluster(folder: Path) -> Iterator[tuple[str, list[int]]]:
             processes.append(subprocess.Popen([*command, *own, f"{LOOPBACK}:0"], stderr=log))
             for n in range(2):
                 place = ["--local-directory", str(folder / f"worker{n}")]
-                processes.append(
-                    subprocess.Popen([*worker, *own, f"{LOOPBACK}:0", *place], stderr=log)
-                )
+                processes.append(subprocess.Popen([*worker, *own, f"{LOOPBACK}:0", *place], stderr=log))
             yield address, [p.pid for p in processes]
         finally:
             for process in processes:
@@ -239,9 +233,7 @@ def test_shards_that_run_at_once(tmp_path: Path, expected: np.ndarray) -> None:
     assert {p.suffix for p in (tmp_path / "results/jobs").iterdir()} == {".job"}
 
 
-def test_scheduler_that_does_not_answer_is_told(
-    study: ToyStudy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scheduler_that_does_not_answer_is_told(study: ToyStudy, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "PATIENCE", 2)
     began = time.monotonic()
     with pytest.raises(InputError, match="no scheduler answers there"):

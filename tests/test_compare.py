@@ -15,9 +15,7 @@ from stickslip.front.comparison import Comparison
 from stickslip.report.quantities import column
 from stickslip.report.side_by_side import cards
 
-STUDY = (
-    'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'
-)
+STUDY = 'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'
 
 
 def design(ratios: tuple[int, ...], factor: float, mu: float, title: str = "same") -> ss.Result:
@@ -36,7 +34,7 @@ def pair() -> Comparison:
 
 def test_peaks_are_held_against_the_first_design_case_by_case(pair: Comparison) -> None:
     cases = list(zip(pair.peaks["case"], pair.peaks["design"], strict=True))
-    assert cases == [(f"{KEY} = 50", "a"), (f"{KEY} = 50", "b"), (f"{KEY} = 5", "a"), (f"{KEY} = 20", "b")]  # fmt: skip
+    assert cases == [(f"{KEY} = 50", "a"), (f"{KEY} = 50", "b"), (f"{KEY} = 5", "a"), (f"{KEY} = 20", "b")]
     nan = np.nan
     np.testing.assert_allclose(pair.peaks["against the first (%)"], [nan, 20.0, nan, nan])
     np.testing.assert_allclose(pair.peaks["shift (Hz)"], [nan, 0.0, nan, nan])
@@ -61,19 +59,35 @@ def test_a_design_with_one_case_is_held_against_the_case_whose_values_its_study_
 def test_nonlinear_modes_are_drawn_over_each_other_and_told_in_one_table(tmp_path: Path) -> None:
     def mode(hz: float) -> ss.Result:
         along = ("case", "branch", "point")
-        data = xr.Dataset({
-            "amplitude": (along, [[[1e-6, 1e-5, np.nan]]]), "frequency_hz": (along, [[[hz, 0.9 * hz, np.nan]]]),
-            "damping_ratio": (along, [[[0.01, 0.05, np.nan]]]), "status": (along, [[[0, 0, -1]]]), "harmonics": (along, [[[3, 5, -1]]]),
-            **{name: (("case", "branch"), [[v]]) for name, v in {
-                "wave_number": -1, "mode": 1, "mode_frequency_hz": hz, "mode_damping_ratio": 0.01, "largest_damping_ratio": 0.05,
-                "largest_damping_amplitude": 1e-5, "gross_slip_amplitude": np.nan, "problem": "", "end": "reached",
-            }.items()},
-            "output": ("case", ["tip.x"]), "case_label": ("case", [""]),
-        })  # fmt: skip
+        data = xr.Dataset(
+            {
+                "amplitude": (along, [[[1e-6, 1e-5, np.nan]]]),
+                "frequency_hz": (along, [[[hz, 0.9 * hz, np.nan]]]),
+                "damping_ratio": (along, [[[0.01, 0.05, np.nan]]]),
+                "status": (along, [[[0, 0, -1]]]),
+                "harmonics": (along, [[[3, 5, -1]]]),
+                **{
+                    name: (("case", "branch"), [[v]])
+                    for name, v in {
+                        "wave_number": -1,
+                        "mode": 1,
+                        "mode_frequency_hz": hz,
+                        "mode_damping_ratio": 0.01,
+                        "largest_damping_ratio": 0.05,
+                        "largest_damping_amplitude": 1e-5,
+                        "gross_slip_amplitude": np.nan,
+                        "problem": "",
+                        "end": "reached",
+                    }.items()
+                },
+                "output": ("case", ["tip.x"]),
+                "case_label": ("case", [""]),
+            }
+        )
         return ss.Result(tree_of(nonlinear_mode=data))
 
     found = ss.compare(mode(100.0), mode(80.0), names=("a", "b"))
-    drawn = {t.name: np.asarray(t.y) for t in found.plot("compared_nonlinear_modes").data if t.showlegend}  # fmt: skip
+    drawn = {t.name: np.asarray(t.y) for t in found.plot("compared_nonlinear_modes").data if t.showlegend}
     assert drawn["b, mode 1"].tolist() == [80.0, 72.0]
     page = found.report(tmp_path / "c.html").read_text(encoding="utf-8")
     assert page.count("reached") == 2
@@ -91,7 +105,7 @@ def test_rotations_have_their_unit_and_stand_against_no_displacements() -> None:
     turned = ss.Result(own.data.copy(deep=True))
     data = turned.data["forced_response"].to_dataset()
     names = [str(n).replace(".x", ".rx") for n in data["output"].values]
-    turned = ss.Result(tree_of(forced_response=data.assign_coords(output=names).assign_attrs(report_output=names[0])))  # fmt: skip
+    turned = ss.Result(tree_of(forced_response=data.assign_coords(output=names).assign_attrs(report_output=names[0])))
     assert "amplitude (rad/N)" in ss.compare(turned, turned, names=("a", "b")).peaks
     with pytest.raises(ss.InputError, match="are displacements and rotations"):
         ss.compare(own, turned, names=("a", "b"))
@@ -119,7 +133,7 @@ def test_each_case_is_drawn_for_the_designs_that_have_it(pair: Comparison) -> No
 def test_the_head_holds_best_against_best_and_names_each_case(pair: Comparison) -> None:
     head = cards(pair.designs, divided=True)
     labels = [card.label for card in head]
-    assert labels == ["best peak of a", "best peak of b", f"peak of a at {KEY} = 50", f"peak of b at {KEY} = 50"]  # fmt: skip
+    assert labels == ["best peak of a", "best peak of b", f"peak of a at {KEY} = 50", f"peak of b at {KEY} = 50"]
     assert f"for {KEY} = 5;" in head[0].note
     assert f"for {KEY} = 20;" in head[1].note
     assert head[1].note.endswith(" than best peak of a")
@@ -134,7 +148,7 @@ def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> No
     hz = np.asarray(figure.data[0].x, dtype=float)
     response = one["forced_response"]
     force = float(response["excitation_n"][0])
-    whole = np.asarray(response["amplitude"].isel(output=0).values)[np.argsort(response["frequency_hz"].values)]  # fmt: skip
+    whole = np.asarray(response["amplitude"].isel(output=0).values)[np.argsort(response["frequency_hz"].values)]
     file = tmp_path / "rig.csv"
     lines = [f"{f},{1.1e6 * a / force}" for f, a in zip(np.sort(hz), whole, strict=True)]
     file.write_text("frequency_hz,amplitude_um_per_n\n" + "\n".join(lines))
@@ -201,7 +215,5 @@ def test_from_the_command_line(tmp_path: Path) -> None:
         ([], "m", []),
     ],
 )
-def test_numbers_of_a_column_have_the_same_decimals(
-    values: list[float], unit: str, cells: list[str]
-) -> None:
+def test_numbers_of_a_column_have_the_same_decimals(values: list[float], unit: str, cells: list[str]) -> None:
     assert column(np.array(values), "m") == (unit, cells)

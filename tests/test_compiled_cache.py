@@ -56,18 +56,21 @@ def damaged(content, rng):
     places = rng.integers(0, len(content), 1 + int(rng.integers(3)))
     np.bitwise_xor.at(flipped, places, 1 << rng.integers(0, 8, places.size).astype(np.uint8))
     kinds = (
-        b"", content[:at], content[:at] + bytes(len(content) - at), rng.bytes(len(content)), content + content[:at],
-        content[at:], b"\x80" + content[1:], flipped.tobytes(), flipped.tobytes(),
-    )  # fmt: skip
+        b"",
+        content[:at],
+        content[:at] + bytes(len(content) - at),
+        rng.bytes(len(content)),
+        content + content[:at],
+        content[at:],
+        b"\x80" + content[1:],
+        flipped.tobytes(),
+        flipped.tobytes(),
+    )
     return kinds[rng.integers(len(kinds))]
 
 
-@pytest.mark.parametrize(
-    ("seed", "rounds"), [(1, 6), pytest.param(2, 40, marks=pytest.mark.validation)]
-)
-def test_damaged_files_of_compiled_functions_are_made_anew(
-    tmp_path, monkeypatch, caplog, seed, rounds
-):
+@pytest.mark.parametrize(("seed", "rounds"), [(1, 6), pytest.param(2, 40, marks=pytest.mark.validation)])
+def test_damaged_files_of_compiled_functions_are_made_anew(tmp_path, monkeypatch, caplog, seed, rounds):
     """Each is told by one line, or, where it looks like one of an earlier version, by none; what comes out is the same."""
     rng = np.random.default_rng(seed)
     monkeypatch.syspath_prepend(tmp_path)
@@ -184,9 +187,7 @@ def times(x):
 """
 
 
-def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(
-    tmp_path, monkeypatch
-):
+def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(cache_files, "_PACKAGE", tmp_path)
     # Python tells files of the same second and size apart by nothing, and would load the first one's bytecode
@@ -240,7 +241,5 @@ print(*(f.py_func.__qualname__ for f in used if not f.overloads), *(f.__qualname
 
 
 def test_every_function_that_is_called_from_python_is_compiled_ahead():
-    missed = subprocess.run(
-        [sys.executable, "-c", ASKED], capture_output=True, text=True, check=True
-    )
+    missed = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=True)
     assert not missed.stdout.split(), missed.stdout

@@ -32,9 +32,7 @@ def test_same_solutions_as_the_force_form(case, omega):
     assert again.status.converged
     assert np.any(form.contacts(again.x, omega).state == 1), "the contact should slip"
     other = balance.unknowns(form.coefficients(again.x))
-    bound = unknowns_bound(
-        other, balance.linearise(found.x, omega), balance.linearise(other, omega)
-    )
+    bound = unknowns_bound(other, balance.linearise(found.x, omega), balance.linearise(other, omega))
     assert np.max(np.abs(other - found.x)) <= bound
 
 
@@ -48,12 +46,10 @@ def test_derivatives(problem):
     sides = [
         (form.linearise(x + step * e, omega).residual - form.linearise(x - step * e, omega).residual) / (2 * step)
         for e in np.eye(form.size)
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(at.dense_jac(), np.array(sides).T, atol=1e-6 * np.abs(sides).max())
     h = 1e-6 * omega
-    by_omega = (form.linearise(x, omega + h).residual - form.linearise(x, omega - h).residual) / (
-        2 * h
-    )
+    by_omega = (form.linearise(x, omega + h).residual - form.linearise(x, omega - h).residual) / (2 * h)
     np.testing.assert_allclose(at.jac_p, by_omega, atol=1e-6 * np.abs(by_omega).max())
 
 

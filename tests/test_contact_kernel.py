@@ -21,12 +21,7 @@ def evaluate(coefficients, laws, samples):
 
 def random_gap(rng, order, tangential=1.0, normal=1.0, means=(0.0, 0.0, 0.0)):
     decay = np.repeat(1.0 / np.maximum(np.arange(order + 1), 1) ** 1.5, 2)[1:, None]
-    gap = (
-        SIZE
-        * rng.standard_normal((2 * order + 1, 3))
-        * decay
-        * np.array([tangential, tangential, normal])
-    )
+    gap = SIZE * rng.standard_normal((2 * order + 1, 3)) * decay * np.array([tangential, tangential, normal])
     gap[0] += SIZE * np.array(means)
     return gap
 
@@ -45,15 +40,17 @@ laws = st.builds(
 def with_preload_in_gaps(law, share):
     """The same law with its preload as a share of the normal force that one unit of gap makes: all states get their turn."""
     return ElasticCoulomb(
-        k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=law.mu, preload=share * law.k_n * SIZE * 2.0,
+        k_t=law.k_t,
+        k_w=law.k_w,
+        k_n=law.k_n,
+        mu=law.mu,
+        preload=share * law.k_n * SIZE * 2.0,
         residual_traction=law.residual_traction,
-    )  # fmt: skip
+    )
 
 
 @settings(max_examples=120)
-@given(
-    law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 7), samples=st.integers(16, 512)
-)
+@given(law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 7), samples=st.integers(16, 512))
 def test_forces_and_states_of_the_plain_march(law, seed, order, samples):
     rng = np.random.default_rng(seed)
     law = with_preload_in_gaps(law, law.preload)
@@ -101,18 +98,12 @@ def differences(coefficients, law, samples):
             point = coefficients.copy()
             point[column // 3, column % 3] += sign * step
             moved.append(point)
-    forces = evaluate(np.hstack(moved), [law] * len(moved), samples).coefficients.reshape(
-        m, len(moved), 3
-    )
+    forces = evaluate(np.hstack(moved), [law] * len(moved), samples).coefficients.reshape(m, len(moved), 3)
     slope = (forces[:, 0::2] - forces[:, 1::2]) / (2 * step)  # (m, 3 m, 3)
     b = basis((m - 1) // 2, samples)
     before = twin((b @ coefficients).T, law).history
-    kept = np.array(
-        [np.array_equal(before, twin((b @ p).T, law).history) for p in moved]
-    ).reshape(-1, 2).all(axis=1)  # fmt: skip
-    return slope.reshape(m, m, 3, 3), kept.reshape(
-        m, 3
-    )  # [force row, gap row, gap direction, force direction]
+    kept = np.array([np.array_equal(before, twin((b @ p).T, law).history) for p in moved]).reshape(-1, 2).all(axis=1)
+    return slope.reshape(m, m, 3, 3), kept.reshape(m, 3)  # [force row, gap row, gap direction, force direction]
 
 
 def check_blocks(blocks, slope, kept, stiffness):
@@ -129,9 +120,7 @@ def check_blocks(blocks, slope, kept, stiffness):
 def test_jacobian_in_each_contact_state(name, residual):
     k_t, k_w, mu, preload, tangential, normal, means, must_occur = STATES[name]
     k_n = 3e6
-    law = ElasticCoulomb(
-        k_t=k_t, k_w=k_w, k_n=k_n, mu=mu, preload=preload * k_n * SIZE, residual_traction=residual
-    )
+    law = ElasticCoulomb(k_t=k_t, k_w=k_w, k_n=k_n, mu=mu, preload=preload * k_n * SIZE, residual_traction=residual)
     rng = np.random.default_rng(7)
     seen, used, total = set(), 0, 0
     for order in ORDERS:
@@ -156,9 +145,7 @@ def test_shakedown_slips_in_the_first_period_only():
 
 
 @settings(max_examples=40)
-@given(
-    law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 3), samples=st.integers(16, 60)
-)
+@given(law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 3), samples=st.integers(16, 60))
 def test_jacobian_of_random_contacts(law, seed, order, samples):
     rng = np.random.default_rng(seed)
     law = with_preload_in_gaps(law, law.preload)
@@ -166,10 +153,7 @@ def test_jacobian_of_random_contacts(law, seed, order, samples):
     slope, kept = differences(coefficients, law, samples)
     # a force on its limit at every sample (constant gaps) is the one generic kink: all its columns drop out
     check_blocks(
-        evaluate(coefficients, [law], samples).blocks[0],
-        slope,
-        kept,
-        max(law.k_t, law.k_w, law.k_n * max(1, law.mu)),
+        evaluate(coefficients, [law], samples).blocks[0], slope, kept, max(law.k_t, law.k_w, law.k_n * max(1, law.mu))
     )
 
 
@@ -239,9 +223,7 @@ def rotated(coefficients, shift, samples):
 )
 def test_a_contact_that_slips_forgets_when_time_began(seed, order, shift, residual):
     rng = np.random.default_rng(seed)
-    law = ElasticCoulomb(
-        k_t=1e6, k_w=2e6, k_n=3e6, mu=0.5, preload=20.0, residual_traction=residual
-    )
+    law = ElasticCoulomb(k_t=1e6, k_w=2e6, k_n=3e6, mu=0.5, preload=20.0, residual_traction=residual)
     coefficients = random_gap(rng, order, 8.0, 1.0)
     period = evaluate(coefficients, [law], 64)
     # both signs of slip, or a lift-off, erase the memory; slip to one side alone may keep the mean of its start
@@ -250,18 +232,11 @@ def test_a_contact_that_slips_forgets_when_time_began(seed, order, shift, residu
         if signs.size < 2 and not np.any(period.state[0, d] == OPEN):
             return
     late = evaluate(rotated(coefficients, shift, 64), [law], 64)
-    assert np.allclose(
-        late.force[0], np.roll(period.force[0], shift, axis=1), rtol=0, atol=1e-9 * 60
-    )
+    assert np.allclose(late.force[0], np.roll(period.force[0], shift, axis=1), rtol=0, atol=1e-9 * 60)
 
 
 @settings(max_examples=60)
-@given(
-    law=laws,
-    seed=st.integers(0, 2**32 - 1),
-    order=st.integers(0, 5),
-    direction=st.sampled_from([0, 1]),
-)
+@given(law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 5), direction=st.sampled_from([0, 1]))
 def test_mirror_image_of_a_tangent(law, seed, order, direction):
     law = with_preload_in_gaps(law, law.preload)
     residual = law.residual_traction
@@ -272,9 +247,13 @@ def test_mirror_image_of_a_tangent(law, seed, order, direction):
         )
     mirrored = coefficients.copy()
     mirrored[:, direction] *= -1.0
-    turned = law if residual is None else ElasticCoulomb(
-        k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=law.mu, preload=law.preload, residual_traction=-residual
-    )  # fmt: skip
+    turned = (
+        law
+        if residual is None
+        else ElasticCoulomb(
+            k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=law.mu, preload=law.preload, residual_traction=-residual
+        )
+    )
     a, b = evaluate(coefficients, [law], 48), evaluate(mirrored, [turned], 48)
     assert np.array_equal(b.force[0, direction], -a.force[0, direction])
     assert np.array_equal(b.force[0, 2], a.force[0, 2])
@@ -285,19 +264,19 @@ def test_mirror_image_of_a_tangent(law, seed, order, direction):
 
 
 @settings(max_examples=60)
-@given(
-    law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 5), power=st.integers(-20, 20)
-)
+@given(law=laws, seed=st.integers(0, 2**32 - 1), order=st.integers(0, 5), power=st.integers(-20, 20))
 def test_forces_grow_with_gap_and_preload(law, seed, order, power):
     law = with_preload_in_gaps(law, law.preload)
-    factor = (
-        2.0**power
-    )  # a power of two: scaling commits no rounding, so the two must agree bit by bit
+    factor = 2.0**power  # a power of two: scaling commits no rounding, so the two must agree bit by bit
     coefficients = random_gap(np.random.default_rng(seed), order, 2.0, 1.0)
     larger = ElasticCoulomb(
-        k_t=law.k_t, k_w=law.k_w, k_n=law.k_n, mu=law.mu, preload=factor * law.preload,
+        k_t=law.k_t,
+        k_w=law.k_w,
+        k_n=law.k_n,
+        mu=law.mu,
+        preload=factor * law.preload,
         residual_traction=law.residual_traction,
-    )  # fmt: skip
+    )
     a, b = evaluate(coefficients, [law], 48), evaluate(factor * coefficients, [larger], 48)
     assert np.array_equal(b.force, factor * a.force)
     assert np.array_equal(b.blocks, a.blocks)
@@ -312,8 +291,7 @@ def test_homogeneous_forces_are_their_jacobian_times_the_gap():
         period = evaluate(q, [law], 64)
         k = period.blocks[0]
         forces = np.stack(
-            [k[TT] @ q[:, 0] + k[TN] @ q[:, 2], k[WW] @ q[:, 1] + k[WN] @ q[:, 2], k[NN] @ q[:, 2]],
-            axis=1,
+            [k[TT] @ q[:, 0] + k[TN] @ q[:, 2], k[WW] @ q[:, 1] + k[WN] @ q[:, 2], k[NN] @ q[:, 2]], axis=1
         )
         assert np.allclose(forces, period.coefficients, rtol=0, atol=1e-12 * 3e6 * SIZE * 10)
 
@@ -324,9 +302,7 @@ def test_full_stick_is_linear_springs():
     period = evaluate(q, [law], 64)
     want = q * np.array([1e6, 2e6, 3e6])
     want[0, 2] -= 1e6
-    assert np.allclose(
-        period.coefficients, want, rtol=0, atol=1e-9
-    )  # rounding of a preload of 1e6 N
+    assert np.allclose(period.coefficients, want, rtol=0, atol=1e-9)  # rounding of a preload of 1e6 N
     for block, k in ((TT, 1e6), (WW, 2e6), (NN, 3e6)):
         assert np.allclose(period.blocks[0, block], k * np.eye(11), rtol=0, atol=1e-12 * k * 64)
     assert np.all(period.blocks[0, [TN, WN]] == 0.0)
@@ -344,9 +320,7 @@ def test_order_of_contacts_does_not_matter():
     rng = np.random.default_rng(5)
     many = [
         ElasticCoulomb(k_t=10**e, k_w=3e5, k_n=1e6, mu=0.3, preload=p, residual_traction=m)
-        for e, p, m in zip(
-            (5, 6, 7, 5.5), (5.0, -2.0, 50.0, 0.0), (None, 0.2, None, -1.0), strict=True
-        )
+        for e, p, m in zip((5, 6, 7, 5.5), (5.0, -2.0, 50.0, 0.0), (None, 0.2, None, -1.0), strict=True)
     ]
     gaps = [random_gap(rng, 3, 3.0) for _ in many]
     order = [2, 0, 3, 1]
@@ -387,11 +361,7 @@ def test_residual_traction_does_not_matter_where_all_slips():
     rng = np.random.default_rng(2)
     q = random_gap(rng, 1, 300.0, 0.1)
     both = [
-        evaluate(
-            q,
-            [ElasticCoulomb(k_t=1e6, k_w=1e6, k_n=1e6, mu=0.5, preload=20.0, residual_traction=m)],
-            64,
-        ).force
+        evaluate(q, [ElasticCoulomb(k_t=1e6, k_w=1e6, k_n=1e6, mu=0.5, preload=20.0, residual_traction=m)], 64).force
         for m in (None, -1.0, 0.0, 1.0)
     ]
     for other in both[1:]:

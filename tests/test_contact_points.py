@@ -21,12 +21,8 @@ from stickslip.model.rigid.sides import nearest
 DEG = math.pi / 180
 LENGTH, WIDTH = 0.048, 0.027
 FLAT = FlatCurvedDamper(length=LENGTH, flat_between=(0.002, 0.002 + WIDTH), curved_width=0.001)
-WEDGE = WedgeDamper(
-    left_angle=40 * DEG, right_angle=65 * DEG, top_width=0.004, height=0.012, length=0.05, mass=0.09
-)
-CYLINDER = CylinderDamper(
-    left_angle=40 * DEG, radius=0.006, length=0.04, mass=0.05, contact_width=0.0005
-)
+WEDGE = WedgeDamper(left_angle=40 * DEG, right_angle=65 * DEG, top_width=0.004, height=0.012, length=0.05, mass=0.09)
+CYLINDER = CylinderDamper(left_angle=40 * DEG, radius=0.006, length=0.04, mass=0.05, contact_width=0.0005)
 
 # a damper that hangs between two grounds: springs and inertia of its own alone
 STUDY = """
@@ -91,9 +87,7 @@ def side_of(name: str, per: str) -> str:
     """The keys of a contact; per point, the stiffness of the side over the points of the first study."""
     by = {"area": AREAS[name], "interface": 1.0, "point": {"flat": 6, "curved": 3}[name]}[per]
     unit = "n_per_m3" if per == "area" else "n_per_m"
-    lines = [
-        f"{word}_stiffness_{unit} = {k / by!r}" for word, k in zip(WORDS, WHOLE[name], strict=True)
-    ]
+    lines = [f"{word}_stiffness_{unit} = {k / by!r}" for word, k in zip(WORDS, WHOLE[name], strict=True)]
     return "\n".join([f'per = "{per}"', *lines])
 
 
@@ -104,11 +98,7 @@ def study(folder: Path, per: str = "area", extent: str = EXTENT) -> Study:
     return Study.from_file(path)
 
 
-@given(
-    st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=8, unique=True),
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 1.0),
-)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=8, unique=True), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_stretches_add_up_to_the_side_and_hold_what_is_nearest(places, before, after):
     places, low, high = sorted(places), min(places) - before, max(places) + after
     parts = nearest(places, low, high)
@@ -132,11 +122,7 @@ def test_areas_add_up_to_the_side(uneven):
     part = damper_part(flat)
     assert part.surfaces["flat"].area.sum() == pytest.approx(LENGTH * WIDTH)
     assert part.surfaces["curved"].area.sum() == pytest.approx(LENGTH * 0.001)
-    assert list(dict.fromkeys(n.split(".")[0] for n in part.surfaces["flat"].names)) == [
-        "L1",
-        "L2",
-        "L3",
-    ]
+    assert list(dict.fromkeys(n.split(".")[0] for n in part.surfaces["flat"].names)) == ["L1", "L2", "L3"]
     wedge = damper_part(replace(WEDGE, sections=places))
     for side, angle in (("left", 40 * DEG), ("right", 65 * DEG)):
         assert wedge.surfaces[side].area.sum() == pytest.approx(0.012 / math.sin(angle) * 0.05)
@@ -158,9 +144,7 @@ def stuck(made: Study) -> np.ndarray:
     model = made.model()
     matrix = model.at(0.0, contacts="stuck").stiffness
     dofs = model.places.own("damper")
-    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)[
-        np.ix_(dofs, dofs)
-    ]
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)[np.ix_(dofs, dofs)]
 
 
 def test_a_section_cut_in_two_at_its_place_changes_nothing(tmp_path):
@@ -180,9 +164,7 @@ def test_the_stiffness_against_a_tilt_has_the_error_of_the_midpoint_rule(count, 
     k = np.array([pairs.laws[i].k_n for i in flat])
     y = pairs.position[flat, 1]
     assert k.sum() == pytest.approx(WHOLE["flat"][0])
-    assert k @ y**2 == pytest.approx(
-        (1 - 1 / count**2) * WHOLE["flat"][0] * LENGTH**2 / 12, abs=1e-3
-    )
+    assert k @ y**2 == pytest.approx((1 - 1 / count**2) * WHOLE["flat"][0] * LENGTH**2 / 12, abs=1e-3)
 
 
 def sections(made: Study, count: int) -> Study:
@@ -215,9 +197,7 @@ def test_stiffness_of_the_whole_side_is_shared_alike_and_that_of_points_grows_wi
 
 
 BODY = 'shape = "rigid_body"\nmass_kg = 0.1\ninertia_kg_m2 = [1e-5, 1e-5, 1e-5]\ncentre_m = [0.0, 0.0, 0.0]\n'
-ROUND = (
-    'shape = "cylinder"\nradius_m = 0.006\nlength_m = 0.04\nleft_angle_deg = 40.0\nmass_kg = 0.05\n'
-)
+ROUND = 'shape = "cylinder"\nradius_m = 0.006\nlength_m = 0.04\nleft_angle_deg = 40.0\nmass_kg = 0.05\n'
 WRONG = [
     (
         {"part.damper.length_m": None},
@@ -234,7 +214,7 @@ WRONG = [
         "part.damper.flat_between_m: must hold all lines of the flat side, at (0.002, 0.029) m from the apex, got (0.003, 0.029). Give the nearer",
     ),
     ({"part.damper.curved_width_m": 0.0}, "part.damper.curved_width_m: must be greater than 0, got 0.0"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("changes", "said"), WRONG)
@@ -265,9 +245,7 @@ def test_what_has_no_area_is_refused_with_file_key_and_remedy(changes, said, tmp
 def test_other_bodies_say_which_key_is_missing(body, said, tmp_path):
     contact = f'[contact.flat]\nbetween = ["damper.left", "ground"]\nlaw = "elastic_coulomb"\nfriction_coefficient = 0.6\n{side_of("flat", "area")}\n'
     path = tmp_path / "study.toml"
-    path.write_text(
-        f'schema_version = 2\ntitle = "One side"\n[part.damper]\n{body}\n{contact}\n[modes]\n'
-    )
+    path.write_text(f'schema_version = 2\ntitle = "One side"\n[part.damper]\n{body}\n{contact}\n[modes]\n')
     with pytest.raises(InputError) as caught:
         Study.from_file(path)
     assert said in str(caught.value)

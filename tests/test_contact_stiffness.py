@@ -126,26 +126,25 @@ def peak_of(k):
         dynamic = stiffness - omega**2 * np.eye(2) + 1j * omega * np.eye(2)
         return abs(np.linalg.inv(dynamic)[1, 1])
 
-    found = minimize_scalar(lambda omega: -size(omega), bounds=(55.0, 75.0), method="bounded", options={"xatol": 1e-9})  # fmt: skip
+    found = minimize_scalar(lambda omega: -size(omega), bounds=(55.0, 75.0), method="bounded", options={"xatol": 1e-9})
     return np.array([-found.fun, found.x / (2 * np.pi)])
 
 
 def test_a_result_tells_what_the_contact_stiffness_does_to_the_peak():
     """Soft contacts decide the peak, contacts a million times as stiff as the structure do not."""
     for k in (1e3, 1e10):
-        body = ss.model.lumped(
-            np.eye(2), 1e4 * np.array([[2.0, -1], [-1, 1.0]]), np.eye(2), names=("a", "b")
-        )
+        body = ss.model.lumped(np.eye(2), 1e4 * np.array([[2.0, -1], [-1, 1.0]]), np.eye(2), names=("a", "b"))
         model = ss.Model(
             parts={"p": ss.Part(structure=body)},
             contacts={"c": ss.Contact(between=("p.a", "ground"), law=ss.Jenkins(k_t=k, limit=1e9), acts="tangential")},
-            loads={"f": ss.Load(on="p.b", newton=1.0)}, outputs=(ss.Output(name="b", on="p.b"),),
-        )  # fmt: skip
+            loads={"f": ss.Load(on="p.b", newton=1.0)},
+            outputs=(ss.Output(name="b", on="p.b"),),
+        )
         result = model.forced_response(hz=(5.0, 20.0), points=12)
         first = next(v for v in result.verdicts if v.level == "trusted")
         assert "contacts 10 % softer change it by" in first.why
         told = float(result["forced_response"].stiffness_peak_slope.values[0])
-        exact, hertz = (peak_of(1.01 * k) - peak_of(0.99 * k)) / (0.02 * np.array([peak_of(k)[0], 1.0]))  # fmt: skip
+        exact, hertz = (peak_of(1.01 * k) - peak_of(0.99 * k)) / (0.02 * np.array([peak_of(k)[0], 1.0]))
         # quadratic in the way to the peak, as in the closed form above; a hundredth of a per cent of the amplitude
         assert told == pytest.approx(exact, abs=1e-4)
         assert (abs(exact) > 5e-3) == (k < 1e4)
@@ -154,8 +153,7 @@ def test_a_result_tells_what_the_contact_stiffness_does_to_the_peak():
 
 
 @pytest.mark.parametrize(
-    ("slope", "note", "said"),
-    [(-0.51, True, "+5.1 %"), (-0.49, False, "+4.9 %"), (1e-6, False, "less than 0.001 %")],
+    ("slope", "note", "said"), [(-0.51, True, "+5.1 %"), (-0.49, False, "+4.9 %"), (1e-6, False, "less than 0.001 %")]
 )
 def test_a_peak_that_contacts_decide_is_noted_and_never_doubted(slope, note, said):
     """Beside 5 %: a tenth of the stiffness times the slope."""

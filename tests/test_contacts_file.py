@@ -55,7 +55,7 @@ WRITTEN = {
     "polynomial_spring": ("along_t = [2e4, 0.0, 1e10]", ss.PolynomialSpring(along_t=(2e4, 0.0, 1e10))),
     "jenkins": (f"{TANGENTIAL}slip_limit_n = 2.0", ss.Jenkins(k_t=2e4, limit=2.0)),
     "elastic_coulomb": (
-        f'{TANGENTIAL}axial_stiffness_n_per_m = 0.0\n{NORMAL}friction_coefficient = 0.5\npreload_n = 4.0',
+        f"{TANGENTIAL}axial_stiffness_n_per_m = 0.0\n{NORMAL}friction_coefficient = 0.5\npreload_n = 4.0",
         ss.ElasticCoulomb(k_t=2e4, k_w=0.0, k_n=2e4, mu=0.5, preload=4.0),
     ),
     "coupled_coulomb": (
@@ -75,7 +75,7 @@ WRITTEN = {
         f'{TANGENTIAL}slip_limit_n = 2.0\npopulation = {{ kind = "four_parameter", chi = -0.5, beta = 0.5 }}',
         ss.Iwan(k_t=2e4, limit=2.0, population=FourParameter(chi=-0.5, beta=0.5)),
     ),
-}  # fmt: skip
+}
 
 
 def write(folder, contact, text=CHAIN):
@@ -99,16 +99,11 @@ def test_every_law_is_written_in_a_file():
 def test_forces_of_a_study_are_those_of_the_law(name, tmp_path):
     said, law = WRITTEN[name]
     data = answered(write(tmp_path, f'law = "{name}"\n{said}\n'))
-    gap, force = (
-        (data[v].values[..., 0] + 1j * data[v].values[..., 1])[:, :, 0]
-        for v in ("gap", "contact_force")
-    )
+    gap, force = ((data[v].values[..., 0] + 1j * data[v].values[..., 1])[:, :, 0] for v in ("gap", "contact_force"))
     assert (data["status"] == 0).all()
     direction = 2 if name == "unilateral_spring" else 0
     for own, told, hertz in zip(gap, force, data["frequency_hz"].values, strict=True):
-        period = contact_forces(
-            to_real(own), compile_contacts([law], None, "march"), 64, 2 * np.pi * hertz
-        )
+        period = contact_forces(to_real(own), compile_contacts([law], None, "march"), 64, 2 * np.pi * hertz)
         found = to_complex(period.coefficients)
         assert np.abs(found[1, direction]) > 0.05  # N: the contact has a say
         np.testing.assert_allclose(told, found, rtol=0, atol=1e-9 * np.abs(found).max())
@@ -136,7 +131,7 @@ REFUSED = [
     ("interference_m = 1e-4\npreload_n = 1.0", "preload_n: is given together with interference_m"),
     ("preload_n = -1.0", "preload_n: must be greater than or equal to 0, got -1.0"),
     ('per = "point"\npreload_pa = 1.0', "preload_pa: is not the key with per = one other than area"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("said", "told"), REFUSED)
@@ -150,10 +145,16 @@ def test_a_contact_at_rest_is_one_thing(said, told, tmp_path):
 @pytest.mark.parametrize(
     ("said", "told"),
     [
-        ("jenkins", "interference_m: is given \\(in Python gap=-0.0001\\), and the law jenkins has a normal force that does not depend on how far"),
-        ("regularised_coulomb", "interference_m: is given \\(in Python gap=-0.0001\\), and the law regularised_coulomb has no normal stiffness here"),
+        (
+            "jenkins",
+            "interference_m: is given \\(in Python gap=-0.0001\\), and the law jenkins has a normal force that does not depend on how far",
+        ),
+        (
+            "regularised_coulomb",
+            "interference_m: is given \\(in Python gap=-0.0001\\), and the law regularised_coulomb has no normal stiffness here",
+        ),
     ],
-)  # fmt: skip
+)
 def test_an_interference_that_presses_nothing_is_refused(said, told, tmp_path):
     own = WRITTEN[said][0].replace("preload_n = 4.0", "")
     study = read_study(write(tmp_path, f'law = "{said}"\n{own}\ninterference_m = 1e-4\n'))
@@ -172,7 +173,5 @@ def test_a_contact_where_everything_is_clamped_says_so(tmp_path: Path) -> None:
         '[load.shaker]\non = "bars.tip"\ndirection = "z"\nforce_n = 1.0\n'
         "[forced_response]\nfrequencies_hz = [100.0]\n"
     )
-    with pytest.raises(
-        InputError, match=r"contact.foot.between: every node of 'bars.foot' is clamped"
-    ):
+    with pytest.raises(InputError, match=r"contact.foot.between: every node of 'bars.foot' is clamped"):
         check_study(read_study(path))

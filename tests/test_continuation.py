@@ -5,15 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from stickslip.solve.continuation import (
-    Following,
-    StepControl,
-    advance,
-    reversed_point,
-    start_point,
-    step_to,
-    trace,
-)
+from stickslip.solve.continuation import Following, StepControl, advance, reversed_point, start_point, step_to, trace
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Status
 
@@ -45,9 +37,7 @@ class Curve:
 
 
 CIRCLE = Curve(lambda x, p: x * x + p * p - 1, lambda x, _: 2 * x, lambda _, p: 2 * p)
-FOLD = Curve(
-    lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0
-)  # folds at x = ±1/√3
+FOLD = Curve(lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0)  # folds at x = ±1/√3
 
 
 def along(control, newton=NEWTON):
@@ -135,11 +125,7 @@ def test_a_reversed_branch_comes_back_to_its_start():
 
 def corner(slope):
     """p = 1 - slope |x|, as contact laws make them; from slope 1 on the branch turns by more than a right angle."""
-    return Curve(
-        lambda x, p: p - 1 + slope * abs(x),
-        lambda x, _: slope * (1.0 if x > 0 else -1.0),
-        lambda _x, _p: 1.0,
-    )
+    return Curve(lambda x, p: p - 1 + slope * abs(x), lambda x, _: slope * (1.0 if x > 0 else -1.0), lambda _x, _p: 1.0)
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.4, 0.6, 1.0, 2.0, 5.0, 20.0])
@@ -176,9 +162,7 @@ def test_a_rounded_corner_lies_at_the_corner_and_is_charged(slope):
 
 @pytest.mark.parametrize("slope", [0.6, 2.0, 20.0])
 def test_a_branch_goes_on_bitwise_at_a_corner(slope):
-    assert_goes_on_bitwise(
-        corner(slope), [-0.7 / slope, 1.0], 0.3, 9.0, StepControl(scale=1.0, max_points=40)
-    )
+    assert_goes_on_bitwise(corner(slope), [-0.7 / slope, 1.0], 0.3, 9.0, StepControl(scale=1.0, max_points=40))
 
 
 # ---- folds --------------------------------------------------------------------------------------------------------------
@@ -197,9 +181,7 @@ def test_units_do_not_move_the_points(x_unit, p_unit):
     for problem, x_size, p_size in ((plain, 1.0, 1.0), (Scaled(), x_unit, p_unit)):
         control = StepControl(scale=0.4 * p_size, first=0.05)
         start = begin(problem, [0.3 * x_size, 0.0], 0.3 * p_size, control)
-        branches.append(
-            [(*(q.x / x_size), q.p / p_size) for q in branch(problem, start, 3.0 * p_size, control)]
-        )
+        branches.append([(*(q.x / x_size), q.p / p_size) for q in branch(problem, start, 3.0 * p_size, control)])
     assert len(branches[0]) == len(branches[1])
     assert np.allclose(branches[0], branches[1], rtol=0, atol=1e-9)
 
@@ -243,10 +225,7 @@ class Duffing:
         r = np.array([k * a - self.c * p * b - self.force, k * b + self.c * p * a])
         stretch = 1.5 * self.beta
         jac = np.array(
-            [
-                [k + stretch * a * a, stretch * a * b - self.c * p],
-                [stretch * a * b + self.c * p, k + stretch * b * b],
-            ],
+            [[k + stretch * a * a, stretch * a * b - self.c * p], [stretch * a * b + self.c * p, k + stretch * b * b]],
             order="F",
         )
         return At(r, jac, np.array([-2 * p * a - self.c * b, -2 * p * b + self.c * a]))
@@ -258,9 +237,7 @@ def test_duffing_lies_on_its_closed_form():
     points = branch(problem, begin(problem, [0.3, 0.0], 0.3, control), 3.0, control)
     ps = np.array([point.p for point in points])
     amplitude = np.array([np.hypot(*point.x) for point in points])
-    closed = amplitude**2 * (
-        (1 - ps**2 + 0.75 * problem.beta * amplitude**2) ** 2 + (problem.c * ps) ** 2
-    )
+    closed = amplitude**2 * ((1 - ps**2 + 0.75 * problem.beta * amplitude**2) ** 2 + (problem.c * ps) ** 2)
     assert np.allclose(closed, problem.force**2, rtol=0, atol=1e-10)
     assert np.sum(np.diff(np.sign(np.diff(ps))) != 0) == 2
     # on the backbone the phase is 90° and c ω A = F: no point is higher
@@ -299,10 +276,14 @@ def test_a_branch_without_end_stops_after_its_points():
 
 def same(a, b):
     return (
-        np.array_equal(a.x, b.x) and a.p == b.p and np.array_equal(a.tangent, b.tangent) and a.step == b.step
-        and a.orientation == b.orientation and a.solution.status is b.solution.status
+        np.array_equal(a.x, b.x)
+        and a.p == b.p
+        and np.array_equal(a.tangent, b.tangent)
+        and a.step == b.step
+        and a.orientation == b.orientation
+        and a.solution.status is b.solution.status
         and a.solution.iterations == b.solution.iterations
-    )  # fmt: skip
+    )
 
 
 def assert_goes_on_bitwise(problem, x, p, end, control):
@@ -327,9 +308,7 @@ def test_a_folded_branch_goes_on_bitwise(end):
 
 
 def test_a_branch_that_ends_goes_on_bitwise():
-    curve = Curve(
-        lambda x, p: x - 1.0 if p < 0.5 else np.nan, lambda _x, _p: 1.0, lambda _x, _p: 0.0
-    )
+    curve = Curve(lambda x, p: x - 1.0 if p < 0.5 else np.nan, lambda _x, _p: 1.0, lambda _x, _p: 0.0)
     points = assert_goes_on_bitwise(curve, [1.0, 1.0], 0.0, 1.0, StepControl(scale=1.0))
     assert points[-1].solution.status is Status.STEP_TOO_SMALL
 
@@ -354,12 +333,7 @@ def test_step_to_where_one_step_is_too_far():
     curve = Curve(
         lambda x, p: np.arctan(20 * (x - np.tanh(40 * (p - 0.5)))),
         lambda x, p: 20 / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2),
-        lambda x, p: (
-            -20
-            / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2)
-            * 40
-            / np.cosh(40 * (p - 0.5)) ** 2
-        ),
+        lambda x, p: -20 / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2) * 40 / np.cosh(40 * (p - 0.5)) ** 2,
     )
     few = along(StepControl(scale=0.1), Newton(tolerance=1e-12, max_iterations=6))
     start = start_point(curve, np.array([-1.0, 1.0]), 0.0, few)

@@ -154,7 +154,7 @@ def test_a_slider_dragged_to_where_it_sticks_for_ever_has_its_derivatives(seed):
     slips, rests = 0.1, 20.0
     for _ in range(12):
         middle = 0.5 * (slips + rests)
-        slips, rests = (slips, middle) if np.all(evaluated(middle).state == STICK) else (middle, rests)  # fmt: skip
+        slips, rests = (slips, middle) if np.all(evaluated(middle).state == STICK) else (middle, rests)
     period, way = evaluated(rests), rng.standard_normal(gaps.shape)
     assert np.all(period.state == STICK)
     found = np.zeros_like(gaps)
@@ -205,9 +205,7 @@ def test_a_step_from_a_normal_force_of_rounding_ends_along_the_way(angle, before
             for pressure in (1e-5, 0.02, 1.0):
                 gap = np.array([*(place + way * line), law.preload - pressure])
                 out, jac, _ = stepped(law, gap, state)
-                assert np.allclose(
-                    out[:2], np.sign(way) * min(abs(way), 0.5 * pressure) * line, atol=2e-15
-                )
+                assert np.allclose(out[:2], np.sign(way) * min(abs(way), 0.5 * pressure) * line, atol=2e-15)
                 # what the force depends on within the rounding of the state before is unbounded
                 assert np.max(np.abs(jac[:, :6] if before < 1e-20 else jac)) < 3.0
 
@@ -232,7 +230,7 @@ def test_the_tangent_of_a_curved_surface_is_an_axis_along_no_normal(turn: int) -
     around = np.roll(np.eye(3), turn, axis=1)  # rows: the axes from `turn` on
 
     def chosen(*normals: np.ndarray) -> list[float]:
-        surface: Any = SimpleNamespace(used=np.arange(len(normals)), node_normals=lambda: np.array(normals))  # fmt: skip
+        surface: Any = SimpleNamespace(used=np.arange(len(normals)), node_normals=lambda: np.array(normals))
         anything: Any = SimpleNamespace(tangent=None, share="point", frame=None)
         law = ss.ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5)
         return list(direction("contact.c", anything, law, anything, surface, None, None))

@@ -41,10 +41,7 @@ def stuck(blades):
     whole = join(blades=blades, damper=body.structure())
     contact = whole.dof_set("blades.contact").reshape(9, 3)
     operator = gap_operator(points, contact, whole.dof_set("damper"), whole.n, body)
-    share = {
-        "flat": np.array([450e6, 450e6, 520e6]) / 6,
-        "curved": np.array([20e6, 450e6, 25e6]) / 3,
-    }
+    share = {"flat": np.array([450e6, 450e6, 520e6]) / 6, "curved": np.array([20e6, 450e6, 25e6]) / 3}
     return with_springs(whole, operator, np.concatenate([share[s] for s in points.side]))
 
 
@@ -131,9 +128,7 @@ def test_sets_and_labels_survive(blades, reduced):
 
 def test_keeping_all_dofs_needs_no_modes():
     full = random_chain()
-    np.testing.assert_allclose(
-        craig_bampton(full, np.arange(12), 0).stiffness, full.stiffness, atol=1e-9
-    )
+    np.testing.assert_allclose(craig_bampton(full, np.arange(12), 0).stiffness, full.stiffness, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -157,16 +152,12 @@ def test_nothing_kept_is_modal_truncation():
     """Documented: the lowest modes of a structure that its supports hold."""
     full = chain(12, mass=1.0, stiffness=1.0)
     small = craig_bampton(full, np.array([]), 3)
-    np.testing.assert_allclose(
-        natural_frequencies(small, 3), natural_frequencies(full, 3), rtol=1e-12
-    )
+    np.testing.assert_allclose(natural_frequencies(small, 3), natural_frequencies(full, 3), rtol=1e-12)
 
 
 def test_the_name_of_a_set_is_told_from_its_dofs():
     full = replace(chain(12, mass=1.0, stiffness=1.0), sets={"tip": np.array([11])})
-    with pytest.raises(
-        InputError, match=r"holds the name 'tip'. Give its dofs: structure.dof_set\('tip'\)"
-    ):
+    with pytest.raises(InputError, match=r"holds the name 'tip'. Give its dofs: structure.dof_set\('tip'\)"):
         craig_bampton(full, "tip", 1)
 
 
@@ -181,9 +172,7 @@ def test_a_floating_chain_is_singular():
     stiffness = 100.0 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
     stiffness[0, 0] = stiffness[4, 4] = 100.0
     floating = lumped(np.ones(5), stiffness)
-    with pytest.raises(
-        SingularError, match=r"with the kept dofs fixed: one body is not held.*translation along x"
-    ):
+    with pytest.raises(SingularError, match=r"with the kept dofs fixed: one body is not held.*translation along x"):
         craig_bampton(floating, np.array([], dtype=int), 2)
     assert natural_frequencies(floating, 1)[0] == pytest.approx(0.0, abs=1e-6)
 
@@ -191,25 +180,19 @@ def test_a_floating_chain_is_singular():
 def test_chain_has_its_closed_form_frequencies():
     n, m, k = 600, 0.2, 5e4  # large enough for the sparse solver
     dense = chain(n, m, k)
-    sparse = Structure(
-        *(scipy.sparse.csr_array(x) for x in (dense.mass, dense.damping, dense.stiffness)),
-        dense.dofs,
-    )
+    sparse = Structure(*(scipy.sparse.csr_array(x) for x in (dense.mass, dense.damping, dense.stiffness)), dense.dofs)
     angle = (2 * np.arange(1, 7) - 1) * math.pi / (2 * (2 * n + 1))
     exact = 2 * math.sqrt(k / m) * np.sin(angle) / (2 * math.pi)
     np.testing.assert_allclose(natural_frequencies(sparse, 6), exact, rtol=1e-9)
     np.testing.assert_allclose(
-        natural_frequencies(chain(20, m, k), 1),
-        2 * math.sqrt(k / m) * math.sin(math.pi / 82) / (2 * math.pi),
+        natural_frequencies(chain(20, m, k), 1), 2 * math.sqrt(k / m) * math.sin(math.pi / 82) / (2 * math.pi)
     )
 
 
 def test_equal_uncoupled_parts_keep_all_their_frequencies():
     one = chain(500, 1.0, 1e4)
     pair = join(left=one, right=one)
-    sparse = Structure(
-        *(scipy.sparse.csr_array(x) for x in (pair.mass, pair.damping, pair.stiffness)), pair.dofs
-    )
+    sparse = Structure(*(scipy.sparse.csr_array(x) for x in (pair.mass, pair.damping, pair.stiffness)), pair.dofs)
     single = natural_frequencies(one, 3)
     np.testing.assert_allclose(natural_frequencies(sparse, 6), np.repeat(single, 2), rtol=1e-8)
 
@@ -220,9 +203,7 @@ def test_added_springs_dense_and_sparse():
     found = with_springs(base, operator, np.array([7.0])).stiffness - base.stiffness
     expected = 7.0 * operator.T @ operator
     np.testing.assert_allclose(found, expected, atol=1e-14)
-    sparse = Structure(
-        *(scipy.sparse.csr_array(x) for x in (base.mass, base.damping, base.stiffness)), base.dofs
-    )
+    sparse = Structure(*(scipy.sparse.csr_array(x) for x in (base.mass, base.damping, base.stiffness)), base.dofs)
     found = with_springs(sparse, operator, np.array([7.0])).stiffness
     assert scipy.sparse.issparse(found)
     np.testing.assert_allclose(found.toarray() - base.stiffness, expected, atol=1e-14)

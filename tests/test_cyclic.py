@@ -57,9 +57,7 @@ def test_ring_of_masses_has_its_closed_form(sectors):
 )
 def test_wheel_has_the_union_of_the_waves(sectors, seed, hub, axis, free):
     """Random sectors, also with nodes on the axis, singular ones, wheels of one and two sectors."""
-    sector = cyclic_sector(
-        random_sector(sectors, seed, hub=hub, free=free, axis=axis), sectors, axis=axis
-    )
+    sector = cyclic_sector(random_sector(sectors, seed, hub=hub, free=free, axis=axis), sectors, axis=axis)
     whole = squares(wheel(sector))
     np.testing.assert_allclose(union(sector), whole, rtol=1e-9, atol=1e-11 * whole[-1])
 
@@ -73,14 +71,7 @@ def test_wheel_of_a_solid_ring_has_the_union_of_the_waves():
 def test_free_ring_has_six_rigid_motions_in_the_first_two_diameters():
     sector = cyclic_sector(assemble_solid(wedge(6, clamp=False), Material()), 6)
     rigid = [np.count_nonzero(np.abs(squares(travelling_wave(sector, k))) < 1.0) for k in range(6)]
-    assert rigid == [
-        2,
-        2,
-        0,
-        0,
-        0,
-        2,
-    ]  # axial motion and turning; in each whirl two translations and tilts
+    assert rigid == [2, 2, 0, 0, 0, 2]  # axial motion and turning; in each whirl two translations and tilts
 
 
 def test_every_mode_of_a_wave_is_one_of_the_wheel():
@@ -95,18 +86,14 @@ def test_every_mode_of_a_wave_is_one_of_the_wheel():
         residual = whole.stiffness @ own - values[2] * (whole.mass @ own)
         assert np.linalg.norm(residual) < 1e-11 * np.linalg.norm(whole.stiffness @ own)
         # the high face of each sector moves as the low face of the next one
-        np.testing.assert_allclose(
-            shape[:, sector.high], np.roll(shape, -1, axis=0)[:, sector.low], atol=1e-12
-        )
+        np.testing.assert_allclose(shape[:, sector.high], np.roll(shape, -1, axis=0)[:, sector.low], atol=1e-12)
 
 
 def test_wave_matrices_are_the_blocks_of_the_transformed_wheel():
     """Eq. 41: in the sectors' own frames the Fourier matrix makes the wheel block-diagonal."""
     sector = cyclic_sector(random_sector(4, 1), 4)
     m, n_s = sector.independent.size, 4
-    turn = [
-        dense(sector.turn(n))[np.ix_(sector.independent, sector.independent)] for n in range(n_s)
-    ]
+    turn = [dense(sector.turn(n))[np.ix_(sector.independent, sector.independent)] for n in range(n_s)]
     frames = scipy.linalg.block_diag(*turn)
     fourier = np.exp(2j * np.pi * np.outer(np.arange(n_s), np.arange(n_s)) / n_s) / 2
     W = frames @ np.kron(fourier, np.eye(m))
@@ -123,9 +110,7 @@ def test_opposite_waves_are_conjugate(sectors):
     for k in range(1, sectors):
         one, other = travelling_wave(sector, k), travelling_wave(sector, sectors - k)
         for name in ("mass", "damping", "stiffness", "basis"):
-            np.testing.assert_allclose(
-                dense(getattr(one, name)), dense(getattr(other, name)).conj(), atol=1e-13
-            )
+            np.testing.assert_allclose(dense(getattr(one, name)), dense(getattr(other, name)).conj(), atol=1e-13)
 
 
 @pytest.mark.parametrize("sectors", [1, 2, 5, 6])
@@ -146,9 +131,7 @@ def test_it_does_not_matter_which_sector_is_modelled():
     for start in (1.0, -2.5):
         other = cyclic_sector(assemble_solid(wedge(6, start=start), material), 6)
         for k in (0, 1, 3):
-            np.testing.assert_allclose(
-                squares(travelling_wave(other, k)), squares(travelling_wave(one, k)), rtol=1e-7
-            )
+            np.testing.assert_allclose(squares(travelling_wave(other, k)), squares(travelling_wave(one, k)), rtol=1e-7)
 
 
 @settings(max_examples=20)
@@ -272,9 +255,7 @@ def test_swapped_faces_are_recognised_though_one_lacks_nodes():
 
 def test_swapped_faces_are_recognised():
     structure = random_sector(24)
-    with pytest.raises(
-        InputError, match=r"are swapped: 'cyclic_low' lies 15° behind 'cyclic_high'"
-    ):
+    with pytest.raises(InputError, match=r"are swapped: 'cyclic_low' lies 15° behind 'cyclic_high'"):
         cyclic_sector(structure, 24, low="cyclic_high", high="cyclic_low")
     with pytest.raises(InputError, match=r"are -15° apart, 20 sectors need 18°.*swap them"):
         cyclic_sector(structure, 20, low="cyclic_high", high="cyclic_low")
@@ -352,9 +333,7 @@ def test_nodes_on_the_axis_in_neither_face_are_named():
 
 def test_axis_off_the_origin_matters():
     structure = random_sector(6, axis=TILTED)
-    with pytest.raises(
-        InputError, match=r"2 of 2 nodes of 'cyclic_low'.*axis \(0.3, -0.4, 0.8\) through"
-    ):
+    with pytest.raises(InputError, match=r"2 of 2 nodes of 'cyclic_low'.*axis \(0.3, -0.4, 0.8\) through"):
         cyclic_sector(structure, 6, axis=replace(TILTED, origin=(0.0, 0.0, 0.0)))
 
 

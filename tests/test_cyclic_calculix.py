@@ -16,8 +16,7 @@ from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 FOLDER = COMPLETE / "calculix"
 SECTORS = 24
 pytestmark = pytest.mark.skipif(
-    not FOLDER.is_dir(),
-    reason="the folder with CalculiX results does not lie beside the repository",
+    not FOLDER.is_dir(), reason="the folder with CalculiX results does not lie beside the repository"
 )
 
 
@@ -76,9 +75,7 @@ def sector():
 def frequencies(diameter):
     with (FOLDER / "n24_coarse_frequencies.csv").open() as file:
         rows = [r for r in csv.DictReader(file) if r["case"] == "free"]
-    return np.array(
-        [float(r["frequency_hz"]) for r in rows if int(r["nodal_diameter"]) == diameter]
-    )
+    return np.array([float(r["frequency_hz"]) for r in rows if int(r["nodal_diameter"]) == diameter])
 
 
 def compare(sector, diameter):
@@ -106,9 +103,7 @@ def test_matrices_at_three_diameters(sector):
     tie = sector.wave_tie(3)
     key = {
         (a, b): i
-        for i, (a, b) in enumerate(
-            zip(sector.structure.dofs.node, sector.structure.dofs.component, strict=True)
-        )
+        for i, (a, b) in enumerate(zip(sector.structure.dofs.node, sector.structure.dofs.component, strict=True))
     }
     rows = np.array([key[node, "xyz"[direction]] for node, direction in table])
     turn = tie[rows]  # unitary: its rows are the dofs that CalculiX keeps

@@ -98,9 +98,7 @@ def gyroscopic(structure):
     """Eigenvalues of ``λ² M + λ C + K``, sorted by imaginary part, then real part."""
     M, C, K = (dense(m) for m in (structure.mass, structure.damping, structure.stiffness))
     n = len(M)
-    state = np.block(
-        [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]
-    )
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     return np.sort_complex(np.round(-1j * np.linalg.eigvals(state), 9))
 
 
@@ -113,11 +111,7 @@ def test_a_mirrored_wheel_has_its_waves_the_other_way_round():
     mirror = np.tile([1.0, -1.0, 1.0], one.n // 3)
     turn = scipy.sparse.diags_array(mirror).tocsr()
     position = one.dofs.position * [1.0, -1.0, 1.0]
-    sets = {
-        **one.sets,
-        "cyclic_low": one.sets["cyclic_high"],
-        "cyclic_high": one.sets["cyclic_low"],
-    }
+    sets = {**one.sets, "cyclic_low": one.sets["cyclic_high"], "cyclic_high": one.sets["cyclic_low"]}
     other = replace(
         one,
         mass=turn @ one.mass @ turn,

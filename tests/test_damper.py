@@ -110,37 +110,21 @@ def test_gap_operator_ignores_rigid_motion_of_everything():
 def test_gap_opens_when_the_damper_moves_inward():
     damper = FlatCurvedDamper()
     points = damper.contact_points()
-    operator = gap_operator(
-        points, np.arange(27).reshape(9, 3), np.arange(27, 33), 33, damper.body()
-    )
+    operator = gap_operator(points, np.arange(27).reshape(9, 3), np.arange(27, 33), 33, damper.body())
     inward = np.zeros(33)
     inward[29] = -1.0
     gap = (operator @ inward).reshape(9, 3)
-    angles = np.where(
-        [side == "flat" for side in points.side], damper.flat_angle, damper.curved_angle
-    )
+    angles = np.where([side == "flat" for side in points.side], damper.flat_angle, damper.curved_angle)
     np.testing.assert_allclose(gap[:, 2], np.cos(angles))
     np.testing.assert_allclose(gap[:, 1], 0.0, atol=1e-15)
 
 
 def test_pressed_outward_all_nine_points_are_in_compression(tmp_path):
     """The example on a coarse mesh, its contacts free to slip and to open; no spring helps."""
-    path = write_two_blades(
-        tmp_path, {"reduction.fixed_interface_modes": "2", "retention.stiffness_n_per_m": "0.0"}
-    )
+    path = write_two_blades(tmp_path, {"reduction.fixed_interface_modes": "2", "retention.stiffness_n_per_m": "0.0"})
     found = assemble(read_study(path).model(), 1)
     pull = 442.0
-    assert found.contacts.names == (
-        "L1.1",
-        "L1.2",
-        "L1.3",
-        "L2.1",
-        "L2.2",
-        "L2.3",
-        "R.1",
-        "R.2",
-        "R.3",
-    )
+    assert found.contacts.names == ("L1.1", "L1.2", "L1.3", "L2.1", "L2.2", "L2.3", "R.1", "R.2", "R.3")
     assert np.max(found.static_force[:, 2]) < -0.02 * pull
     held = found.system.interface.gap_operator.T @ found.static_force.ravel()
     dofs = [i for i, part in enumerate(found.system.structure.dofs.part) if part == "damper"]

@@ -24,9 +24,7 @@ def ratios_of(structure):
     """Damping ratios from the eigenvalues of the state matrix, by frequency."""
     M, C, K = structure.mass, structure.damping, structure.stiffness
     n = len(M)
-    state = np.block(
-        [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]
-    )
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     rates = np.linalg.eigvals(state)
     rates = rates[rates.imag > 0]
     rates = rates[np.argsort(np.abs(rates))]
@@ -62,9 +60,7 @@ def test_modes_of_a_wave_are_damped_alike():
 def test_friction_ring_free_and_stuck_has_the_published_peaks():
     # benchmark B9, engine order 2 on the tips: ring free (slip limit 0) and stuck (limit 20 and above); the blisk's modes are damped
     # with their ring away
-    alone = ss.model.modal_damping(
-        ss.reduction.travelling_wave(blisk_with_ring(ring=None), 2), 1e-3
-    )
+    alone = ss.model.modal_damping(ss.reduction.travelling_wave(blisk_with_ring(ring=None), 2), 1e-3)
     both = ss.reduction.travelling_wave(blisk_with_ring(), 2)
     C = np.zeros((4, 4), dtype=complex)
     C[:3, :3] = alone.damping
@@ -84,10 +80,7 @@ def test_friction_ring_free_and_stuck_has_the_published_peaks():
 def test_coriolis_terms_outlive_a_new_damping():
     skew = np.array([[0.0, -1.0], [1.0, 0.0]])
     turning = ss.model.lumped(np.ones(2), np.diag([4.0, 9.0])).with_damping(3.0 * skew)
-    for damped in (
-        ss.model.rayleigh_damping(turning, 0.01, (0.1, 1.0)),
-        ss.model.modal_damping(turning, 0.01),
-    ):
+    for damped in (ss.model.rayleigh_damping(turning, 0.01, (0.1, 1.0)), ss.model.modal_damping(turning, 0.01)):
         np.testing.assert_allclose((damped.damping - damped.damping.T) / 2, 3.0 * skew)
         assert np.all(np.diagonal(damped.damping) > 0)
     again = ss.model.modal_damping(ss.model.modal_damping(turning, 0.5), 0.01)
@@ -97,16 +90,9 @@ def test_coriolis_terms_outlive_a_new_damping():
 def test_sparse_structures_stay_sparse():
     structure = random_structure(0)
     sparse = replace(
-        structure,
-        **{
-            n: scipy.sparse.csr_array(getattr(structure, n))
-            for n in ("mass", "damping", "stiffness")
-        },
+        structure, **{n: scipy.sparse.csr_array(getattr(structure, n)) for n in ("mass", "damping", "stiffness")}
     )
-    for damp in (
-        lambda s: ss.model.modal_damping(s, 0.02),
-        lambda s: ss.model.rayleigh_damping(s, 0.02, (0.5, 2.0)),
-    ):
+    for damp in (lambda s: ss.model.modal_damping(s, 0.02), lambda s: ss.model.rayleigh_damping(s, 0.02, (0.5, 2.0))):
         found = damp(sparse).damping
         assert scipy.sparse.issparse(found)
         np.testing.assert_allclose(found.toarray(), damp(structure).damping, atol=1e-9)
@@ -155,11 +141,7 @@ def test_joined_parts_keep_their_losses():
     both = ss.model.join(a=lossy, b=other)
     np.testing.assert_allclose(both.loss, scipy.linalg.block_diag(lossy.loss, np.zeros((3, 3))))
     assert ss.model.join(a=other).loss is None
-    sparse = replace(
-        other,
-        mass=scipy.sparse.csr_array(other.mass),
-        stiffness=scipy.sparse.csr_array(other.stiffness),
-    )
+    sparse = replace(other, mass=scipy.sparse.csr_array(other.mass), stiffness=scipy.sparse.csr_array(other.stiffness))
     np.testing.assert_allclose(np.asarray(ss.model.join(a=lossy, b=sparse).loss), both.loss)
 
 
@@ -178,9 +160,7 @@ def turning_and_lossy(seed=2, n=8):
 REDUCTIONS = {
     "craig_bampton": lambda s: ss.craig_bampton(s, np.array([0, 3]), s.n - 2),
     "rubin": lambda s: ss.reduction.rubin(s, np.array([0, 3]), s.n - 2),
-    "relative": lambda s: ss.reduction.in_relative_coordinates(
-        s, np.eye(3, s.n) - np.eye(3, s.n, k=3)
-    )[0],
+    "relative": lambda s: ss.reduction.in_relative_coordinates(s, np.eye(3, s.n) - np.eye(3, s.n, k=3))[0],
 }
 
 
@@ -228,10 +208,7 @@ def balance_of(structure, jacobian="dense", order=3):
     force[0] = 3.0 + 1.0j
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
     linear = ss.harmonic.condense(structure, system.retained, load)
-    return replace(
-        ss.harmonic.harmonic_balance(linear, system.interface, order=order, samples=64),
-        jacobian=jacobian,
-    )
+    return replace(ss.harmonic.harmonic_balance(linear, system.interface, order=order, samples=64), jacobian=jacobian)
 
 
 def test_jacobian_and_frequency_derivative_of_the_periodic_problem():
@@ -240,24 +217,14 @@ def test_jacobian_and_frequency_derivative_of_the_periodic_problem():
     at = balance.linearise(x, 5.0)
     step = 1e-6
     columns = [
-        (
-            balance.linearise(x + step * e, 5.0).residual
-            - balance.linearise(x - step * e, 5.0).residual
-        )
-        / (2 * step)
+        (balance.linearise(x + step * e, 5.0).residual - balance.linearise(x - step * e, 5.0).residual) / (2 * step)
         for e in np.eye(balance.size)
     ]
-    np.testing.assert_allclose(
-        at.dense_jac(), np.array(columns).T, atol=1e-6 * np.abs(at.dense_jac()).max()
-    )
-    difference = (
-        balance.linearise(x, 5.0 + step).residual - balance.linearise(x, 5.0 - step).residual
-    ) / (2 * step)
+    np.testing.assert_allclose(at.dense_jac(), np.array(columns).T, atol=1e-6 * np.abs(at.dense_jac()).max())
+    difference = (balance.linearise(x, 5.0 + step).residual - balance.linearise(x, 5.0 - step).residual) / (2 * step)
     np.testing.assert_allclose(at.jac_p, difference, atol=1e-6 * np.abs(difference).max())
     structured = replace(balance, jacobian="structured").linearise(x, 5.0)
-    np.testing.assert_allclose(
-        structured.jac.dense(), at.dense_jac(), atol=1e-12 * np.abs(at.dense_jac()).max()
-    )
+    np.testing.assert_allclose(structured.jac.dense(), at.dense_jac(), atol=1e-12 * np.abs(at.dense_jac()).max())
     v = np.random.default_rng(2).standard_normal(balance.size)
     np.testing.assert_allclose(structured.jac.matvec(v), at.dense_jac() @ v, atol=1e-10)
     np.testing.assert_allclose(structured.jac.rmatvec(v), at.dense_jac().T @ v, atol=1e-10)
@@ -268,20 +235,14 @@ def test_forms_of_the_problem_agree_on_a_turning_structure():
     found = {}
     for name in ("dense", "structured"):
         balance = balance_of(turning_and_lossy(), name)
-        result = ss.solve.newton(
-            lambda x, b=balance: b.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton()
-        )
+        result = ss.solve.newton(lambda x, b=balance: b.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton())
         assert result.status == ss.solve.Status.CONVERGED
         found[name] = result.x
     form = ComplianceForm(balance_of(turning_and_lossy()))
-    result = ss.solve.newton(
-        lambda x: form.linearise(x, 5.0), np.zeros(form.size), ss.solve.Newton()
-    )
+    result = ss.solve.newton(lambda x: form.linearise(x, 5.0), np.zeros(form.size), ss.solve.Newton())
     found["compliance"] = result.x
     for name, x in found.items():
-        np.testing.assert_allclose(
-            x, found["dense"], atol=1e-7 * np.abs(found["dense"]).max(), err_msg=name
-        )
+        np.testing.assert_allclose(x, found["dense"], atol=1e-7 * np.abs(found["dense"]).max(), err_msg=name)
 
 
 def test_time_integration_is_right_with_coriolis_terms_and_refuses_loss():
@@ -292,23 +253,15 @@ def test_time_integration_is_right_with_coriolis_terms_and_refuses_loss():
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
     laws = system.interface
     balance = balance_of(structure, order=15)
-    solution = ss.solve.newton(
-        lambda x: balance.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton()
-    )
+    solution = ss.solve.newton(lambda x: balance.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton())
     coefficients = balance.linear.recover(5.0, balance.coefficients(solution.x))
-    timed = ss.response.integrate(
-        structure, laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n)
-    )
+    timed = ss.response.integrate(structure, laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n))
     assert timed.settled
     harmonics = timed.harmonics
     # 64 samples a period leave 4e-5
-    np.testing.assert_allclose(
-        harmonics[1], coefficients[1], atol=1e-4 * np.abs(coefficients[1]).max()
-    )
+    np.testing.assert_allclose(harmonics[1], coefficients[1], atol=1e-4 * np.abs(coefficients[1]).max())
     with pytest.raises(ss.InputError, match="structural damping"):
-        ss.response.integrate(
-            turning_and_lossy(), laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n)
-        )
+        ss.response.integrate(turning_and_lossy(), laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n))
 
 
 def test_forced_response_of_a_turning_lossy_structure_in_bonded_contact():
@@ -316,18 +269,14 @@ def test_forced_response_of_a_turning_lossy_structure_in_bonded_contact():
     rows = np.zeros((3, structure.n))
     rows[0, 1], rows[2, 2] = 1.0, 1.0
     system = ss.System(
-        structure,
-        ss.Interface(("c",), (ss.Bonded(k_t=40.0, k_w=40.0, k_n=60.0),), rows),
-        outputs=np.array([0, 5]),
+        structure, ss.Interface(("c",), (ss.Bonded(k_t=40.0, k_w=40.0, k_n=60.0),), rows), outputs=np.array([0, 5])
     )
     force = np.zeros(structure.n, dtype=complex)
     force[0] = 3.0 + 1.0j
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
     sweep = ss.Sweep(omega_range=(5.0, 9.0))
     problem = ss.response.forced_problem(system, load, sweep)
-    stuck = replace(
-        structure, stiffness=structure.stiffness + rows.T @ np.diag([40.0, 40.0, 60.0]) @ rows
-    )
+    stuck = replace(structure, stiffness=structure.stiffness + rows.T @ np.diag([40.0, 40.0, 60.0]) @ rows)
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     assert len(points) > 5
     for point in points:

@@ -28,9 +28,7 @@ from stickslip.solve.continuation import Following, StepControl, start_point, tr
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton, newton
 
-TWO_MASSES = lumped(
-    np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
-)
+TWO_MASSES = lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]]))
 
 
 def rubbing(order, samples, penalty=None, law=None, force=20.0, static=0.0, retained=(1,)):
@@ -41,7 +39,7 @@ def rubbing(order, samples, penalty=None, law=None, force=20.0, static=0.0, reta
     law = law or RigidCoulomb(mu=0.9, preload=9.0)
     return dynamic_lagrangian(
         condense(TWO_MASSES, np.array(retained), load), Interface(("c",), (law,), gap), order, samples, penalty
-    )  # fmt: skip
+    )
 
 
 def pressed(order, samples, penalty=None, shake=1.5, law=None, static=(0.3, -2.0)):
@@ -52,7 +50,7 @@ def pressed(order, samples, penalty=None, shake=1.5, law=None, static=(0.3, -2.0
     gap = np.zeros((3, 2))
     gap[0, 0], gap[2, 1] = 1.0, 1.0
     interface = Interface(("c",), (law or RigidCoulomb(mu=0.4),), gap)
-    return dynamic_lagrangian(condense(structure, np.arange(2), load), interface, order, samples, penalty)  # fmt: skip
+    return dynamic_lagrangian(condense(structure, np.arange(2), load), interface, order, samples, penalty)
 
 
 def solution(problem, omega, start=None, iterations=100):
@@ -75,12 +73,10 @@ def assert_derivatives(problem, x, omega, step=1e-6):
     sides = [
         (problem.linearise(x + step * e, omega).residual - problem.linearise(x - step * e, omega).residual) / (2 * step)
         for e in np.eye(problem.size)
-    ]  # fmt: skip
+    ]
     size = np.abs(jac).max()
     np.testing.assert_allclose(jac, np.array(sides).T, atol=1e-7 * size)
-    by_omega = (
-        problem.linearise(x, omega + step).residual - problem.linearise(x, omega - step).residual
-    ) / (2 * step)
+    by_omega = (problem.linearise(x, omega + step).residual - problem.linearise(x, omega - step).residual) / (2 * step)
     np.testing.assert_allclose(at.jac_p, by_omega, atol=1e-7 * max(size, np.abs(at.jac_p).max()))
 
 
@@ -120,9 +116,14 @@ def test_products_of_the_jacobian_are_those_of_the_array(seed, size, made):
     assert isinstance(jac, RigidJacobian)
     assert isinstance(array, np.ndarray)
     for found, expected in (
-        (at.residual, other.residual), (at.jac_p, other.jac_p), (jac.dense(), array), (at.dense_jac(), array),
-        (jac.matvec(v), array @ v), (jac.rmatvec(v), v @ array), (jac.transposed.matvec(v), v @ array),
-    ):  # fmt: skip
+        (at.residual, other.residual),
+        (at.jac_p, other.jac_p),
+        (jac.dense(), array),
+        (at.dense_jac(), array),
+        (jac.matvec(v), array @ v),
+        (jac.rmatvec(v), v @ array),
+        (jac.transposed.matvec(v), v @ array),
+    ):
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
     if np.linalg.cond(array) < 1e6:
         exact = Krylov(tolerance=1e-13)
@@ -137,10 +138,7 @@ def test_newton_by_products_finds_the_same_motion(made):
     problem, krylov = made(), Krylov()
     options = Newton(max_iterations=100, tolerance=1e-12, linear=krylov)
     expected, _ = solution(problem, 1.5)
-    for order in (
-        problem.order,
-        problem.order + 2,
-    ):  # factors are those of each number of harmonics
+    for order in (problem.order, problem.order + 2):  # factors are those of each number of harmonics
         own = by_products(problem.with_order(order))
         found = newton(lambda v: own.linearise(v, 1.5), own.unknowns(expected), options)  # noqa: B023
         assert found.status.converged
@@ -168,7 +166,7 @@ def test_products_with_a_weight_are_those_of_the_samples():
         basis = np.array(
             [np.ones(samples)]
             + [f(h * 2 * np.pi * np.arange(samples) / samples) for h in range(1, 5) for f in (np.cos, np.sin)]
-        ).T  # fmt: skip
+        ).T
         analysis = basis.T * 2.0 / samples
         analysis[0] /= 2.0
         expected = [analysis @ (w[:, None] * basis) for w in weight]
@@ -222,10 +220,9 @@ def test_default_penalty_changes_smoothly_with_frequency():
         at = problem.penalties(omega)
         np.testing.assert_allclose(at.slope, (high - low) / (2.0 * step), rtol=1e-5)
         x = np.random.default_rng(1).standard_normal(problem.size)
-        by_omega = (
-            problem.linearise(x, omega + step).residual
-            - problem.linearise(x, omega - step).residual
-        ) / (2.0 * step)
+        by_omega = (problem.linearise(x, omega + step).residual - problem.linearise(x, omega - step).residual) / (
+            2.0 * step
+        )
         jac_p = problem.linearise(x, omega).jac_p
         np.testing.assert_allclose(jac_p, by_omega, atol=1e-6 * np.max(np.abs(jac_p)))
     values = np.array([problem.penalties(w).value for w in np.linspace(60.0, 200.0, 4000)])
@@ -257,9 +254,7 @@ def test_laws_hold_at_the_samples():
     assert np.all(np.abs(force[0]) <= -0.4 * force[2] + 1e-8)
     h = np.arange(8)
     tau = 2 * np.pi * np.arange(15) / 15
-    velocity = np.real(
-        np.exp(1j * np.outer(tau, h)) @ (1j * h * problem.coefficients(found.x)[:, 0])
-    )
+    velocity = np.real(np.exp(1j * np.outer(tau, h)) @ (1j * h * problem.coefficients(found.x)[:, 0]))
     assert np.max(np.abs(velocity[state == 0])) < 1e-8  # sticks where it sticks
     assert np.all(velocity[state == 1] * force[0][state == 1] > 0)  # and is braked where it slips
 
@@ -296,9 +291,7 @@ def test_penalty_law_tends_to_the_rigid_one_as_the_root_of_its_flexibility():
     start, _ = solution(rubbing(31, 2048), 1.5)
     for k in stiffnesses:
         law = RigidCoulomb(mu=0.9, preload=9.0).softened(k)
-        q, _ = solution(
-            harmonic_balance(linear, Interface(("c",), (law,), gap), 31, 2048), 1.5, start
-        )
+        q, _ = solution(harmonic_balance(linear, Interface(("c",), (law,), gap), 31, 2048), 1.5, start)
         errors.append(abs(abs(q[1, 0]) / exact - 1))
     slope = -np.polyfit(np.log(stiffnesses), np.log(errors), 1)[0]
     assert errors == sorted(errors, reverse=True)
@@ -344,9 +337,7 @@ def test_forced_response_through_resonance_by_continuation():
     problem = rubbing(5, 160, retained=(0, 1))
     _, found = solution(problem, 0.3)
     following = Following(
-        newton=Newton(),
-        control=StepControl(scale=0.2, first=0.05, largest=0.25),
-        weights=np.ones(problem.size),
+        newton=Newton(), control=StepControl(scale=0.2, first=0.05, largest=0.25), weights=np.ones(problem.size)
     )
     start = start_point(problem, found.x, 0.3, following)
     points = list(trace(problem, start, 2.2, following))
@@ -373,9 +364,7 @@ def test_changed_order_keeps_the_problem():
     problem = rubbing(3, 256).with_order(5)
     direct = rubbing(5, 256)
     x = np.random.default_rng(2).standard_normal(direct.size)
-    np.testing.assert_array_equal(
-        problem.linearise(x, 1.0).residual, direct.linearise(x, 1.0).residual
-    )
+    np.testing.assert_array_equal(problem.linearise(x, 1.0).residual, direct.linearise(x, 1.0).residual)
 
 
 def test_messages():
@@ -383,18 +372,14 @@ def test_messages():
     between = np.zeros((3, 2))
     between[0] = 1.0, -1.0
     rigid = RigidCoulomb(mu=0.5, preload=1.0)
-    with pytest.raises(
-        InputError, match=r"rigid contact c: has a gap between.*in_relative_coordinates"
-    ):
+    with pytest.raises(InputError, match=r"rigid contact c: has a gap between.*in_relative_coordinates"):
         dynamic_lagrangian(linear, Interface(("c",), (rigid,), between), 1, 16)
     one = np.zeros((3, 2))
     one[0, 0] = 1.0
     with pytest.raises(InputError, match="contact c: is unilateral and has no normal gap"):
         dynamic_lagrangian(linear, Interface(("c",), (RigidCoulomb(mu=0.5),), one), 1, 16)
     with pytest.raises(InputError, match="a and b: share one coordinate"):
-        dynamic_lagrangian(
-            linear, Interface(("a", "b"), (rigid, rigid), np.vstack([one, one])), 1, 16
-        )
+        dynamic_lagrangian(linear, Interface(("a", "b"), (rigid, rigid), np.vstack([one, one])), 1, 16)
     with pytest.raises(InputError, match="6 samples a period for 3 harmonics"):
         dynamic_lagrangian(linear, Interface(("c",), (rigid,), one), 3, 6)
     with pytest.raises(InputError, match="penalty: must be positive"):
@@ -412,9 +397,7 @@ def test_messages():
 @pytest.mark.parametrize("samples", [11, 64])
 def test_reported_forces_keep_the_balance_beside_elastic_contacts(samples):
     # they were evaluated on the samples of the rigid contacts, which may be far fewer
-    structure = lumped(
-        np.ones(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), np.array([[0.02, 0.0], [0.0, 0.02]])
-    )
+    structure = lumped(np.ones(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), np.array([[0.02, 0.0], [0.0, 0.02]]))
     gaps = np.zeros((6, 2))
     gaps[0, 0] = gaps[3, 1] = 1.0
     laws = (RigidCoulomb(mu=0.1, preload=1.0), Jenkins(k_t=1.0, limit=0.3))

@@ -103,9 +103,11 @@ def structure_of(kind, seed=0, n=9):
         mass[7] = mass[:, 7] = 0.0
     if kind == "sparse":
         return Structure(
-            scipy.sparse.csr_array(mass), scipy.sparse.csr_array(damping["general"]), scipy.sparse.csr_array(stiffness),
+            scipy.sparse.csr_array(mass),
+            scipy.sparse.csr_array(damping["general"]),
+            scipy.sparse.csr_array(stiffness),
             table(("q",) * n),
-        )  # fmt: skip
+        )
     if kind.startswith("coriolis"):
         spin = rng.standard_normal((n, n))
         dissipation = np.zeros((n, n)) if kind == "coriolis alone" else damping["general"]
@@ -122,8 +124,7 @@ def structure_of(kind, seed=0, n=9):
 def loaded(seed, n=9):
     rng = np.random.default_rng(seed + 100)
     return HarmonicLoad(
-        rng.standard_normal(n),
-        {h: rng.standard_normal(n) + 1j * rng.standard_normal(n) for h in (1, 3)},
+        rng.standard_normal(n), {h: rng.standard_normal(n) + 1j * rng.standard_normal(n) for h in (1, 3)}
     )
 
 
@@ -132,11 +133,7 @@ def dense(matrix):
 
 
 def dynamic(structure, w):
-    D = (
-        dense(structure.stiffness)
-        + 1j * w * dense(structure.damping)
-        - w**2 * dense(structure.mass)
-    )
+    D = dense(structure.stiffness) + 1j * w * dense(structure.damping) - w**2 * dense(structure.mass)
     return D if structure.loss is None or w == 0 else D + 1j * dense(structure.loss)
 
 
@@ -146,18 +143,24 @@ def schur(structure, load, omega, order):
     out, loads = [], []
     for h in range(order + 1):
         d = dynamic(structure, h * omega)
-        x = np.linalg.solve(
-            d[np.ix_(inner, inner)], np.column_stack([d[np.ix_(inner, RETAINED)], f[h, inner]])
-        )
+        x = np.linalg.solve(d[np.ix_(inner, inner)], np.column_stack([d[np.ix_(inner, RETAINED)], f[h, inner]]))
         out.append(d[np.ix_(RETAINED, RETAINED)] - d[np.ix_(RETAINED, inner)] @ x[:, :-1])
         loads.append(f[h, RETAINED] - d[np.ix_(RETAINED, inner)] @ x[:, -1])
     return np.array(out), np.array(loads)
 
 
 KINDS = [
-    "proportional", "general", "none", "massless", "sparse",
-    "coriolis", "coriolis alone", "coriolis and loss", "loss", "uniform loss",
-]  # fmt: skip
+    "proportional",
+    "general",
+    "none",
+    "massless",
+    "sparse",
+    "coriolis",
+    "coriolis alone",
+    "coriolis and loss",
+    "loss",
+    "uniform loss",
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -195,9 +198,7 @@ def test_condensed_solution_and_recovery_are_the_full_solution(kind):
     linear = condense(structure, RETAINED, load)
     condensed = linear.condensed(OMEGA, ORDER)
     f = load.coefficients(ORDER)
-    full = np.array(
-        [np.linalg.solve(dynamic(structure, h * OMEGA), f[h]) for h in range(ORDER + 1)]
-    )
+    full = np.array([np.linalg.solve(dynamic(structure, h * OMEGA), f[h]) for h in range(ORDER + 1)])
     q = np.linalg.solve(condensed.stiffness, condensed.load[:, :, None])[:, :, 0]
     assert np.allclose(q, full[:, RETAINED], rtol=0, atol=1e-9 * np.abs(full).max())
     assert np.allclose(linear.recover(OMEGA, q), full, rtol=0, atol=1e-9 * np.abs(full).max())
@@ -220,16 +221,12 @@ def test_products_are_those_of_the_schur_complement(kind):
     np.testing.assert_allclose(products.product(rows), product, rtol=0, atol=10 * size)
     expected = to_real((slope.derivative @ q)[:, :, 0])
     np.testing.assert_allclose(by_omega, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_allclose(
-        products.load, to_real(force), rtol=0, atol=1e-9 * np.abs(force).max()
-    )
+    np.testing.assert_allclose(products.load, to_real(force), rtol=0, atol=1e-9 * np.abs(force).max())
     np.testing.assert_allclose(
         products.load_slope, to_real(slope.load_derivative), rtol=0, atol=1e-9 * np.abs(slope.load_derivative).max()
-    )  # fmt: skip
-    transposed = real_matrix(stiffness).T @ rows.ravel()
-    np.testing.assert_allclose(
-        products.transposed_product(rows).ravel(), transposed, rtol=0, atol=10 * size
     )
+    transposed = real_matrix(stiffness).T @ rows.ravel()
+    np.testing.assert_allclose(products.transposed_product(rows).ravel(), transposed, rtol=0, atol=10 * size)
 
 
 def test_change_of_all_dofs_is_the_difference_of_two_recoveries():
@@ -420,9 +417,7 @@ def test_a_free_interior_is_refused():
     inner = np.setdiff1d(np.arange(9), RETAINED)
     stiffness = np.array(structure.stiffness)
     stiffness[inner[0]] = stiffness[:, inner[0]] = 0.0
-    with pytest.raises(
-        InputError, match=r"can move without stiffness .*Retain the dofs of free bodies"
-    ):
+    with pytest.raises(InputError, match=r"can move without stiffness .*Retain the dofs of free bodies"):
         condense(replace(structure, stiffness=stiffness), RETAINED, loaded(0))
 
 
@@ -456,19 +451,14 @@ def test_a_tiny_mass_is_condensed():
 def test_static_problem_feels_no_loss():
     structure = structure_of("loss")
     with_loss, without = (
-        condense(s, RETAINED, loaded(0)).condensed(OMEGA, 0)
-        for s in (structure, replace(structure, loss=None))
+        condense(s, RETAINED, loaded(0)).condensed(OMEGA, 0) for s in (structure, replace(structure, loss=None))
     )
     assert np.array_equal(with_loss.stiffness, without.stiffness)
     assert np.array_equal(with_loss.load, without.load)
 
 
 @settings(max_examples=15, deadline=None)
-@given(
-    seed=st.integers(0, 10**6),
-    spin=st.sampled_from([1e-3, 1.0, 30.0]),
-    frequency=st.floats(-2.0, 2.0),
-)
+@given(seed=st.integers(0, 10**6), spin=st.sampled_from([1e-3, 1.0, 30.0]), frequency=st.floats(-2.0, 2.0))
 def test_coriolis_terms_are_summed_over_poles(seed, spin, frequency):
     rng = np.random.default_rng(seed)
     skew = rng.standard_normal((12, 12))
@@ -505,12 +495,8 @@ def test_a_structure_is_condensed_once_until_its_matrices_change():
     rng = np.random.default_rng(0)
     half = rng.standard_normal((LARGE, LARGE))
     stiffness = half @ half.T + LARGE * np.eye(LARGE)
-    own = Structure(
-        np.eye(LARGE), 1e-3 * stiffness, stiffness, table(tuple(f"a{i}" for i in range(LARGE)))
-    )
-    first, second = (
-        HarmonicLoad(np.zeros(LARGE), {1: rng.standard_normal(LARGE) + 0j}) for _ in range(2)
-    )
+    own = Structure(np.eye(LARGE), 1e-3 * stiffness, stiffness, table(tuple(f"a{i}" for i in range(LARGE))))
+    first, second = (HarmonicLoad(np.zeros(LARGE), {1: rng.standard_normal(LARGE) + 0j}) for _ in range(2))
     retained = np.arange(3)
     one, two = (condensed_once(own, retained, load) for load in (first, second))
     assert two.spectral is one.spectral

@@ -36,10 +36,7 @@ def test_materials_of_cells_against_plain_loops():
     mesh = without_sets(box(20, SIZE, (1, 2, 2), 0.002))
     light = Material(young_modulus=110e9, poisson_ratio=0.34, density=4430.0)
     materials = [STEEL, light, light, STEEL]
-    parts = [
-        plain_matrices(SolidMesh(mesh.points, mesh.cells[[i]], {}), one)
-        for i, one in enumerate(materials)
-    ]
+    parts = [plain_matrices(SolidMesh(mesh.points, mesh.cells[[i]], {}), one) for i, one in enumerate(materials)]
     solid = assemble_solid(mesh, materials)
     for found, exact in zip((solid.mass, solid.stiffness), zip(*parts, strict=True), strict=True):
         assert relative(found.toarray(), sum(exact)) < 1e-13
@@ -123,9 +120,7 @@ def test_calculix_rule_has_four_points():
     shape = shape_functions(10, Quadrature.calculix().mass)
     assert shape.values.shape == (4, 10)
     mesh = without_sets(box(10, SIZE, (1, 1, 1)))
-    exact, coarse = (
-        assemble_solid(mesh, STEEL, quadrature=q) for q in (Quadrature(), Quadrature.calculix())
-    )
+    exact, coarse = (assemble_solid(mesh, STEEL, quadrature=q) for q in (Quadrature(), Quadrature.calculix()))
     # strains of a straight-edged cell are linear, so four points are enough for the stiffness, not for the mass
     assert relative(coarse.stiffness.toarray(), exact.stiffness.toarray()) < 1e-13
     assert relative(coarse.mass.toarray(), exact.mass.toarray()) > 0.1

@@ -15,24 +15,12 @@ from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 SECTORS = 6
 # disk, blade and tip of a sector; shrouds rub and hit their neighbours, the root rubs in its slot
 MASSES, NAMES = [1.0, 0.5, 0.3], ["disk", "blade", "tip"]
-SPRINGS = [("disk", "ground", 2e5), ("disk", "next.disk", 4e5), ("disk", "blade", 3e5), ("blade", "tip", 1e5)]  # fmt: skip
+SPRINGS = [("disk", "ground", 2e5), ("disk", "next.disk", 4e5), ("disk", "blade", 3e5), ("blade", "tip", 1e5)]
 DASHPOTS = [(one, other, 4e-5 * k) for one, other, k in SPRINGS]
 CONTACTS = {
-    "shroud": (
-        "tip",
-        "next.tip",
-        'law = "jenkins", tangential_stiffness_n_per_m = 2e4, slip_limit_n = 3.0',
-    ),
-    "root": (
-        "disk",
-        "blade",
-        'law = "jenkins", tangential_stiffness_n_per_m = 5e4, slip_limit_n = 1.5',
-    ),
-    "stop": (
-        "blade",
-        "next.blade",
-        'law = "unilateral_spring", normal_stiffness_n_per_m = 2e4, gap_m = 4e-5',
-    ),
+    "shroud": ("tip", "next.tip", 'law = "jenkins", tangential_stiffness_n_per_m = 2e4, slip_limit_n = 3.0'),
+    "root": ("disk", "blade", 'law = "jenkins", tangential_stiffness_n_per_m = 5e4, slip_limit_n = 1.5'),
+    "stop": ("blade", "next.blade", 'law = "unilateral_spring", normal_stiffness_n_per_m = 2e4, gap_m = 4e-5'),
 }
 LOADS = {2: (6.0, 0.0), 3: (4.0, 40.0)}  # engine order -> force, phase in degrees
 HARMONICS = "low = 9\nhigh = 9\nselection = 'always_low'"
@@ -42,9 +30,7 @@ def links(rows: list[tuple[str, str, float]]) -> str:
     return "[" + ", ".join(f'["{a}", "{b}", {v!r}]' for a, b, v in rows) + "]"
 
 
-def text(
-    part: Mapping[str, object], contacts: str, loads: str, asked: str, harmonics: str = HARMONICS
-) -> str:
+def text(part: Mapping[str, object], contacts: str, loads: str, asked: str, harmonics: str = HARMONICS) -> str:
     own = "\n".join(f"{key} = {value}" for key, value in part.items())
     return (
         f"schema_version = 2\n[part.wheel]\nshape = 'lumped'\n{own}\n{contacts}\n{loads}\n[forced_response]\n{asked}\n"
@@ -52,13 +38,14 @@ def text(
     )
 
 
-def one_sector(
-    loads: Mapping[int, tuple[float, float]], asked: str, harmonics: str = HARMONICS, **laws: str
-) -> str:
+def one_sector(loads: Mapping[int, tuple[float, float]], asked: str, harmonics: str = HARMONICS, **laws: str) -> str:
     part = {
-        "sectors": SECTORS, "masses_kg": MASSES, "names": NAMES,
-        "springs_n_per_m": links(SPRINGS), "dashpots_n_s_per_m": links(DASHPOTS),
-    }  # fmt: skip
+        "sectors": SECTORS,
+        "masses_kg": MASSES,
+        "names": NAMES,
+        "springs_n_per_m": links(SPRINGS),
+        "dashpots_n_s_per_m": links(DASHPOTS),
+    }
     contacts = "[contact]\n" + "\n".join(
         f'{name} = {{ between = ["wheel.{a}", "{b.replace("next.", "next.wheel.") if b.startswith("next.") else "wheel." + b}"], {laws.get(name, law)} }}'
         for name, (a, b, law) in CONTACTS.items()
@@ -83,9 +70,11 @@ def all_sectors(loads: Mapping[int, tuple[float, float]], base: int, asked: str)
         return links([(place(a, n), place(b, n), v) for n in range(SECTORS) for a, b, v in rows])
 
     part = {
-        "masses_kg": MASSES * SECTORS, "names": [place(name, n) for n in range(SECTORS) for name in NAMES],
-        "springs_n_per_m": everywhere(SPRINGS), "dashpots_n_s_per_m": everywhere(DASHPOTS),
-    }  # fmt: skip
+        "masses_kg": MASSES * SECTORS,
+        "names": [place(name, n) for n in range(SECTORS) for name in NAMES],
+        "springs_n_per_m": everywhere(SPRINGS),
+        "dashpots_n_s_per_m": everywhere(DASHPOTS),
+    }
     contacts = "[contact]\n" + "\n".join(
         f'{name}_{n} = {{ between = ["wheel.{place(a, n)}", "wheel.{place(b, n)}"], {law} }}'
         for n in range(SECTORS)
@@ -116,7 +105,7 @@ def of(**orders: tuple[int, int | None]) -> dict[str, SimpleNamespace]:
 
 
 def test_the_base_is_the_common_divisor_of_the_orders_that_act() -> None:
-    assert engine_order(of(a=(1, 4), b=(1, 6), still=(0, None)), wheel=True) == (2, {"a": 2, "b": 3, "still": 0})  # fmt: skip
+    assert engine_order(of(a=(1, 4), b=(1, 6), still=(0, None)), wheel=True) == (2, {"a": 2, "b": 3, "still": 0})
     assert engine_order(of(a=(2, 3), b=(1, 9)), wheel=True) == (3, {"a": 2, "b": 3})
     # one order stays as it is, whatever its harmonics
     assert engine_order(of(a=(2, 4), b=(3, 4)), wheel=True) == (4, {"a": 2, "b": 3})
@@ -135,7 +124,7 @@ def test_orders_superpose_where_nothing_slips(tmp_path: Path) -> None:
     }
     loads = {4: (6.0, 0.0), 10: (4.0, 40.0)}  # beyond the number of sectors, too
     asked = "over = 'speed'\nspeed_rpm = [500.0, 900.0]\nfrequencies = 5"
-    both = response(tmp_path / "both", one_sector(loads, asked, "high = 7\nselection = 'always_high'", **stuck))  # fmt: skip
+    both = response(tmp_path / "both", one_sector(loads, asked, "high = 7\nselection = 'always_high'", **stuck))
     assert both.attrs["engine_order"] == 2
     assert both.attrs["driven_harmonics"] == [2, 5]
     np.testing.assert_allclose(both["frequency_hz"], np.linspace(500, 900, 5) / 60 * 2)

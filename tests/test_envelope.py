@@ -25,9 +25,7 @@ def oscillator(natural, ratio, share=0.1, limit=1e9):
     """Return a mass that a contact holds with a share of the stiffness while it sticks, under a unit force."""
     stiffness = natural**2
     table = Dofs(np.array([0]), ("x",), np.zeros((1, 3)))
-    own = Structure(
-        np.eye(1), 2 * ratio * natural * np.eye(1), (1 - share) * stiffness * np.eye(1), table
-    )
+    own = Structure(np.eye(1), 2 * ratio * natural * np.eye(1), (1 - share) * stiffness * np.eye(1), table)
     gap = np.array([[1.0], [0.0], [0.0]])
     law = Jenkins(k_t=share * stiffness, limit=limit)
     system = System(own, Interface(("c",), (law,), gap), np.array([0]))
@@ -197,4 +195,4 @@ def test_a_sweep_that_is_none_is_refused():
     with pytest.raises(InputError, match="above zero"):
         SweepInTime(ends=(70.0, 130.0), rate=-1.0)
     with pytest.raises(InputError, match="harmonic"):
-        list(envelope(system, HarmonicLoad(np.zeros(1), {2: np.ones(1)}), SweepInTime(ends=(70.0, 130.0), rate=1.0)))  # fmt: skip
+        list(envelope(system, HarmonicLoad(np.zeros(1), {2: np.ones(1)}), SweepInTime(ends=(70.0, 130.0), rate=1.0)))

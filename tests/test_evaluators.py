@@ -33,9 +33,8 @@ laws = st.builds(
 
 @settings(max_examples=60)
 @given(
-    law=laws, seed=st.integers(0, 10**6), order=st.integers(0, 5), samples=st.integers(16, 128),
-    size=st.floats(-2, 1),
-)  # fmt: skip
+    law=laws, seed=st.integers(0, 10**6), order=st.integers(0, 5), samples=st.integers(16, 128), size=st.floats(-2, 1)
+)
 def test_march_and_intervals_agree(law, seed, order, samples, size):
     gap = gaps(seed, order, size=10**size)
     one = contact_forces(gap, compile_contacts([law]), samples)
@@ -76,9 +75,7 @@ def test_groups_come_back_in_their_order(evaluator):
     want = contact_forces(gap, compile_contacts(plain, weights, evaluator), 4096)
     got = contact_forces(gap, compile_contacts(mixed, weights, evaluator), 4096)
     size = np.max(np.abs(want.coefficients))
-    tolerance = (
-        1e-12 if evaluator == "intervals" else 1e-4
-    )  # the march has the error of its samples
+    tolerance = 1e-12 if evaluator == "intervals" else 1e-4  # the march has the error of its samples
     assert np.max(np.abs(got.coefficients - want.coefficients)) <= tolerance * size
     assert got.blocks.shape[1] == 7
     assert np.max(np.abs(got.blocks[:, :5] - want.blocks)) <= max(tolerance, 1e-12) * 100

@@ -60,12 +60,7 @@ def force_size(row, coefficients):
 
 rows = st.builds(
     lambda k_t, k_w, k_n, mu, preload, m: element(
-        k_t=10**k_t,
-        k_w=10**k_w,
-        k_n=10**k_n,
-        mu=mu,
-        preload=preload * 10**k_n * SIZE * 2.0,
-        residual_traction=m,
+        k_t=10**k_t, k_w=10**k_w, k_n=10**k_n, mu=mu, preload=preload * 10**k_n * SIZE * 2.0, residual_traction=m
     ),
     k_t=st.floats(4, 8),
     k_w=st.floats(4, 8),
@@ -129,9 +124,7 @@ def test_iwan_as_a_sum_of_elements_dissipates_as_its_parts():
     parts = np.array([element(k_t=1 / n, mu=1.0, preload=x / n, unilateral=False) for x in limits])
     q = np.zeros((7, 3))
     q[1, 0] = amplitude
-    coefficients, blocks, force, state = exact_period(
-        q, parts, np.array([0, n]), (basis(3, 64) @ q).T[None].copy()
-    )
+    coefficients, blocks, force, state = exact_period(q, parts, np.array([0, n]), (basis(3, 64) @ q).T[None].copy())
     lost = 4 * np.sum(np.maximum(amplitude - limits, 0.0) * limits / n)
     assert np.pi * amplitude * -coefficients[2, 0] == pytest.approx(lost, rel=1e-13)
     alone = [evaluate(q, row, 64) for row in parts]
@@ -217,9 +210,7 @@ def companion_twin(coefficients, row):
     m = len(coefficients)
     pressure = -row[2] * coefficients[:, 2]
     pressure[0] += row[4]
-    out = [
-        mean(*twin_spring(coefficients[:, d], row[d], pressure, row[3], row[5]), m) for d in (0, 1)
-    ]
+    out = [mean(*twin_spring(coefficients[:, d], row[d], pressure, row[3], row[5]), m) for d in (0, 1)]
     normal = mean(lambda tau: -np.maximum(at(pressure, tau), 0.0), near_roots(pressure), m)
     return np.array([*out, normal]).T
 
@@ -241,9 +232,13 @@ def test_samples_and_coefficients_of_the_dense_march(row, seed, order):
     q = random_gaps(rng, order, 1, 10 ** rng.uniform(-1.5, 1.5), 1.0)
     samples, every = 4096, 64
     law = ElasticCoulomb(
-        k_t=row[0], k_w=row[1], k_n=row[2], mu=row[3], preload=row[4],
+        k_t=row[0],
+        k_w=row[1],
+        k_n=row[2],
+        mu=row[3],
+        preload=row[4],
         residual_traction=None if np.isnan(row[5]) else row[5],
-    )  # fmt: skip
+    )
     want = twin((basis(order, samples) @ q).T, law)
     coefficients, _, force, _ = evaluate(q, row, samples // every)
     # the march sees an extremum of a wall at its nearest sample, an opening up to a sample late, and starts a sample early
@@ -267,12 +262,7 @@ def test_samples_converge_to_the_events():
     errors = []
     for n in samples:
         by_samples, blocks_by_samples = sampled(q, row, n)
-        errors.append(
-            [
-                root_mean_square(by_samples - coefficients),
-                root_mean_square(blocks_by_samples - blocks),
-            ]
-        )
+        errors.append([root_mean_square(by_samples - coefficients), root_mean_square(blocks_by_samples - blocks)])
     force, derivative = -np.polyfit(np.log(samples), np.log(errors), 1)[0]
     assert 1.8 <= force <= 2.2
     assert 0.8 <= derivative <= 1.2
@@ -312,9 +302,7 @@ def check_blocks(blocks, slope, tolerance):
 @pytest.mark.parametrize("name", list(STATES))
 def test_jacobian_in_each_contact_state(name, residual):
     k_t, k_w, mu, preload, tangential, normal, means, must_occur = STATES[name]
-    row = element(
-        k_t=k_t, k_w=k_w, k_n=3e6, mu=mu, preload=preload * 3e6 * SIZE, residual_traction=residual
-    )  # fmt: skip
+    row = element(k_t=k_t, k_w=k_w, k_n=3e6, mu=mu, preload=preload * 3e6 * SIZE, residual_traction=residual)
     rng = np.random.default_rng(7)
     seen = set()
     stiffness = max(k_t, k_w, 3e6 * max(1.0, min(mu, k_w / 3e6)))
@@ -371,9 +359,7 @@ def delayed(coefficients, shift):
 
 
 @settings(max_examples=100, deadline=None)
-@given(
-    row=rows, seed=st.integers(0, 2**32 - 1), order=st.integers(1, 8), shift=st.floats(0, 2 * np.pi)
-)
+@given(row=rows, seed=st.integers(0, 2**32 - 1), order=st.integers(1, 8), shift=st.floats(0, 2 * np.pi))
 def test_a_contact_that_slips_forgets_when_time_began(row, seed, order, shift):
     rng = np.random.default_rng(seed)
     q = random_gaps(rng, order, 1, 10 ** rng.uniform(-1, 1.5), 1.0)
@@ -385,7 +371,7 @@ def test_a_contact_that_slips_forgets_when_time_began(row, seed, order, shift):
             signs = np.unique(np.sign(force[0, d][state[0, d] == SLIP]))
             if signs.size < 2 and not np.any(state[0, d] == OPEN):
                 continue
-        assert np.max(np.abs(delayed(here[:, [d]], shift) - there[:, [d]])) <= 1e-12 * force_size(row, q)  # fmt: skip
+        assert np.max(np.abs(delayed(here[:, [d]], shift) - there[:, [d]])) <= 1e-12 * force_size(row, q)
 
 
 @settings(max_examples=200, deadline=None)
@@ -517,7 +503,7 @@ def found(polynomial):
     width = grid.shape[1]
     count = sign_changes(
         polynomial, slope_of(polynomial), grid, np.empty(width), np.empty(width), np.empty((40, 3)), roots
-    )  # fmt: skip
+    )
     return roots[:count]
 
 
@@ -561,10 +547,7 @@ def test_zero_counts_as_positive():
 @pytest.mark.parametrize("evaluator", ["intervals", "events"])
 def test_threads_change_nothing(evaluator, monkeypatch):
     rng = np.random.default_rng(2)
-    laws = [
-        ElasticCoulomb(k_t=1e6, k_w=2e6, k_n=3e6, mu=0.5, preload=60.0 * p)
-        for p in rng.uniform(-0.5, 3.0, 37)
-    ]
+    laws = [ElasticCoulomb(k_t=1e6, k_w=2e6, k_n=3e6, mu=0.5, preload=60.0 * p) for p in rng.uniform(-0.5, 3.0, 37)]
     contacts = compile_contacts(laws, evaluator=evaluator)
     q = random_gaps(rng, 3, 37, 2.0)
     alone = contact_forces(q, contacts, 64)

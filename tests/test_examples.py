@@ -37,9 +37,7 @@ def test_python_example_finds_the_damped_resonance(capsys):
     rows = re.findall(r"([\d.]+) Hz, (\d) harmonics: ([\d.]+) µm(.*)", capsys.readouterr().out)
     assert len(rows) > 40
     assert all(not state for *_, state in rows)
-    hertz, _, peak = max(
-        ((float(f), int(h), float(a)) for f, h, a, _ in rows), key=lambda row: row[2]
-    )
+    hertz, _, peak = max(((float(f), int(h), float(a)) for f, h, a, _ in rows), key=lambda row: row[2])
     both, contacts = names["both"], names["contacts"]
     gaps = contacts.gap_operator
     stuck = both.stiffness + gaps.T @ (contacts.stuck_stiffness()[:, None] * gaps)
@@ -56,11 +54,9 @@ def test_no_example_is_longer_than_sixty_lines_of_code(path):
     text = path.read_text()
     told = set()  # lines of docstrings
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(
-            node
-        ):
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node):
             told |= set(range(node.body[0].lineno, node.body[0].end_lineno + 1))
-    blank = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}  # fmt: skip
+    blank = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
     code = {
         line
         for token in tokenize.generate_tokens(StringIO(text).readline)

@@ -96,17 +96,22 @@ def wheel():
     law = ElasticCoulomb(k_t=6e6, k_w=6e6, k_n=8e6, mu=0.5, preload=1e6)
     own = sector_model(shrouded_sector())
     model = Model(
-        parts={"blade": solid_part(
-            own.parts["blade"].mesh, Material(), sectors=SECTORS, reduction=Reduction(200),
-            damping=own.parts["blade"].damping,
-        )},
+        parts={
+            "blade": solid_part(
+                own.parts["blade"].mesh,
+                Material(),
+                sectors=SECTORS,
+                reduction=Reduction(200),
+                damping=own.parts["blade"].damping,
+            )
+        },
         contacts={name: replace(c, law=law) for name, c in own.contacts.items()},
-        loads={name: own.loads[name] for name in ("gas", "lean")}, outputs=own.outputs, speed=own.speed,
-    )  # fmt: skip
-    hertz = (400.0, 500.0, 600.0)
-    found = model.forced_response(
-        hertz, low=1, high=1, selection="always_low", stability="off", peak_points=0
+        loads={name: own.loads[name] for name in ("gas", "lean")},
+        outputs=own.outputs,
+        speed=own.speed,
     )
+    hertz = (400.0, 500.0, 600.0)
+    found = model.forced_response(hertz, low=1, high=1, selection="always_low", stability="off", peak_points=0)
     return found, model
 
 
@@ -134,9 +139,7 @@ def test_every_node_of_copies_moves_as_the_unreduced_model_says(beams):
     still = full.expand(np.linalg.solve(dense, full.project(static)))
     assert [body.nodes.part for body in motion.bodies] == ["one", "two"]
     for body in motion.bodies:
-        assert (
-            np.abs(body.amplitudes[1] - body.nodes.of(wanted)).max() < 1e-8 * np.abs(wanted).max()
-        )
+        assert np.abs(body.amplitudes[1] - body.nodes.of(wanted)).max() < 1e-8 * np.abs(wanted).max()
         assert np.abs(body.mean - body.nodes.of(still)).max() < 1e-8 * np.abs(still).max()
     z = data["output"].values.tolist().index("middle.z")
     reported = data["output_displacement"].values[point_of(data, 0, None), 1, z]
@@ -184,9 +187,7 @@ def test_paraview_files_hold_one_period_read_by_meshio(beams):
     mesh = meshio.read(place / "motion_002.vtu")
     angle = 0.8 * math.pi
     vibration = np.vstack([body.at(angle) for body in motion.bodies])
-    assert (
-        np.abs(mesh.point_data["vibration_m"] - vibration).max() < 1e-12 * np.abs(vibration).max()
-    )
+    assert np.abs(mesh.point_data["vibration_m"] - vibration).max() < 1e-12 * np.abs(vibration).max()
     mean = np.vstack([body.mean for body in motion.bodies])
     assert np.allclose(mesh.point_data["displacement_m"], mean + vibration, rtol=1e-12, atol=0)
     count = len(model.parts["one"].mesh.points)
@@ -196,14 +197,7 @@ def test_paraview_files_hold_one_period_read_by_meshio(beams):
     own = harmonics["harmonic_1_real_m"] + 1j * harmonics["harmonic_1_imag_m"]
     assert np.allclose((own * np.exp(1j * angle)).real, vibration, rtol=1e-9, atol=1e-18)
     contact = meshio.read(place / "contacts_000.vtu")
-    assert set(contact.point_data) >= {
-        "gap_m",
-        "force_n",
-        "pressure_pa",
-        "state",
-        "slip_distance_m",
-        "energy_j",
-    }
+    assert set(contact.point_data) >= {"gap_m", "force_n", "pressure_pa", "state", "slip_distance_m", "energy_j"}
     assert np.all(contact.point_data["state"] == 0)  # they stick
     assert np.all(contact.point_data["slip_distance_m"] == 0)
     assert np.allclose(contact.points[:, 0], 0.1)
@@ -299,7 +293,7 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
 
 def test_all_sectors_go_to_a_folder_beside_that_of_one(wheel, tmp_path):
     result = ss.Result(wheel[0].data, tmp_path / "result.nc")
-    one, whole = (result.export("frd", of=wheel[1], wheel=all_of_it)[0] for all_of_it in (False, True))  # fmt: skip
+    one, whole = (result.export("frd", of=wheel[1], wheel=all_of_it)[0] for all_of_it in (False, True))
     assert one == tmp_path / "frd_0" / "motion.frd"
     assert whole == tmp_path / "frd_0_wheel" / "motion.frd"
     assert one.stat().st_size < whole.stat().st_size
@@ -310,9 +304,7 @@ def test_every_sector_of_a_mistuned_wheel_moves_as_the_unreduced_wheel_says(whee
     more = np.array([0.04, -0.03, 0.0, 0.02, -0.05])
     blades = BladeMistuning(of="blade", deviations=more, quantity="stiffness")
     mistuned = replace(model, mistuning=Mistuning(blades={"more": blades}))
-    result = mistuned.forced_response(
-        (500.0,), low=1, high=1, selection="always_low", stability="off", peak_points=0
-    )
+    result = mistuned.forced_response((500.0,), low=1, high=1, selection="always_low", stability="off", peak_points=0)
     motion = motion_of(chosen(result.data, hz=500.0), mistuned, wheel=False)
     assert [body.sector for body in motion.bodies] == list(range(SECTORS))
     waves = [model.at(0.0, k, "stuck", with_damping=True) for k in range(SECTORS)]
@@ -376,7 +368,7 @@ def test_free_motions_hold_the_balance_of_a_mass_that_is_not_solved_for(asked, t
         picked = chosen(result.data, amplitude_mm=600.0)
         told = result["nonlinear_mode"].isel(case=0, branch=0)
         near = int(np.nanargmin(np.abs(told["amplitude"].values - 0.6)))
-        ratio, omega = float(told["damping_ratio"][near]), 2 * math.pi * float(told["frequency_hz"][near])  # fmt: skip
+        ratio, omega = float(told["damping_ratio"][near]), 2 * math.pi * float(told["frequency_hz"][near])
         assert abs(ratio) > 1e-3
         s = 1j * omega if asked == "periodic" else omega * (1j * math.sqrt(1 - ratio**2) - ratio)
         own = s**2 - 2 * ratio * omega * s if asked == "periodic" else s**2
@@ -394,5 +386,7 @@ def test_a_page_is_no_result_and_the_refusal_names_what_can_be_written(tmp_path)
     page.write_text("<!doctype html>")
     told = CliRunner().invoke(app, ["export", str(page)])
     assert told.exit_code == 2
-    assert told.output.strip().endswith("both.html: is a page, and no result. Give the folder of a run, or the result.nc in it.")  # fmt: skip
+    assert told.output.strip().endswith(
+        "both.html: is a page, and no result. Give the folder of a run, or the result.nc in it."
+    )
     assert told.output.count("\n") == 1

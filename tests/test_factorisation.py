@@ -18,8 +18,7 @@ from stickslip.model.fe.factorisation import factorise, negative_eigenvalues
 RNG = np.random.default_rng(5)
 REQUIRED = os.environ.get("STICKSLIP_OPTIONAL") == "required"  # then nothing is skipped
 needs_feral = pytest.mark.skipif(
-    find_spec("feral") is None and not REQUIRED,
-    reason="feral is not installed: pip install 'stickslip[sparse]'",
+    find_spec("feral") is None and not REQUIRED, reason="feral is not installed: pip install 'stickslip[sparse]'"
 )
 SPARSE = ["superlu", pytest.param("feral", marks=needs_feral)]
 
@@ -267,9 +266,7 @@ def test_superlu_takes_its_place_where_the_package_errs(young, caplog, draw, fau
     assert negative_eigenvalues(matrix) == negative
     if told:
         assert [r.levelno for r in caplog.records] == 2 * [logging.WARNING]
-        assert re.search(
-            f"feral-solver is not used: it {told}.*SuperLU takes its place", caplog.text
-        )
+        assert re.search(f"feral-solver is not used: it {told}.*SuperLU takes its place", caplog.text)
     with pytest.raises(StickslipError, match=told or "2 pivots vanish"):
         factorise(matrix, backend="feral")
 

@@ -72,9 +72,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, xr.DataTre
 
 def same(found: xr.DataTree, expected: xr.DataTree) -> bool:
     return all(
-        np.array_equal(
-            found[name][key], expected[name][key], equal_nan=expected[name][key].dtype.kind in "fc"
-        )
+        np.array_equal(found[name][key], expected[name][key], equal_nan=expected[name][key].dtype.kind in "fc")
         for name in expected.children
         for key in expected[name].data_vars
         if "seconds" not in str(key)
@@ -100,11 +98,7 @@ def test_damaged_results_are_refused_by_name_or_give_the_same_numbers(
         path.write_bytes(content)
         try:
             of_file = path.suffix == ".nc"
-            tree = (
-                Result.open(path).data
-                if of_file
-                else run_study(read_study(tmp_path / "study.toml")).tree
-            )
+            tree = Result.open(path).data if of_file else run_study(read_study(tmp_path / "study.toml")).tree
         except InputError as error:
             told = error.place == str(path) and "--fresh" in str(error)
             counted["refused" if told else f"{number}: {error}"] += 1
@@ -116,9 +110,7 @@ def test_damaged_results_are_refused_by_name_or_give_the_same_numbers(
     assert set(counted) <= {"refused", "same"}, counted
 
 
-@pytest.mark.parametrize(
-    "name", ["jobs", "run.log", "result.ab12.part.nc", "report.html", "run.lock"]
-)
+@pytest.mark.parametrize("name", ["jobs", "run.log", "result.ab12.part.nc", "report.html", "run.lock"])
 def test_links_in_the_results_folder_are_not_followed(
     finished: tuple[Path, xr.DataTree], tmp_path: Path, name: str
 ) -> None:
@@ -133,9 +125,7 @@ def test_links_in_the_results_folder_are_not_followed(
     before = sorted(mine.iterdir()) if mine.is_dir() else mine.read_text()
     with pytest.raises(InputError) as caught:
         run_study(read_study(tmp_path / "s" / "study.toml"), fresh=True)
-    assert str(caught.value).startswith(
-        f"{link}: is a link, which a run does not follow. Remove it"
-    )
+    assert str(caught.value).startswith(f"{link}: is a link, which a run does not follow. Remove it")
     assert before == (sorted(mine.iterdir()) if mine.is_dir() else mine.read_text())
 
 
@@ -185,16 +175,9 @@ def test_a_result_goes_to_a_file_with_an_ending_or_into_a_folder(tmp_path: Path)
 
 def test_without_a_place_for_compiled_functions_the_package_loads_and_says_so_once() -> None:
     program = "import stickslip.contact.slider, stickslip.response.time.time_step"
-    nowhere = {
-        "NUMBA_CACHE_DIR": "/dev/null/none",
-        "NUMBA_CACHE_LOCATOR_CLASSES": "_UserProvidedCacheLocator",
-    }
+    nowhere = {"NUMBA_CACHE_DIR": "/dev/null/none", "NUMBA_CACHE_LOCATOR_CLASSES": "_UserProvidedCacheLocator"}
     ended = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, **nowhere},
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env={**os.environ, **nowhere}
     )
     assert ended.stderr.count("compiled functions cannot be kept") == 1
     assert "NUMBA_CACHE_DIR" in ended.stderr
@@ -242,9 +225,7 @@ def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
     assert Result.open(tmp_path / "results").data.attrs["complete"] == 1
 
 
-def test_an_interrupt_waits_until_a_result_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupt_waits_until_a_result_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # HDF5 calls back while it writes, and what is raised there is lost
     tree = xr.DataTree(xr.Dataset({"x": ("i", np.arange(3.0))}))
     made = netcdf.to_bytes
@@ -256,9 +237,7 @@ def test_an_interrupt_waits_until_a_result_is_written(
         return made(tree)
 
     monkeypatch.setattr(netcdf, "to_bytes", interrupted)
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # jobs in the background ignore it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it
     try:
         with pytest.raises(KeyboardInterrupt):
             write_tree(tree, tmp_path / "result.nc")

@@ -78,9 +78,7 @@ def influence(strength=fluid.STRENGTH):
 
 
 def model(aero, **more):
-    return ss.Model(
-        parts={"sector": Part(structure=sector(), sectors=N)}, aerodynamics=aero, **more
-    )
+    return ss.Model(parts={"sector": Part(structure=sector(), sectors=N)}, aerodynamics=aero, **more)
 
 
 def of_blade(coefficients, reference=2.2):
@@ -152,9 +150,7 @@ def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
 
 
 @pytest.mark.parametrize("wave", [1, 4])
-def test_energy_method_and_eigenvalue_part_four_times_less_when_coefficients_are_halved(
-    wave: int,
-) -> None:
+def test_energy_method_and_eigenvalue_part_four_times_less_when_coefficients_are_halved(wave: int) -> None:
     """Two modes that the fluid couples, so that the shapes change as well."""
     rng = np.random.default_rng(8)
     values = rng.standard_normal((1, 1, 3, 2, 2)) + 1j * rng.standard_normal((1, 1, 3, 2, 2))
@@ -213,11 +209,7 @@ def mode(moving):
 def wrong(tmp_path: Path, rows: list[str], change: tuple[str, str] = ("", "")) -> str:
     """Return what a study says of a file of coefficients."""
     save_structure(sector(), tmp_path / "sector.npz")
-    text = (
-        STUDY.format(file="aero.csv").replace(*change)
-        if change[0]
-        else STUDY.format(file="aero.csv")
-    )
+    text = STUDY.format(file="aero.csv").replace(*change) if change[0] else STUDY.format(file="aero.csv")
     (tmp_path / "study.toml").write_text(text)
     (tmp_path / "aero.csv").write_text("\n".join(rows))
     with pytest.raises(ss.InputError) as told:
@@ -230,8 +222,16 @@ def wrong(tmp_path: Path, rows: list[str], change: tuple[str, str] = ("", "")) -
     [
         ("neighbour,real_per_s2,imag_n_per_m", "0,1,2", "real_per_s2.*points are in N/m.*real_n_per_m"),
         ("neighbur,real_n_per_m,imag_n_per_m", "0,1,2", "neighbur.*not known.*neighbour"),
-        ("ibpa,real_n_per_m,imag_n_per_m", "0,1,2", "'ibpa', which is not known. The columns are one of neighbour, recorded_on, wave_number"),
-        ("phase_angle_deg,real_n_per_m,imag_n_per_m", "-180,1,2\n0,1,2\n180,1,2", "-180 and 180 degrees are the same angle. Leave one"),
+        (
+            "ibpa,real_n_per_m,imag_n_per_m",
+            "0,1,2",
+            "'ibpa', which is not known. The columns are one of neighbour, recorded_on, wave_number",
+        ),
+        (
+            "phase_angle_deg,real_n_per_m,imag_n_per_m",
+            "-180,1,2\n0,1,2\n180,1,2",
+            "-180 and 180 degrees are the same angle. Leave one",
+        ),
         ("note,real_n_per_m,imag_n_per_m", "0,1,2", "whose motion.*neighbour, recorded_on"),
         ("neighbour,real_n_per_m,phase_deg", "0,1,2", "real_n_per_m and phase_deg of the values"),
         ("neighbour,real_n_per_m,imag_n_per_m", "0.5,1,2", "line 2: neighbour: is no whole number, got '0.5'"),
@@ -240,13 +240,15 @@ def wrong(tmp_path: Path, rows: list[str], change: tuple[str, str] = ("", "")) -
         ("neighbour,real_n_per_m,imag_n_per_m", "0,1,2\n0,1,3", "line 3: says the same.*line 2"),
         ("neighbour,frequency_hz,real_n_per_m,imag_n_per_m", "0,1,1,2\n1,1,1,3\n0,2,1,2", "lacks.*neighbour 1, 2 Hz"),
         ("phase_angle_deg,real_n_per_m,imag_n_per_m", "0,1,2\n50,1,2", "not spread evenly"),
-        ("neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m", "0,blade,tip,1,2", "motion_point: is no point"),
+        (
+            "neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m",
+            "0,blade,tip,1,2",
+            "motion_point: is no point",
+        ),
         ("neighbour,force_point,real_n_per_m,imag_n_per_m", "0,blade,1,2", "force_point and motion_point"),
     ],
-)  # fmt: skip
-def test_what_is_wrong_in_the_file_is_told_with_its_place(
-    head: str, row: str, words: str, tmp_path: Path
-) -> None:
+)
+def test_what_is_wrong_in_the_file_is_told_with_its_place(head: str, row: str, words: str, tmp_path: Path) -> None:
     told = wrong(tmp_path, [head, *row.split("\n")])
     assert re.search(words, told.replace("\n", " ")), told
     assert "aero.csv" in told
@@ -256,14 +258,12 @@ def test_what_is_wrong_in_the_file_is_told_with_its_place(
     ("change", "words"),
     [
         (("sectors = 6", "sectors = 1"), "no sector of a wheel"),
-        (('[aero]', '[aero]\nclamped = "sector.blade"'), "clamped: is given for shapes"),
-        (('[aero]', '[aero]\nlargest_displacement_m = 1.0'), "belongs to modes"),
+        (("[aero]", '[aero]\nclamped = "sector.blade"'), "clamped: is given for shapes"),
+        (("[aero]", "[aero]\nlargest_displacement_m = 1.0"), "belongs to modes"),
         (("aero.csv", "other.csv"), "aero.file: there is no file"),
     ],
-)  # fmt: skip
-def test_what_is_wrong_in_the_table_is_told(
-    change: tuple[str, str], words: str, tmp_path: Path
-) -> None:
+)
+def test_what_is_wrong_in_the_table_is_told(change: tuple[str, str], words: str, tmp_path: Path) -> None:
     assert words in wrong(tmp_path, recorded_rows(), change)
 
 
@@ -272,9 +272,7 @@ def test_flutter_without_coefficients_and_outside_of_their_table_is_refused() ->
         model(None).flutter()
     narrow = influence()
     narrow = InfluenceCoefficients(narrow.distances, narrow.values[:, :3], narrow.frequencies[:3])
-    with pytest.raises(
-        ss.InputError, match=r"0\.05 to 0\.075 Hz, .* needs 0\.106249 to 0\.203573 Hz"
-    ):
+    with pytest.raises(ss.InputError, match=r"0\.05 to 0\.075 Hz, .* needs 0\.106249 to 0\.203573 Hz"):
         model(of_blade(narrow)).flutter(number=1)
 
 
@@ -364,7 +362,14 @@ def test_a_mistuned_wheel_without_deviations_does_what_one_sector_does_in_the_fl
     own = InfluenceCoefficients(own.distances, own.values[:, 22:23])
     there = driven(of_blade(own), 4)
     whole = replace(there, mistuning=Mistuning())
-    keys = {"frequencies_hz": [0.35, 0.36], "low": 1, "high": 1, "selection": "always_low", "peak_points": 0, "stability": "off"}  # fmt: skip
+    keys = {
+        "frequencies_hz": [0.35, 0.36],
+        "low": 1,
+        "high": 1,
+        "selection": "always_low",
+        "peak_points": 0,
+        "stability": "off",
+    }
     one, every = (m.forced_response(**keys).data["forced_response"] for m in (there, whole))
     tuned, sectors = one["amplitude"].values, every["amplitude"].values
     assert sectors.shape[1] >= N
@@ -378,9 +383,7 @@ def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
     """Blades that slip, engine orders that drive the two directions of a nodal diameter: the sectors of the wheel in time agree."""
     own = influence()
     aero = of_blade(InfluenceCoefficients(own.distances, 6 * own.values[:, 22:23]))
-    rub = ss.Contact(
-        between=("sector.blade", "ground"), law=ss.Jenkins(k_t=0.4, limit=0.01), acts="tangential"
-    )
+    rub = ss.Contact(between=("sector.blade", "ground"), law=ss.Jenkins(k_t=0.4, limit=0.01), acts="tangential")
     loads = {"gas": ss.Load(on="sector.blade", newton=0.02, engine_order=order)}
     outputs = (ss.Output(name="tip", on="sector.blade"),)
     there = model(aero, contacts={"rub": rub}, loads=loads, outputs=outputs)
@@ -388,11 +391,9 @@ def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
     omega = 2 * np.pi * 0.36
     sweep = ss.Sweep(
         omega_range=(omega, 1.0001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0
-    )  # fmt: skip
+    )
     problem = ss.response.forced_problem(found.system, found.load, sweep)
-    point = ss.response.accepted_points(list(ss.forced_response(found.system, found.load, sweep)))[
-        0
-    ]
+    point = ss.response.accepted_points(list(ss.forced_response(found.system, found.load, sweep)))[0]
     assert point.converged
     assert ss.response.fields(problem, point).energy.max() > 1e-4  # it slips
     motion = problem.low.linear.recover(point.omega, point.coefficients)
@@ -402,20 +403,14 @@ def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
     stepping = ss.response.TimeStepping(384, tolerance=1e-8, max_periods=300)
     shot = ss.response.shoot(
         whole.structure, gaps, laws, whole.load, omega, np.arange(whole.structure.n), start, stepping
-    )  # fmt: skip
+    )
     assert shot.converged
     expected, size = whole.spread(motion)[:2], np.abs(motion[1]).max()
     assert np.abs(shot.harmonics[:2] - expected).max() < 2e-3 * size
     # the other direction is another answer
-    other = assemble(
-        replace(there, loads={"gas": replace(loads["gas"], engine_order=N - order)}), 7
-    )
-    mirrored = ss.response.accepted_points(
-        list(ss.forced_response(other.system, other.load, sweep))
-    )[0]
-    far = ss.response.forced_problem(other.system, other.load, sweep).low.linear.recover(
-        omega, mirrored.coefficients
-    )
+    other = assemble(replace(there, loads={"gas": replace(loads["gas"], engine_order=N - order)}), 7)
+    mirrored = ss.response.accepted_points(list(ss.forced_response(other.system, other.load, sweep)))[0]
+    far = ss.response.forced_problem(other.system, other.load, sweep).low.linear.recover(omega, mirrored.coefficients)
     assert abs(abs(far[1]).max() - size) > 1e-2 * size
 
 
@@ -445,13 +440,7 @@ def test_the_example_tells_its_margin_in_terminal_and_page(tmp_path: Path) -> No
     page = tmp_path / "page.html"
     result.report(page)
     html = page.read_text()
-    for words in (
-        "Least stable diagram",
-        "Margins",
-        "unstable",
-        "In the flow",
-        "least damping in the flow",
-    ):
+    for words in ("Least stable diagram", "Margins", "unstable", "In the flow", "least damping in the flow"):
         assert words in html
 
 
@@ -526,9 +515,7 @@ def test_the_phase_of_a_mode_is_that_of_the_sectors_own_dofs(tmp_path: Path) -> 
         leading = shapes[top, [0, 1]]
         moving = there.at(0.0, k, "open")
         patterns = flow.on_structure(k, moving).patterns
-        np.testing.assert_allclose(
-            patterns, M @ shapes * np.abs(leading) / leading, rtol=1e-9, atol=1e-9
-        )
+        np.testing.assert_allclose(patterns, M @ shapes * np.abs(leading) / leading, rtol=1e-9, atol=1e-9)
 
 
 def test_rounding_does_not_choose_the_phase() -> None:
@@ -542,15 +529,13 @@ def test_rounding_does_not_choose_the_phase() -> None:
 def test_diagrams_of_still_fluid_and_equal_sectors_say_so() -> None:
     """The coefficients are those of 10 to 20 Hz, where no mode is."""
     base = sector_model(shrouded_sector())
-    narrow = InfluenceCoefficients(
-        np.array([0]), np.full((1, 2, 1, 1, 1), 1j), 2 * np.pi * np.array([10.0, 20.0])
-    )
+    narrow = InfluenceCoefficients(np.array([0]), np.full((1, 2, 1, 1, 1), 1j), 2 * np.pi * np.array([10.0, 20.0]))
     aero = Aerodynamics(influence=narrow, reference=70.0, points={"tip": ("blade.tip", (0, 1, 0))})
     scatter = BladeMistuning(of="blade.tip", deviations=np.full(SECTORS, 0.1))
     plain = ss.Model(parts=base.parts)
     full = replace(plain, aerodynamics=aero, mistuning=Mistuning(blades={"all": scatter}))
     keys = {"engine_orders": [1, 2], "modes": 2}
-    for name, more in (("safe", {"speed_rpm": 3000.0}), ("campbell", {"speeds_rpm": [0.0, 3000.0], "points": 2})):  # fmt: skip
+    for name, more in (("safe", {"speed_rpm": 3000.0}), ("campbell", {"speeds_rpm": [0.0, 3000.0], "points": 2})):
         found, still = (getattr(m, name)(**keys, **more) for m in (full, plain))
         a, b = (r.data[name].to_dataset()["frequency_hz"].values for r in (found, still))
         np.testing.assert_array_equal(a, b)

@@ -13,10 +13,7 @@ from stickslip.errors import InputError
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
 from stickslip.response.nonlinear_modes import ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.curve import (
-    damping_over_amplitude,
-    slip_amplitude,
-)
+from stickslip.response.self_excited.curve import damping_over_amplitude, slip_amplitude
 from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles
 from stickslip.response.self_excited.in_time import Marched, march_periods, wave_history
 from stickslip.response.self_excited.modes import stuck_modes
@@ -38,27 +35,21 @@ def cycles_of(two: bool) -> tuple[SelfExcited, list[LimitCycle]]:
     assert mode.unstable
     problem = self_excited_motions(system, load, mode, MOVED, Discretisation(order=11, samples=256))
     slips = slip_amplitude(problem)
-    return problem, limit_cycles(problem, damping_over_amplitude(problem, (0.6 * slips, 15.0 * slips), 10))  # fmt: skip
+    return problem, limit_cycles(problem, damping_over_amplitude(problem, (0.6 * slips, 15.0 * slips), 10))
 
 
 def marched(whole, motion: np.ndarray, omega: float, periods: int, kick: float) -> Marched:
     """March all sectors from a motion, speeds disturbed in another share for each coordinate."""
-    start = start_from_harmonics(
-        whole.spread(motion), omega, whole.contacts.gap_operator, whole.contacts.laws
-    )
+    start = start_from_harmonics(whole.spread(motion), omega, whole.contacts.gap_operator, whole.contacts.laws)
     shares = 1.0 + kick * np.cos(2.4 * np.arange(whole.structure.n))
     start = replace(start, velocity=start.velocity * shares)
-    return march_periods(whole.structure, whole.contacts, whole.load, omega, TIPS, start, periods, 256)  # fmt: skip
+    return march_periods(whole.structure, whole.contacts, whole.load, omega, TIPS, start, periods, 256)
 
 
 def test_modes_of_all_waves_have_the_damping_that_the_fluid_gives_them() -> None:
-    ratios = [
-        stuck_modes(flutter_wheel(k, 1, ONE_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)
-    ]
+    ratios = [stuck_modes(flutter_wheel(k, 1, ONE_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)]
     assert [k for k, ratio in enumerate(ratios) if ratio < 0] == [2]
-    still = [
-        stuck_modes(flutter_wheel(k, 1, TWO_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)
-    ]
+    still = [stuck_modes(flutter_wheel(k, 1, TWO_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)]
     assert [k for k, ratio in enumerate(still) if ratio < 0] == [1, 2]
 
 
@@ -102,7 +93,9 @@ def forced(force: float, fluid: InfluenceCoefficients = ONE_UNSTABLE):
     """A forced motion of wave 1, near its resonance."""
     system, load = flutter_wheel(1, 9, fluid, force)
     omega = 2 * math.pi * 619.5
-    sweep = ss.Sweep(omega_range=(omega, 1.0001 * omega), low=9, high=9, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    sweep = ss.Sweep(
+        omega_range=(omega, 1.0001 * omega), low=9, high=9, selection="always_low", frequencies=2, peak_points=0
+    )
     problem = ss.response.forced_problem(system, load, sweep)
     point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     assert point.converged
@@ -133,16 +126,14 @@ def test_a_forced_motion_is_left_by_an_unstable_wave_unless_it_slips_enough() ->
             assert gained == pytest.approx(found.multiplier, abs=1e-3)
 
 
-def test_a_share_of_the_period_has_the_multipliers_of_the_whole(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_share_of_the_period_has_the_multipliers_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wave 2 of six sectors makes three shares; force 2 N on wave 1 six, with slip in all sectors."""
     problem, cycles = cycles_of(False)
     forced_problem, point, _ = forced(2.0)
     gaps = [
         (problem.system, cycles[0].coefficients @ problem.balance.interface.gap_operator.T, cycles[0].omega),
         (forced_problem.system, point.coefficients @ forced_problem.low.interface.gap_operator.T, point.omega),
-    ]  # fmt: skip
+    ]
     for (system, own, omega), shares in zip(gaps, (3, 6), strict=True):
         found = all_in_time(system, own)
         assert found.shares == shares
@@ -162,11 +153,13 @@ def test_of_a_wheel_without_all_its_waves_nothing_is_said() -> None:
     wheel = problem.system.structure
     few = replace(wheel, waves={k: s for k, s in wheel.waves.items() if k % 2 == 0})
     with pytest.raises(InputError, match="has no wave"):
-        stability(replace(problem, system=replace(problem.system, structure=replace(few, engine_order=2))), point)  # fmt: skip
+        stability(replace(problem, system=replace(problem.system, structure=replace(few, engine_order=2))), point)
 
 
 @pytest.mark.parametrize("concept", ["periodic", "decaying"])
-def test_nonlinear_modes_of_each_wave_begin_with_its_damping_in_the_flow_and_cross_zero_at_its_limit_cycle(concept) -> None:  # fmt: skip
+def test_nonlinear_modes_of_each_wave_begin_with_its_damping_in_the_flow_and_cross_zero_at_its_limit_cycle(
+    concept,
+) -> None:
     begun = []
     for k in (2, 4):
         system, load = flutter_wheel(k, 3, ONE_UNSTABLE)
@@ -179,7 +172,7 @@ def test_nonlinear_modes_of_each_wave_begin_with_its_damping_in_the_flow_and_cro
         assert found.end.startswith("amplitude reached")
         begun.append(found.points[0].ratio)
         # a decaying linear motion is that of the eigenvalue, a steady one to the square of the damping
-        assert found.points[0].ratio == pytest.approx(mode.ratio, rel=1e-8 if concept == "decaying" else 1e-3)  # fmt: skip
+        assert found.points[0].ratio == pytest.approx(mode.ratio, rel=1e-8 if concept == "decaying" else 1e-3)
         assert found.points[0].omega == pytest.approx(mode.omega, rel=1e-4)
         if k == 2 and concept == "periodic":
             assert "gross slip from" in found.end

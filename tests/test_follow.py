@@ -16,12 +16,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.branch import OneLevel, Route, branch_of, steps_through
 from stickslip.response.follow import AUDITED, follow
 from stickslip.response.forced.along import ForcedCurve
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.system import System
 from stickslip.solve.branch import Following
 from stickslip.solve.newton_method import Newton, newton
@@ -83,9 +78,7 @@ def test_a_linear_resonance_however_sharp_is_passed_in_one_stretch(ratio, points
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_a_fold_is_passed_and_all_its_points_are_kept_in_the_order_of_the_branch(direction):
     # one harmonic alone has a closed form
-    sweep = Sweep(
-        omega_range=(0.8, 1.8), cap=1, points=40, peak_points=0, samples=64, direction=direction
-    )
+    sweep = Sweep(omega_range=(0.8, 1.8), cap=1, points=40, peak_points=0, samples=64, direction=direction)
     problem, solved = followed(cubic(), sweep)
     points = branch(solved)
     assert all(p.converged and p.order == 1 for p in points)
@@ -166,11 +159,7 @@ def test_an_audit_that_fails_throws_the_branch_back(monkeypatch, place):
     monkeypatch.setattr(ForcedCurve, "agree", disagree_once)
     _, points = followed(griffin(0.1), Sweep(omega_range=(0.8, 1.4), points=40, peak_points=0))
     assert lied, "no audit was made: nothing was shown"
-    failed = next(
-        k
-        for k, p in enumerate(points)
-        if p.stage == "audit" and p.index == lied[0] and p.order == 5
-    )
+    failed = next(k for k, p in enumerate(points) if p.stage == "audit" and p.index == lied[0] and p.order == 5)
     again = next(p for p in points[failed + 1 :] if p.stage == "point")
     assert again.index <= lied[0], "the branch goes on from before"
     assert again.order == 5
@@ -186,14 +175,8 @@ def test_an_audit_that_fails_throws_the_branch_back(monkeypatch, place):
 CASES = {
     "lifts off": (lifting, WIDE),
     "slips": (lambda: griffin(0.1), Sweep(omega_range=(0.8, 1.4), points=30, peak_points=4)),
-    "third resonates": (
-        lambda: griffin(0.03),
-        Sweep(omega_range=(0.25, 0.5), points=30, peak_points=4),
-    ),
-    "two blades": (
-        blades_and_damper,
-        Sweep(omega_range=(150 * HZ, 170 * HZ), points=20, peak_points=4),
-    ),
+    "third resonates": (lambda: griffin(0.03), Sweep(omega_range=(0.25, 0.5), points=30, peak_points=4)),
+    "two blades": (blades_and_damper, Sweep(omega_range=(150 * HZ, 170 * HZ), points=20, peak_points=4)),
 }
 
 
@@ -204,9 +187,7 @@ def exact_errors(case, sweep, points, order=25):
     found = []
     for p in points:
         at = newton(
-            lambda x, omega=p.omega: most.linearise(x, omega),
-            most.unknowns(p.coefficients),
-            Newton(max_iterations=60),
+            lambda x, omega=p.omega: most.linearise(x, omega), most.unknowns(p.coefficients), Newton(max_iterations=60)
         )
         assert at.status.converged
         reference = replace(p, coefficients=most.coefficients(at.x))
@@ -318,9 +299,7 @@ def test_a_branch_that_leads_back_is_left_and_taken_up_where_the_next_one_is(lea
     assert found[-1].converged
     assert max(abs(f.point.x[0] ** 2 - (f.p - 1.0) * (f.p - 2.0)) for f in kept) < 1e-10
     assert not any(1.0 < f.p < 2.0 for f in kept)
-    if (
-        leaves
-    ):  # back beyond its start by a tenth of the range, then on by a step of the range each time
+    if leaves:  # back beyond its start by a tenth of the range, then on by a step of the range each time
         assert -0.6 < min(f.p for f in kept) < -0.3
         assert all(1.0 < p < 2.0 for p in lost)
         assert len(lost) >= 9

@@ -13,13 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response import ladder
 from stickslip.response.branch import BACKWARD
 from stickslip.response.forced import from_time
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_pairs,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_pairs, accepted_points, forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 
 HZ = 2 * np.pi
@@ -37,11 +31,16 @@ def peak_of(system, load, sweep):
 @pytest.mark.parametrize(
     ("limit", "peak", "omega"),
     [
-        (0.02, 3.7388820, 1.000334), (0.05, 1.9693838, 1.004519), (0.08, 0.8446513, 1.031849),
-        (0.10, 0.6260618, 1.065886), (0.14, 0.5509276, 1.119652), (0.2, 0.6038447, 1.161950),
-        (0.5, 1.1288107, 1.211484), (1.0, 2.0803123, 1.221983),
+        (0.02, 3.7388820, 1.000334),
+        (0.05, 1.9693838, 1.004519),
+        (0.08, 0.8446513, 1.031849),
+        (0.10, 0.6260618, 1.065886),
+        (0.14, 0.5509276, 1.119652),
+        (0.2, 0.6038447, 1.161950),
+        (0.5, 1.1288107, 1.211484),
+        (1.0, 2.0803123, 1.221983),
     ],
-)  # fmt: skip
+)
 def test_damper_optimisation_curve(limit, peak, omega):
     """Benchmark B3 (Griffin 1980): peaks of the one-harmonic response, closed form."""
     system, load = griffin(limit)
@@ -56,27 +55,29 @@ def test_stuck_damper_is_a_spring():
     system, load = griffin(2.0)
     # the preload of the contact, 2, is what residuals are measured by: 20 times the excitation
     sweep = Sweep(
-        omega_range=(0.8, 1.1), selection="always_low", points=10, peak_points=0,
-        newton=Newton(tolerance=1e-12),
-    )  # fmt: skip
+        omega_range=(0.8, 1.1), selection="always_low", points=10, peak_points=0, newton=Newton(tolerance=1e-12)
+    )
     problem = forced_problem(system, load, sweep)
     for p in forced_response(system, load, sweep):
-        assert problem.amplitude(p) == pytest.approx(
-            abs(0.1 / (1.5 - p.omega**2 + 0.02j * p.omega)), rel=1e-9
-        )
+        assert problem.amplitude(p) == pytest.approx(abs(0.1 / (1.5 - p.omega**2 + 0.02j * p.omega)), rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("limit", "omega", "amplitude"),
-    [(0.1, 1.1, 0.56839426), (0.1, 1.2, 0.38916153), (0.2, 1.15, 0.59978456)],
+    ("limit", "omega", "amplitude"), [(0.1, 1.1, 0.56839426), (0.1, 1.2, 0.38916153), (0.2, 1.15, 0.59978456)]
 )
 def test_many_harmonics_are_the_exact_response(limit, omega, amplitude):
     """Benchmark B3, event-driven solution."""
     system, load = griffin(limit)
     sweep = Sweep(
-        omega_range=(omega - 0.02, omega), low=11, high=11, samples=2048, selection="always_low", points=4, frequencies=3,
+        omega_range=(omega - 0.02, omega),
+        low=11,
+        high=11,
+        samples=2048,
+        selection="always_low",
+        points=4,
+        frequencies=3,
         peak_points=0,
-    )  # fmt: skip
+    )
     last = list(forced_response(system, load, sweep))[-1]
     assert last.omega == omega
     assert forced_problem(system, load, sweep).amplitude(last) == pytest.approx(amplitude, rel=2e-5)
@@ -146,9 +147,7 @@ def test_peak_points_raise_the_peak(run):
     top = max(accepted_points(points), key=problem.amplitude)
     # against points with as many harmonics: one with fewer may stand higher, and is then solved again
     before = max(
-        problem.amplitude(p)
-        for p in accepted_points([p for p in points if p.stage != "peak"])
-        if p.order == top.order
+        problem.amplitude(p) for p in accepted_points([p for p in points if p.stage != "peak"]) if p.order == top.order
     )
     assert problem.amplitude(top) >= before
 
@@ -170,17 +169,9 @@ def test_stepping_through_frequencies():
     assert all(p.converged for p in points)
     # the same solutions as along the branch: solutions are unique where all contacts slip, and here in stick
     problem = forced_problem(system, load, sweep)
-    branch = list(
-        forced_response(
-            system, load, replace(SHORT, selection="always_low", peak_points=0, points=40)
-        )
-    )
-    curve = np.interp(
-        [p.omega for p in points], [p.omega for p in branch], [problem.amplitude(p) for p in branch]
-    )
-    assert [problem.amplitude(p) for p in points] == pytest.approx(
-        curve.tolist(), rel=2e-2
-    )  # linear interpolation
+    branch = list(forced_response(system, load, replace(SHORT, selection="always_low", peak_points=0, points=40)))
+    curve = np.interp([p.omega for p in points], [p.omega for p in branch], [problem.amplitude(p) for p in branch])
+    assert [problem.amplitude(p) for p in points] == pytest.approx(curve.tolist(), rel=2e-2)  # linear interpolation
 
 
 # ---- resuming -----------------------------------------------------------------------------------------------------------
@@ -336,7 +327,7 @@ def test_frequencies_stay_on_their_grid_after_one_that_failed(no_rescue):
 
 def test_resuming_points_from_the_motion_in_time():
     system, load = lifting()
-    sweep = replace(HASTY, newton=Newton(max_iterations=1), frequencies=10, peak_points=0, rescue="in_time")  # fmt: skip
+    sweep = replace(HASTY, newton=Newton(max_iterations=1), frequencies=10, peak_points=0, rescue="in_time")
     points = list(forced_response(system, load, sweep))
     in_time = [k for k, p in enumerate(points) if p.stage == "in_time"]
     assert len(in_time) > 1, "no point was found in time: nothing was shown"
@@ -443,8 +434,7 @@ def test_the_response_through_a_branch_is_one_curve(branch_run):
 @pytest.mark.parametrize("ends", [(20.0, 10.0), (10.0, 10.0), (0.0, 10.0), (-5.0, 10.0)])
 def test_range_must_grow(ends):
     with pytest.raises(
-        InputError,
-        match=rf"Sweep\.omega_range: must be positive and growing, got {ends[0]:g} to {ends[1]:g}",
+        InputError, match=rf"Sweep\.omega_range: must be positive and growing, got {ends[0]:g} to {ends[1]:g}"
     ):
         Sweep(omega_range=ends)
 

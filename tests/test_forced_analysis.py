@@ -29,13 +29,7 @@ from stickslip.model.structure import Structure
 from stickslip.report.forced.not_periodic import statistics_in_time
 from stickslip.report.page import plots
 from stickslip.report.response import Response
-from stickslip.response.forced.response import (
-    ForcedPoint,
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import ForcedPoint, Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
@@ -44,12 +38,7 @@ from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced.curve import Curve
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
-from stickslip.study.analyses.forced.known import (
-    mixed_places,
-    no_resonance,
-    nothing_pressed,
-    off_engine_order,
-)
+from stickslip.study.analyses.forced.known import mixed_places, no_resonance, nothing_pressed, off_engine_order
 from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.analyses.forced.rules import twice_the_harmonics
 from stickslip.study.analyses.forced.section import ForcedResponse
@@ -69,24 +58,40 @@ def question(system: System, load: HarmonicLoad, sweep: Sweep, **others: object)
     """Return a question about a system of the tests."""
     n = system.interface.n_contacts
     contacts = ContactTable(
-        system.interface.names, ("joint",) * n, ("elastic_coulomb",) * n,
-        np.full((n, 3), np.nan), np.tile(np.eye(3), (n, 1, 1)), np.full(n, np.nan),
-    )  # fmt: skip
+        system.interface.names,
+        ("joint",) * n,
+        ("elastic_coulomb",) * n,
+        np.full((n, 3), np.nan),
+        np.tile(np.eye(3), (n, 1, 1)),
+        np.full(n, np.nan),
+    )
     labels = tuple(f"out{i}.x" for i in range(len(system.outputs)))
     none, pressed = np.zeros((n, 3)), np.tile([0.0, 0.0, -1.0], (n, 1))
     force = max(float(np.abs(f).max()) for f in load.harmonics.values())
     model = Assembled(
-        system, system, load, contacts, labels, 0, labels, 0.0, force, none, pressed,
-        Frequencies(*(np.array([30.0, 50.0]),) * 4), None, 1, None, {},
-    )  # fmt: skip
+        system,
+        system,
+        load,
+        contacts,
+        labels,
+        0,
+        labels,
+        0.0,
+        force,
+        none,
+        pressed,
+        Frequencies(*(np.array([30.0, 50.0]),) * 4),
+        None,
+        1,
+        None,
+        {},
+    )
     asked = {"label": "", "limit": 0.05} | others
     return Question(model=replace(model, **asked.pop("model", {})), sweep=sweep, **asked)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("limit", [1e6, 0.5])
-def test_equivalent_damping_is_that_of_a_linear_oscillator_and_counts_what_friction_takes(
-    limit: float,
-) -> None:
+def test_equivalent_damping_is_that_of_a_linear_oscillator_and_counts_what_friction_takes(limit: float) -> None:
     """Mass 1 on springs 1 and 0.5, of which the second one sticks or slips, with a dashpot."""
     dashpot = 0.03
     structure = Structure(np.eye(1), dashpot * np.eye(1), np.eye(1), table(("a.x",)))
@@ -167,14 +172,12 @@ def test_dataset_holds_what_the_library_finds(rubbed: tuple[Question, Solved]) -
     assert set(data.order.values) == {1, 3}
     for i, point in enumerate(points):
         own = fields(problem, point)
-        for name, value in (("output_displacement", own.outputs), ("gap", own.gaps), ("contact_force", own.forces)):  # fmt: skip
+        for name, value in (("output_displacement", own.outputs), ("gap", own.gaps), ("contact_force", own.forces)):
             stored = data[name][i].values[..., 0] + 1j * data[name][i].values[..., 1]
             np.testing.assert_array_equal(stored[: point.order + 1], value)
             assert np.all(stored[point.order + 1 :] == 0.0)
         np.testing.assert_array_equal(data.dissipated_energy[i], own.energy)
-        assert data.harmonic_kept[i].values.tolist() == [
-            int(h <= point.order) for h in range(data.sizes["harmonic"])
-        ]
+        assert data.harmonic_kept[i].values.tolist() == [int(h <= point.order) for h in range(data.sizes["harmonic"])]
     top = int(np.argmax(data.amplitude[:, 0].values))
     assert int(data.peak_point[0]) == top
     assert float(data.peak_amplitude[0]) == data.amplitude[top, 0]
@@ -187,9 +190,7 @@ def test_dataset_holds_what_the_library_finds(rubbed: tuple[Question, Solved]) -
 
 
 @pytest.mark.parametrize("kept", [1, 5, -3, -1, None])
-def test_what_was_interrupted_goes_on_to_the_same_bits(
-    rubbed: tuple[Question, Solved], kept: int | None
-) -> None:
+def test_what_was_interrupted_goes_on_to_the_same_bits(rubbed: tuple[Question, Solved], kept: int | None) -> None:
     asked, whole = rubbed
     again = solved(asked, kept, whole)
     assert len(again.records) == len(whole.records)
@@ -197,9 +198,7 @@ def test_what_was_interrupted_goes_on_to_the_same_bits(
     xr.testing.assert_identical(dataset(again).drop_vars(NO_TIME), same)
 
 
-def test_file_of_netcdf_gives_the_same_dataset(
-    rubbed: tuple[Question, Solved], tmp_path: Path
-) -> None:
+def test_file_of_netcdf_gives_the_same_dataset(rubbed: tuple[Question, Solved], tmp_path: Path) -> None:
     data = dataset(rubbed[1])
     data.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as read:
@@ -230,16 +229,14 @@ def test_checks_of_a_finished_job_agree_and_solve_nothing_again(
     ]
 
 
-def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(
-    rubbed: tuple[Question, Solved],
-) -> None:
+def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(rubbed: tuple[Question, Solved]) -> None:
     asked, _ = rubbed
     system = asked.model.system
     other = replace(system, interface=replace(system.interface, names=("1", "3")))
-    sweep = replace(asked.sweep, high=5, selection="always_high", points=3, peak_points=0, samples=128)  # fmt: skip
+    sweep = replace(asked.sweep, high=5, selection="always_high", points=3, peak_points=0, samples=128)
     contacts = replace(asked.model.contacts, names=("1", "3"))
     one = replace(asked, sweep=replace(sweep, high=3), label="high = 3")
-    two = replace(asked, sweep=sweep, label="high = 5", model=replace(asked.model, system=other, contacts=contacts))  # fmt: skip
+    two = replace(asked, sweep=sweep, label="high = 5", model=replace(asked.model, system=other, contacts=contacts))
     each = [solved(one), solved(two)]
     data, alone = dataset(*each), [dataset(s) for s in each]
     assert data.contact.values.tolist() == ["1", "2", "3"]
@@ -250,7 +247,9 @@ def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(
         np.testing.assert_array_equal(split[i].gap.sel(contact=labels)[:, :n], alone[i].gap.values)
         assert np.all(split[i].gap.sel(contact=labels)[:, n:] == 0.0)
         assert np.all(split[i].harmonic_kept[:, n:] == 0)
-        np.testing.assert_array_equal(data.peak_force[i].sel(contact=labels)[..., : alone[i].sizes["sample"]], alone[i].peak_force[0])  # fmt: skip
+        np.testing.assert_array_equal(
+            data.peak_force[i].sel(contact=labels)[..., : alone[i].sizes["sample"]], alone[i].peak_force[0]
+        )
     assert np.all(np.isnan(split[0].gap.sel(contact="3")))
     assert np.all(data.peak_state[0].sel(contact="3") == -1)
     assert int(data.peak_point[1]) >= int(data.points[0])
@@ -259,12 +258,10 @@ def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(
 
 
 @pytest.mark.parametrize("driven", [(3,), (1, 3)])
-def test_amplitudes_and_the_peak_are_those_of_the_harmonics_that_the_load_drives(
-    driven: tuple[int, ...],
-) -> None:
+def test_amplitudes_and_the_peak_are_those_of_the_harmonics_that_the_load_drives(driven: tuple[int, ...]) -> None:
     system, load = rubbing()
     forces = dict.fromkeys(driven, load.harmonics[1])
-    sweep = Sweep(omega_range=(0.2, 0.33), low=3, high=3, selection="always_high", points=8, peak_points=0, samples=64)  # fmt: skip
+    sweep = Sweep(omega_range=(0.2, 0.33), low=3, high=3, selection="always_high", points=8, peak_points=0, samples=64)
     asked = question(system, HarmonicLoad(load.static, forces), sweep)
     data = dataset(solved(asked))
     assert list(data.attrs["driven_harmonics"]) == list(driven)
@@ -292,8 +289,14 @@ def test_checks_that_some_cases_had_stay_with_theirs(rubbed: tuple[Question, Sol
 def lifted(**sweep: object) -> Question:
     system, load = lifting()
     given: dict[str, object] = {
-        "omega_range": (0.8, 1.6), "low": 3, "high": 3, "selection": "always_high", "points": 30, "peak_points": 4, "samples": 128,
-    }  # fmt: skip
+        "omega_range": (0.8, 1.6),
+        "low": 3,
+        "high": 3,
+        "selection": "always_high",
+        "points": 30,
+        "peak_points": 4,
+        "samples": 128,
+    }
     return question(system, load, Sweep(**given | sweep))  # type: ignore[arg-type]
 
 
@@ -313,9 +316,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     data = dataset(solved(asked))
     own = data.own_error_percent.values
     assert 0 < np.count_nonzero(own > 0.01) < own.size
-    doubted = [
-        "are predicted to change it by" in text for text in data.verdict_reason.values.tolist()
-    ]
+    doubted = ["are predicted to change it by" in text for text in data.verdict_reason.values.tolist()]
     np.testing.assert_array_equal(doubted, own > 0.01)
     monkeypatch.setattr("stickslip.study.analyses.forced.points.own_error", lambda *_: float("nan"))
     data = dataset(solved(asked))
@@ -324,8 +325,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert int(data.case_verdict[0]) >= 1
     again = dataset(solved(replace(asked, checks=frozenset({"verify_harmonics"}))))
     doubted = [
-        "are predicted to change it, in amplitude or phase, by" in text
-        for text in again.verdict_reason.values.tolist()
+        "are predicted to change it, in amplitude or phase, by" in text for text in again.verdict_reason.values.tolist()
     ]
     np.testing.assert_array_equal(doubted, again.reference_error_percent.values > 0.01)
     assert not any("not examined" in text for text in again.verdict_reason.values.tolist())
@@ -335,15 +335,13 @@ def test_of_always_low_the_remedy_names_the_selection_and_says_what_was_compared
     few = lifted(low=1, high="auto", selection="always_low", points=4, peak_points=0)
     data = dataset(solved(replace(few, checks=frozenset({"verify_harmonics"}))))
     at = int(np.nanargmax(data.reference_error_percent.values))
-    assert "up to 15 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()  # fmt: skip
-    remedy = (
-        'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
-    )
+    assert "up to 15 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()
+    remedy = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
     assert {f.remedy for f in twice_the_harmonics(Curve(data, 0))} == {f"{remedy}."}
     (told,) = [t for t in FORCED_RESPONSE.summary(data) if t.title == "Against more harmonics"]
     (line,) = told.lines
     assert "gainst harmonics up to 15, where harmonics.high stands for 5" in line
-    assert f"{remedy}, and compare; with H = 5 a solution has 11 unknowns a coordinate instead of 3" in line  # fmt: skip
+    assert f"{remedy}, and compare; with H = 5 a solution has 11 unknowns a coordinate instead of 3" in line
     assert "Raise harmonics.high" not in line
 
 
@@ -362,9 +360,15 @@ def test_what_no_balance_is_found_for_is_found_in_time_or_told_with_what_showed_
     stop = Interface(("1",), (UnilateralSpring(k_n=20.0),), np.array([[0.0], [0.0], [1.0]]))
     structure = Structure(np.eye(1), 0.1 * np.eye(1), np.eye(1), table(("a.x",)))
     sweep = Sweep(
-        omega_range=(1.5, 3.5), at=(1.5, 3.5), low=9, high=9, selection="always_high", peak_points=0, rescue="in_time",
+        omega_range=(1.5, 3.5),
+        at=(1.5, 3.5),
+        low=9,
+        high=9,
+        selection="always_high",
+        peak_points=0,
+        rescue="in_time",
         newton=Newton(max_iterations=1),
-    )  # fmt: skip
+    )
     load = HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
     data = dataset(solved(question(System(structure, stop, np.array([0])), load, sweep)))
     periodic, other = data.marched_sentence.values.tolist()
@@ -378,11 +382,18 @@ def test_two_motions_of_one_case_that_are_not_periodic_stand_on_the_page() -> No
     stop = Interface(("1",), (UnilateralSpring(k_n=20.0),), np.array([[0.0], [0.0], [1.0]]))
     structure = Structure(np.eye(1), 0.1 * np.eye(1), np.eye(1), table(("a.x",)))
     sweep = Sweep(
-        omega_range=(3.5, 3.6), at=(3.5, 3.6), low=9, high=9, selection="always_high", peak_points=0, rescue="off", newton=Newton(max_iterations=1)
-    )  # fmt: skip
+        omega_range=(3.5, 3.6),
+        at=(3.5, 3.6),
+        low=9,
+        high=9,
+        selection="always_high",
+        peak_points=0,
+        rescue="off",
+        newton=Newton(max_iterations=1),
+    )
     load = HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
     asked = question(System(structure, stop, np.array([0])), load, sweep)
-    for seconds, words in ((5.0, "amplitude goes from"), (1e-9, "the time was too short: 1 of at least 128 periods")):  # fmt: skip
+    for seconds, words in ((5.0, "amplitude goes from"), (1e-9, "the time was too short: 1 of at least 128 periods")):
         data = dataset(solved(replace(asked, not_periodic_s=seconds)))
         shown = statistics_in_time(Response(data))
         assert shown is not None
@@ -392,9 +403,7 @@ def test_two_motions_of_one_case_that_are_not_periodic_stand_on_the_page() -> No
 
 def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     hopeless = Newton(max_iterations=1)
-    asked = lifted(
-        newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0, rescue="off"
-    )
+    asked = lifted(newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0, rescue="off")
     data = dataset(solved(replace(asked, not_periodic_s=2.0)))
     lost = data.status.values != 0
     assert 0 < lost.sum() == int(data.points_failed[0]) == data.attrs["failed"]
@@ -430,18 +439,13 @@ def drifting(retention: float) -> Question:
 
 def test_body_that_may_drift_is_told_and_retention_is_judged() -> None:
     free = warnings_of(dataset(solved(drifting(0.0))))
-    assert any(
-        "the mean position of node1.ring.x is undetermined and the body may drift" in t
-        for t in free
-    )
+    assert any("the mean position of node1.ring.x is undetermined and the body may drift" in t for t in free)
     data = dataset(solved(drifting(1e-2)))
     assert not any("may drift" in t for t in warnings_of(data))
     assert 0.0 < abs(float(data.retention_peak_shift[0])) < 1e-3
 
 
-def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object, **__: object):
         raise SingularError("static equilibrium: coordinate x is held by nothing")
         yield
@@ -472,9 +476,7 @@ def test_warnings_of_a_sweep_beside_all_resonances() -> None:
     (verdict,) = no_resonance(asked)
     assert f"{verdict.why}. {verdict.remedy}" == told
     assert no_resonance(lifted(omega_range=(40 * HZ, 70 * HZ))) == ()
-    assert mixed_places(("a.x", "b.rz"))[0].why.startswith(
-        "harmonics.alert_over mixes rotations (b.rz)"
-    )
+    assert mixed_places(("a.x", "b.rz"))[0].why.startswith("harmonics.alert_over mixes rotations (b.rz)")
     assert mixed_places(("a.x", "b.y")) == ()
 
 
@@ -483,9 +485,7 @@ def test_a_range_beside_the_engine_order_is_noted() -> None:
     wheel = replace(asked.model, sectors=24, engine_order=6, orders={1: 6})
     (note,) = off_engine_order(replace(asked, model=wheel, rpm=8000.0))
     assert (note.level, note.word) == ("trusted", "note")
-    assert note.why.startswith(
-        "at 8000 rpm engine order 6 excites at 800 Hz, outside 495 to 512 Hz:"
-    )
+    assert note.why.startswith("at 8000 rpm engine order 6 excites at 800 Hz, outside 495 to 512 Hz:")
     assert "passes this range at 4950 to 5120 rpm" in note.remedy
     for other in ({"rpm": 5000.0}, {"rpm": 0.0}, {"rpm": 8000.0, "key": "speed_rpm"}):
         assert off_engine_order(replace(asked, model=wheel, **other)) == ()
@@ -511,10 +511,7 @@ def settings(harmonics: dict[str, object] | None = None, **table_: object) -> Si
         ({"frequency_hz": [1.0, 2.0], "frequencies_hz": [1.0]}, "cannot stand beside frequency_hz"),
         ({"frequencies_hz": [1.0, 1.0]}, "must grow"),
         ({"frequencies_hz": [1.0, 2.0], "frequencies": 4}, "cannot stand beside frequencies_hz"),
-        (
-            {"frequency_hz": [1.0, 2.0], "over": "speed"},
-            "is not for over = 'speed'. Give speed_rpm",
-        ),
+        ({"frequency_hz": [1.0, 2.0], "over": "speed"}, "is not for over = 'speed'. Give speed_rpm"),
         ({"speed_rpm": [1.0, 2.0]}, "is not for over = 'frequency'"),
         ({"over": "speed"}, "is missing. Give one of speed_rpm"),
         ({"frequency_hz": [1.0, 2.0], "frequencies": 1}, "greater than or equal to 2"),
@@ -534,9 +531,7 @@ def test_sweeps_over_ranges_lists_and_speeds() -> None:
     assert sweep_of(settings(frequencies_hz=[3.0]), None).grid.tolist() == [3 * HZ]
     sweep = sweep_of(settings(over="speed", speed_rpm=[100.0, 200.0]), 6)
     assert sweep.omega_range == (600 * RPM, 1200 * RPM)
-    with pytest.raises(
-        InputError, match=r"forced_response\.over: is speed, and no load has an engine order"
-    ):
+    with pytest.raises(InputError, match=r"forced_response\.over: is speed, and no load has an engine order"):
         sweep_of(settings(over="speed", speed_rpm=[100.0, 200.0]), None)
 
 
@@ -550,7 +545,7 @@ def test_response_over_speed_has_speeds() -> None:
 
 
 def model(**others: object) -> Model:
-    structure = Structure(np.eye(3), np.eye(3), np.eye(3), table(("x", "y", "z")), {"tip": np.arange(3)})  # fmt: skip
+    structure = Structure(np.eye(3), np.eye(3), np.eye(3), table(("x", "y", "z")), {"tip": np.arange(3)})
     law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5)
     given: dict[str, object] = {
         "parts": {"blade": Part(structure=structure)},
@@ -560,12 +555,7 @@ def model(**others: object) -> Model:
     return Model(**given | others)  # type: ignore[arg-type]
 
 
-def refused(
-    asked: Model,
-    checks: frozenset[str] = frozenset(),
-    high: int | str = "auto",
-    **limits: float,
-) -> str:
+def refused(asked: Model, checks: frozenset[str] = frozenset(), high: int | str = "auto", **limits: float) -> str:
     own = settings({"low": 1, "high": high}, frequency_hz=[1.0, 2.0])
     own.limits = SimpleNamespace(**{"memory_gb": 4.0, "work_s": 7200.0} | limits)
     case = Case(0, "", {}, own, lambda: asked, "", Path(), checks)
@@ -602,9 +592,7 @@ def test_what_a_run_would_refuse_is_refused_before_any_job(tmp_path: Path):
     pull = {"load.pull.on": '"chain.m4"', "load.pull.force_n": "3.0", "load.pull.harmonic": "0"}
     path = write_four_masses(tmp_path, pull | {"vary.load.shaker.force_n": "[1e-9]"})
     case = read_study(path).cases()[0]
-    with pytest.raises(
-        InputError, match=r"load.shaker.force_n \(load.shaker.force_n = 1e-09\): the excitation is"
-    ):
+    with pytest.raises(InputError, match=r"load.shaker.force_n \(load.shaker.force_n = 1e-09\): the excitation is"):
         FORCED_RESPONSE.inputs(case, case.build())
 
 
@@ -620,9 +608,7 @@ def test_friction_that_nothing_presses_is_told(tmp_path: Path):
         "axial_stiffness_n_per_m": "0.0",
         "tangential_stiffness_n_per_m": "1e4",
     }
-    path = write_four_masses(
-        tmp_path, law | {f"contact.rub.{key}": value for key, value in keys.items()}
-    )
+    path = write_four_masses(tmp_path, law | {f"contact.rub.{key}": value for key, value in keys.items()})
     case = read_study(path).cases()[0]
     said = nothing_pressed(FORCED_RESPONSE.inputs(case, case.build()))
     assert said[0].why.startswith("all 1 contact points with friction are open in the static state")

@@ -37,9 +37,7 @@ nodal_diameters = [0, 1, 2, 3]
 
 def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3):
     """Write the deck of a sector of a ring of 200 to 400 mm, 20 mm thick: 3 x 3 x 1 bricks; coordinates in mm with so many digits."""
-    node = (
-        np.arange(2 * (cells + 1) ** 2).reshape(2, cells + 1, cells + 1) + 1
-    )  # axial, around, out
+    node = np.arange(2 * (cells + 1) ** 2).reshape(2, cells + 1, cells + 1) + 1  # axial, around, out
     lines = ["*NODE, NSET=NALL"]
     for k, j, i in np.ndindex(node.shape):
         r, angle = 100 + 100 * i / cells, 2 * np.pi / sectors * j / cells
@@ -48,9 +46,7 @@ def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3):
         lines.append(f"{node[k, j, i]}, " + ", ".join(f"{x:.{digits}g}" for x in place))
     lines.append("*ELEMENT, TYPE=C3D8, ELSET=EALL")
     for number, (j, i) in enumerate(np.ndindex(cells, cells), 1):
-        corners = [
-            node[k, j + b, i + a] for k in (0, 1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))
-        ]
+        corners = [node[k, j + b, i + a] for k in (0, 1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
         lines.append(", ".join(map(str, [number, *corners])))
     for name, nodes in (("LOW", node[:, 0]), ("HIGH", node[:, -1]), ("HELD", node[0, 1:, 0])):
         lines += [f"*NSET, NSET={name}", *map(str, nodes.ravel())]
@@ -58,10 +54,7 @@ def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3):
     lines += ["*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL"]
     lines += ["*SURFACE, NAME=SLOW, TYPE=NODE", "LOW", "*SURFACE, NAME=SHIGH, TYPE=NODE", "HIGH"]
     lines += ["*TIE, CYCLIC SYMMETRY, NAME=T, POSITION TOLERANCE=0.001", "SLOW, SHIGH"]
-    lines += [
-        f"*CYCLIC SYMMETRY MODEL, N={sectors}, TIE=T",
-        "0, 0, 0, " + ("0, 0, 1" if axis == "z" else "1, 0, 0"),
-    ]
+    lines += [f"*CYCLIC SYMMETRY MODEL, N={sectors}, TIE=T", "0, 0, 0, " + ("0, 0, 1" if axis == "z" else "1, 0, 0")]
     if along:
         lines += ["*BOUNDARY", "HELD, 3" if axis == "z" else "HELD, 1"]
     path.write_text("\n".join(lines) + "\n")
@@ -107,7 +100,11 @@ def tied(path):
     """Return the solid of a deck and the tie of its sector at wave number 0."""
     deck = read_deck(path, units=ss.Units.mm_t_s())
     part = solid_part(
-        deck.mesh, deck.material, clamped=(), sectors=deck.sectors, axis=deck.axis,
+        deck.mesh,
+        deck.material,
+        clamped=(),
+        sectors=deck.sectors,
+        axis=deck.axis,
         held=deck.held if deck.held.any() else None,
-    )  # fmt: skip
+    )
     return part.solid, Model(parts={"ring": part}).neighbours.ties["ring"]

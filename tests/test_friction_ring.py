@@ -26,11 +26,9 @@ def run(folder: Path, text: str, changes: dict[str, str], *only: str) -> xr.Data
     return Result.open(folder / "results").data[only[0]].to_dataset()
 
 
-def at_fixed(
-    folder: Path, harmonics: list[int], changes: dict[str, str] | None = None
-) -> xr.Dataset:
+def at_fixed(folder: Path, harmonics: list[int], changes: dict[str, str] | None = None) -> xr.Dataset:
     text = EXAMPLE.replace("frequency_hz = [621.0, 629.0]", EVERYWHERE).partition("[vary]")[0]
-    own = {"harmonics.low": f"{harmonics}", "harmonics.high": f"{harmonics}", "harmonics.selection": "'always_low'"}  # fmt: skip
+    own = {"harmonics.low": f"{harmonics}", "harmonics.high": f"{harmonics}", "harmonics.selection": "'always_low'"}
     fixed = own | {"forced_response.peak_points": "0", "forced_response.stability": "'off'"}
     return run(folder, text, fixed | (changes or {}), "forced_response")
 
@@ -42,16 +40,19 @@ def test_frequencies_are_those_of_the_blisk_and_of_the_free_ring(tmp_path: Path)
         for printed in row:
             hertz = float(printed)
             away = np.abs(found[diameter] - hertz).min()
-            assert (
-                away < 6e-7 or hertz > found[diameter].max()
-            )  # beyond four modes, the ring's among them
+            assert away < 6e-7 or hertz > found[diameter].max()  # beyond four modes, the ring's among them
 
 
 def test_optimum_of_the_limit_force(tmp_path: Path) -> None:
     """By [vary], with one harmonic as the reference has it."""
     limits = [2.85, OPTIMUM, 2.97]
-    one = {"harmonics.low": "1", "harmonics.high": "1", "forced_response.stability": "'off'", "forced_response.points": "16"}  # fmt: skip
-    changes = one | {"vary.contact.groove.slip_limit_n": f"{limits}", "forced_response.peak_points": "20"}  # fmt: skip
+    one = {
+        "harmonics.low": "1",
+        "harmonics.high": "1",
+        "forced_response.stability": "'off'",
+        "forced_response.points": "16",
+    }
+    changes = one | {"vary.contact.groove.slip_limit_n": f"{limits}", "forced_response.peak_points": "20"}
     text = EXAMPLE.replace("[621.0, 629.0]", "[624.0, 625.5]")
     data = run(tmp_path / "study", text, changes, "forced_response")
     peaks = data["peak_amplitude"].values
@@ -61,14 +62,12 @@ def test_optimum_of_the_limit_force(tmp_path: Path) -> None:
     assert curve.deriv().roots()[0] == pytest.approx(OPTIMUM, abs=0.02)
 
 
-@pytest.mark.parametrize(("column", "harmonics"), [(1, [1]), (2, [1, 3]), (3, [1, 3, 5, 7, 9, 11, 13])])  # fmt: skip
+@pytest.mark.parametrize(("column", "harmonics"), [(1, [1]), (2, [1, 3]), (3, [1, 3, 5, 7, 9, 11, 13])])
 def test_each_harmonic_has_its_own_wave(tmp_path: Path, column: int, harmonics: list[int]) -> None:
     """The amplitudes of the reference, which are 3 % off where all harmonics get the wave of the first one."""
     data = at_fixed(tmp_path / "study", harmonics)
     expected = [row[column] for row in HARMONICS]
-    tolerance = (
-        DIGITS if column == 1 else 1e-5
-    )  # the reference has 4096 samples, exact events are used here
+    tolerance = DIGITS if column == 1 else 1e-5  # the reference has 4096 samples, exact events are used here
     np.testing.assert_allclose(data["amplitude"].values[:, 0], expected, rtol=tolerance)
 
 
@@ -91,7 +90,7 @@ def annulus() -> str:
         return str(every).replace("'", '"')
 
     names = [f"{name}{n}" for n in range(SECTORS) for name in ("disk", "root", "tip")]
-    blisk = [("disk", "ground", 6e5), ("disk", "next.disk", 5e7), ("disk", "root", 1e6), ("root", "tip", 2e6)]  # fmt: skip
+    blisk = [("disk", "ground", 6e5), ("disk", "next.disk", 5e7), ("disk", "root", 1e6), ("root", "tip", 2e6)]
     ring = [("piece", "next.piece", 8e6), ("piece", "ground", 1.0)]
     contacts = "\n".join(
         f'[contact.c{n}]\nbetween = ["blisk.disk{n}", "ring.piece{n}"]\nlaw = "jenkins"\n'

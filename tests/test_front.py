@@ -29,9 +29,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture(scope="module")
 def everything() -> Result:
     nodes = {"modes": modes_result(), "campbell": campbell_result(), "safe": safe_result(0.1)}
-    return Result(
-        tree_of(provenance(), forced_response=synthetic_result(ratios=(20, 5, 2), n=24), **nodes)
-    )
+    return Result(tree_of(provenance(), forced_response=synthetic_result(ratios=(20, 5, 2), n=24), **nodes))
 
 
 @pytest.fixture(scope="module")
@@ -43,21 +41,11 @@ def masses(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Result]:
 
 def test_every_figure_of_the_page_can_be_had_by_name(everything: Result) -> None:
     assert everything.plots[0] == "response"
-    assert {
-        "optimisation",
-        "loops_t",
-        "energy",
-        "diameters",
-        "shapes",
-        "campbell",
-        "safe",
-        "mesh",
-    } <= set(everything.plots)
+    assert {"optimisation", "loops_t", "energy", "diameters", "shapes", "campbell", "safe", "mesh"} <= set(
+        everything.plots
+    )
     assert all(isinstance(everything.plot(name), go.Figure) for name in everything.plots)
-    with pytest.raises(
-        InputError,
-        match=r"plot\('respons'\): is no figure of this result\. Did you mean 'response'",
-    ):
+    with pytest.raises(InputError, match=r"plot\('respons'\): is no figure of this result\. Did you mean 'response'"):
         everything.plot("respons")
 
 
@@ -73,9 +61,7 @@ def test_peaks_are_a_table(everything: Result) -> None:
     assert of_modes["mode 1 (Hz)"][1] == pytest.approx(float(modes_result().frequency_hz[0, 1, 0]))
 
 
-def test_a_saved_result_is_the_same_and_opens_with_xarray_alone(
-    everything: Result, tmp_path: Path
-) -> None:
+def test_a_saved_result_is_the_same_and_opens_with_xarray_alone(everything: Result, tmp_path: Path) -> None:
     again = Result.open(everything.save(tmp_path))
     assert again.path == tmp_path / "result.nc"
     xr.testing.assert_identical(again.data, everything.data)
@@ -99,9 +85,7 @@ def test_cases_of_waves_are_drawn_one_by_one() -> None:
     data = modes_result()
     two = xr.concat([data, data.assign(frequency_hz=2 * data["frequency_hz"])], "case")
     two["case_label"] = "case", ["part.blade.span = 1", "part.blade.span = 2"]
-    two = two.assign(vary_value=(("case", "vary"), [[1.0], [2.0]])).assign_coords(
-        vary=["part.blade.span"]
-    )
+    two = two.assign(vary_value=(("case", "vary"), [[1.0], [2.0]])).assign_coords(vary=["part.blade.span"])
     result = Result(tree_of(modes=two))
     assert result.plots == ("diameters", "shapes", "diameters_1", "shapes_1")
     first, second = (result.plot(name).data[0].y for name in ("diameters", "diameters_1"))
@@ -113,9 +97,7 @@ def test_a_study_runs_and_goes_on_from_what_is_there(masses: tuple[Study, Result
     assert result.path == study.folder / "result.nc"
     assert result.data["forced_response"].sizes["point"] > 10
     again = study.run()
-    xr.testing.assert_equal(
-        again.data["forced_response"].to_dataset(), result.data["forced_response"].to_dataset()
-    )
+    xr.testing.assert_equal(again.data["forced_response"].to_dataset(), result.data["forced_response"].to_dataset())
     assert "first.x" in str(result.plot("response").layout) or result.plots[0] == "response"
 
 
@@ -129,10 +111,7 @@ def test_a_replaced_study_has_a_folder_of_its_own(masses: tuple[Study, Result]) 
     assert found.peaks["amplitude (m)"][0] != result.peaks["amplitude (m)"][0]
     assert "# contact.brake.slip_limit_n = 1.0" in found.data.attrs["study_toml"]
     assert study.content.tables.contact["brake"] is not soft.content.tables.contact["brake"]
-    for key, said in (
-        ("contact.break.slip_limit_n", "contact.break"),
-        ("contact.brake.slip_limit", "slip_limit"),
-    ):
+    for key, said in (("contact.break.slip_limit_n", "contact.break"), ("contact.brake.slip_limit", "slip_limit")):
         with pytest.raises(InputError) as caught:
             study.replace({key: 1.0})
         assert said in str(caught.value)
@@ -140,9 +119,7 @@ def test_a_replaced_study_has_a_folder_of_its_own(masses: tuple[Study, Result]) 
         study.replace({"contact.brake.slip_limit_n": -1.0})
 
 
-def test_a_model_gives_the_numbers_of_its_study_without_files(
-    masses: tuple[Study, Result], tmp_path: Path
-) -> None:
+def test_a_model_gives_the_numbers_of_its_study_without_files(masses: tuple[Study, Result], tmp_path: Path) -> None:
     study, result = masses
     model = study.model()
     assert isinstance(model, Model)
@@ -157,8 +134,7 @@ def test_a_model_gives_the_numbers_of_its_study_without_files(
     kept = model.forced_response(hz=[9.0, 10.0, 11.0], peak_points=0, folder=tmp_path / "made")
     assert kept.path == tmp_path / "made" / "result.nc"
     with pytest.raises(
-        InputError,
-        match=r"forced_response: selektion: is no key of this question\. Did you mean 'selection'",
+        InputError, match=r"forced_response: selektion: is no key of this question\. Did you mean 'selection'"
     ):
         model.forced_response(hz=(8, 20), selektion="always_high")
     with pytest.raises(InputError, match=r"forced_response: low: .*got 0"):

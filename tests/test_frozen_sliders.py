@@ -32,9 +32,7 @@ def wedged(damping: float = 0.0) -> System:
     return replace(system, structure=replace(system.structure, damping=damping * np.eye(2)))
 
 
-def balance_of(
-    system: System, shake: FloatArray, order: int = 1, evaluator: str = "events"
-) -> HarmonicBalance:
+def balance_of(system: System, shake: FloatArray, order: int = 1, evaluator: str = "events") -> HarmonicBalance:
     linear = system.condensed(HarmonicLoad(PULL, {1: shake}), order)
     return harmonic_balance(linear, system.interface, order, 256, evaluator)
 
@@ -140,7 +138,7 @@ def test_gross_slip_forgets():
     omega = 2 * np.pi * 163.0
     sweep = ss.Sweep(
         omega_range=(omega, 1.01 * omega), at=(omega,), low=5, high=5, selection="always_high", peak_points=0
-    )  # fmt: skip
+    )
     problems = [forced_problem(s, load, sweep) for s in (plain, frozen)]
     (point,) = ss.forced_response(plain, load, sweep)
     assert point.converged
@@ -160,9 +158,15 @@ def test_time_integration_from_the_static_state_attains_the_same_stuck_motion():
     start = TransientStart(static, np.zeros(2), rest(2, laws).states)
     load = HarmonicLoad(PULL, {1: SHAKE})
     result = integrate(
-        frozen.structure, interface.gap_operator, laws, load, OMEGA, np.array([0, 1]), start,
+        frozen.structure,
+        interface.gap_operator,
+        laws,
+        load,
+        OMEGA,
+        np.array([0, 1]),
+        start,
         TimeStepping(steps_per_period=4096, tolerance=1e-9),
-    )  # fmt: skip
+    )
     balance = balance_of(frozen, SHAKE)
     q = balance.coefficients(solved(balance, frozen))
     assert result.settled
@@ -268,9 +272,7 @@ def test_a_study_freezes_its_sliders(tmp_path):
     assert abs(force[0]) == pytest.approx(0.5 * 0.5 * 20.0)
     without = STUDY.replace("static_friction_share = 0.5\n", "")
     plain = ss.Study.from_file(written(tmp_path, without)).run().data
-    assert abs(plain["forced_response"]["static_force"].values.reshape(-1)[0]) == pytest.approx(
-        10.0
-    )
+    assert abs(plain["forced_response"]["static_force"].values.reshape(-1)[0]) == pytest.approx(10.0)
 
 
 def test_a_study_that_cannot_freeze_says_which_contact(tmp_path):

@@ -12,24 +12,13 @@ from stickslip.errors import InputError
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import adjoint, strategy_named
-from stickslip.harmonic.selection.adjoint import (
-    contributions,
-    estimate,
-    factored,
-    mean_jacobian,
-    outputs_of,
-)
+from stickslip.harmonic.selection.adjoint import contributions, estimate, factored, mean_jacobian, outputs_of
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.goal_oriented import GoalOriented, chosen_harmonics
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Step
 from stickslip.harmonic.travelling import condense_waves
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton, newton
 
@@ -56,9 +45,7 @@ def step_of(low, high, x, omega, measure=BLADES):
 def true_error(low, x, omega, measure, order=10):
     """Newton's method with many harmonics from the padded solution."""
     many = low.with_order(order)
-    solution = newton(
-        lambda v: many.linearise(v, omega), many.unknowns(low.coefficients(x)), Newton()
-    )
+    solution = newton(lambda v: many.linearise(v, omega), many.unknowns(low.coefficients(x)), Newton())
     assert solution.status.converged
     before = low.linear.recover(omega, low.coefficients(x))
     after = low.linear.recover(omega, many.coefficients(solution.x))
@@ -129,9 +116,7 @@ def test_parts_are_derivatives_of_the_solution(retained):
         alone = np.zeros_like(rows)
         alone[2 * h - 1 : 2 * h + 1] = rows[2 * h - 1 : 2 * h + 1]
         ends = [
-            high.linear.recover(
-                omega, high.coefficients(resolved(high, full, omega, sign * step * alone))
-            )
+            high.linear.recover(omega, high.coefficients(resolved(high, full, omega, sign * step * alone)))
             for sign in (1.0, -1.0)
         ]
         difference = outputs.relative(ends[0] - ends[1]) / (2 * step)
@@ -209,10 +194,7 @@ def test_a_jacobian_by_its_products_gives_the_same_parts():
     _, found = estimated(low, by_products, x, omega, solve=solver.solve)
     assert found.mean.factors is None
     assert found.bound == pytest.approx(dense.bound, rel=1e-9)
-    one, other = (
-        contributions(low, high_, omega, outputs, e)
-        for high_, e in ((by_products, found), (high, dense))
-    )
+    one, other = (contributions(low, high_, omega, outputs, e) for high_, e in ((by_products, found), (high, dense)))
     assert np.allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
     # without a solver of its own it is made an array
     assert estimated(low, by_products, x, omega)[1].bound == pytest.approx(dense.bound, rel=1e-9)
@@ -257,9 +239,7 @@ def test_the_third_harmonic_of_a_jenkins_element_comes_before_the_fifth():
     low, high, x = pair(*griffin(0.1), 1.05, order=9, samples=1024)
     # parts of harmonics 3, 5, 7, 9: 1.8 %, 0.12 %, 0.025 %, 0.003 %
     chosen = [
-        GoalOriented(threshold=threshold, guarded=False)
-        .judge(step_of(low, high, x, 1.05, measure))
-        .again
+        GoalOriented(threshold=threshold, guarded=False).judge(step_of(low, high, x, 1.05, measure)).again
         for threshold in (0.1, 0.01, 0.003, 1e-5)
     ]
     assert chosen == [None, (0, 1, 3), (0, 1, 3, 5), (0, 1, 3, 5, 7, 9)]
@@ -355,9 +335,12 @@ def test_the_guard_is_asked_where_the_bound_is_quiet():
 def test_never_silent_where_the_alert_speaks():
     seen = 0
     for system, load, omegas, measure in (
-        *((*blades_and_damper(excitation=f), HZ * np.array([158.5, 160, 161, 162, 163, 164]), BLADES) for f in (1.0, 1.4)),
+        *(
+            (*blades_and_damper(excitation=f), HZ * np.array([158.5, 160, 161, 162, 163, 164]), BLADES)
+            for f in (1.0, 1.4)
+        ),
         *((*free_body_3d(seed), np.array([250.0, 350.0]), ErrorMeasure(np.arange(6))) for seed in range(3)),
-    ):  # fmt: skip
+    ):
         for omega in omegas:
             try:
                 low, high, x = pair(system, load, omega, samples=128)
@@ -422,9 +405,7 @@ def test_a_response_has_the_accuracy_of_the_reference_with_fewer_unknowns(passag
     )
     assert strategy_named("goal_oriented", 0.02) == GoalOriented(threshold=0.02)
     accepted = accepted_points(list(forced_response(system, load, sweep)))
-    full = accepted_points(
-        list(forced_response(system, load, replace(sweep, low=5, selection="always_high")))
-    )
+    full = accepted_points(list(forced_response(system, load, replace(sweep, low=5, selection="always_high"))))
     problem = forced_problem(system, load, sweep)
     supports = {p.support for p in accepted}
     assert (0, 1) in supports

@@ -36,7 +36,7 @@ def judged(hertz, factor=1.0, name="guarded_alert"):
 @pytest.mark.parametrize(
     ("hertz", "factor", "true"),
     [(163, 1.0, 0.0728), (161, 1.0, 0.1393), (162, 1.0, 0.1438), (159, 1.5, 0.2328), (215, 1.5, 0.0598)],
-)  # fmt: skip
+)
 def test_alarm_is_raised_where_literature_has_large_errors(hertz, factor, true):
     """Literature benchmark B7: real errors above 5 %, the first of them with a prediction of 1.1 %."""
     verdict = judged(hertz, factor)
@@ -52,8 +52,7 @@ def test_published_rule_is_silent_where_the_contacts_change_their_states():
 
 
 @pytest.mark.parametrize(
-    ("hertz", "true"),
-    [(160, 0.0111), (164, 0.0063), (220, 0.0195), (222, 0.0117), (228, 0.0219), (230, 0.0296)],
+    ("hertz", "true"), [(160, 0.0111), (164, 0.0063), (220, 0.0195), (222, 0.0117), (228, 0.0219), (230, 0.0296)]
 )
 def test_no_false_alarm_on_the_rows_of_literature(hertz, true):
     """What is accepted has a bound, which the published real error does not exceed by more than the difference of ñH and 2ñH."""
@@ -86,25 +85,17 @@ def test_outputs_that_stand_still_while_the_contacts_move_on_are_no_proof(number
 @pytest.mark.parametrize("name", ["guarded_alert", "goal_oriented"])
 def test_harmonics_that_a_reference_leaves_out_are_seen(name):
     """A quadratic spring drives the even harmonics alone: at 1 rad/s they change the amplitude by 8 %."""
-    spring = ss.Interface(
-        ("spring",), (ss.PolynomialSpring(along_t=(0.1, 0.25)),), np.eye(3)[:, :1]
-    )
+    spring = ss.Interface(("spring",), (ss.PolynomialSpring(along_t=(0.1, 0.25)),), np.eye(3)[:, :1])
     mass = ss.model.lumped(np.eye(1), np.eye(1), 0.03 * np.eye(1))
     system = ss.System(mass, spring, np.array([0]))
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-    sweep = ss.Sweep(
-        omega_range=(0.4, 1.2), high=(1, 3, 5), selection=name, frequencies=9, peak_points=0
-    )
+    sweep = ss.Sweep(omega_range=(0.4, 1.2), high=(1, 3, 5), selection=name, frequencies=9, peak_points=0)
     first = [p for p in ss.forced_response(system, load, sweep) if p.stage == "low"]
     said = {round(p.omega, 1): p.predicted_error for p in first}
     assert said[1.0] > 0.05
     assert said[1.1] == pytest.approx(0.0218, rel=0.05)  # against harmonics 0 to 12
     published = ss.Sweep(
-        omega_range=(0.4, 1.2),
-        high=(1, 3, 5),
-        selection="jacobian_alert",
-        frequencies=9,
-        peak_points=0,
+        omega_range=(0.4, 1.2), high=(1, 3, 5), selection="jacobian_alert", frequencies=9, peak_points=0
     )
     silent = list(ss.forced_response(system, load, published))
     assert max(p.predicted_error for p in silent) < 1e-9
@@ -205,9 +196,7 @@ def test_wheel_without_waves_beyond_its_reference_is_held_against_the_reference(
     problem = forced_problem(case.system, case.load, case.sweep(high=10))
     assert doubled(problem.high).order == 10
     points = [p for p in low_order_points(case) if p.converged]
-    alarms = [
-        strategy_named("guarded_alert", 0.05).judge(step_of(problem, p)).again for p in points
-    ]
+    alarms = [strategy_named("guarded_alert", 0.05).judge(step_of(problem, p)).again for p in points]
     assert None in alarms
     assert problem.high.harmonics in alarms
 

@@ -207,9 +207,7 @@ def test_a_mass_is_held_by_a_spring_whose_force_opposes_large_displacements(law,
     first = mass.structure.dofs.labels[0]
     model = Model(
         parts={"mass": mass},
-        contacts={
-            "spring": Contact(between=(f"mass.{first}", "ground"), law=law, acts="tangential")
-        },
+        contacts={"spring": Contact(between=(f"mass.{first}", "ground"), law=law, acts="tangential")},
         loads={"shake": Load(on=f"mass.{first}", newton=1.0)},
     )
     assert bool(unheld(model, np.ones(1, dtype=bool))) is not held

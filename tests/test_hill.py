@@ -17,13 +17,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.stability import (
-    hill_exponents,
-    hill_stability,
-    motion_stability,
-    stability,
-    wave_disturbances,
-)
+from stickslip.response.stability import hill_exponents, hill_stability, motion_stability, stability, wave_disturbances
 from stickslip.response.stability.contact_states import located_states
 from stickslip.response.stability.contact_tangent import contact_tangents
 from stickslip.response.stability.hill_segment import Segment
@@ -35,9 +29,7 @@ from stickslip.study.keep.archive import decode, encode
 def random_motion(law, seed):
     rng = np.random.default_rng([seed, list(LAWS).index(law)])
     structure = random_structure(rng, 3)
-    interface = Interface(
-        ("a", "b"), (LAWS[law](),) * 2, rng.standard_normal((6, 3)), np.array([0.7, 1.3])
-    )
+    interface = Interface(("a", "b"), (LAWS[law](),) * 2, rng.standard_normal((6, 3)), np.array([0.7, 1.3]))
     return System(structure, interface, np.array([0])), random_gaps(rng, 2, 3)
 
 
@@ -147,7 +139,9 @@ def above_its_harmonics(slow, fast):
     """Two modes that close a stop together, at 1.3 and 40 times the frequency of the motion, with these damping coefficients."""
     two = Dofs(np.arange(2), ("x", "y"), np.zeros((2, 3)))
     structure = Structure(np.eye(2), np.diag([slow, fast]), np.diag([1.69, 1600.0]), two)
-    interface = Interface(("s",), (UnilateralSpring(k_n=1.0e3, initial_gap=0.1),), np.array([[0.0, 0.0], [0.0, 0.0], [0.1, 1.0]]))  # fmt: skip
+    interface = Interface(
+        ("s",), (UnilateralSpring(k_n=1.0e3, initial_gap=0.1),), np.array([[0.0, 0.0], [0.0, 0.0], [0.1, 1.0]])
+    )
     gaps = np.zeros((3, 3), dtype=complex)
     gaps[1, 2], gaps[2, 2] = 0.7, 0.1j
     system = System(structure, interface, np.array([0]))
@@ -193,7 +187,7 @@ def test_verdicts_are_those_of_the_monodromy():
 def test_structural_damping_has_exponents():
     """Two masses on a spring with a loss factor, at rest in their contact: those of the linear structure, upper half of the strip."""
     system, _ = random_motion("Jenkins", 0)
-    structure = replace(system.structure, damping=np.zeros((3, 3)), loss=0.05 * np.asarray(system.structure.stiffness))  # fmt: skip
+    structure = replace(system.structure, damping=np.zeros((3, 3)), loss=0.05 * np.asarray(system.structure.stiffness))
     stiff = replace(system.interface, laws=(Jenkins(k_t=1e-9, limit=1.0),) * 2)
     lossy = System(structure, stiff, np.array([0]))
     gaps = np.zeros((2, 6), dtype=complex)
@@ -243,9 +237,7 @@ def test_a_stopped_examination_goes_on_where_it_was(monkeypatch):
         except KeyboardInterrupt:
             assert len(pieces) == most
     assert len(made) == all_nodes
-    np.testing.assert_array_equal(
-        found.stability.floquet.multipliers, whole.stability.floquet.multipliers
-    )
+    np.testing.assert_array_equal(found.stability.floquet.multipliers, whole.stability.floquet.multipliers)
     np.testing.assert_array_equal(found.stability.errors, whole.stability.errors)
     made.clear()
     other = replace(point, coefficients=point.coefficients * (1.0 + 1e-12))

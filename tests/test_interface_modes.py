@@ -101,9 +101,7 @@ def test_the_chain_of_a_wave_expands_to_the_wheel(sector, k):
     """Wave, Craig-Bampton, interface reduction: the mode that comes back solves the sector's equations."""
     cyclic = cyclic_sector(sector, 8)
     wave = travelling_wave(cyclic, k)
-    first = craig_bampton(
-        wave, np.concatenate([wave.dof_set("tip"), wave.dof_set("cyclic_low")]), 40
-    )
+    first = craig_bampton(wave, np.concatenate([wave.dof_set("tip"), wave.dof_set("cyclic_low")]), 40)
     second = reduce_interface(first, first.dof_set("cyclic_low"), 36)
     values, vectors = scipy.linalg.eigh(second.stiffness, second.mass)
     shape = wheel_shape(cyclic, k, vectors[:, 0], structure=second)
@@ -125,9 +123,7 @@ def test_free_interface_keeps_its_rigid_motions():
     squares = scipy.linalg.eigvalsh(small.stiffness, small.mass)
     assert np.all(np.abs(squares[:6]) < 1e-7 * squares[6])
     line = np.arange(nodes.size - 9, nodes.size)  # the rim holds all but the turn about itself
-    with pytest.raises(
-        SingularError, match="reduce_interface: with the other dofs fixed: one body"
-    ):
+    with pytest.raises(SingularError, match="reduce_interface: with the other dofs fixed: one body"):
         reduce_interface(once, np.setdiff1d(np.arange(nodes.size), line), 12)
 
 

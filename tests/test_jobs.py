@@ -126,7 +126,7 @@ def test_deaths_are_counted_over_workers_that_are_lost(tmp_path: Path) -> None:
 def test_job_that_takes_too_long_is_set_aside_at_once(tmp_path: Path) -> None:
     made = order(tmp_path)
     watched(made.packed(), Dying(OutOfTime("it took more than 5 s")), never, print)
-    assert "took more than 5 s" in read_sealed(made.sealed, made.analysis.record)[1]["set aside"]["text"]  # fmt: skip
+    assert "took more than 5 s" in read_sealed(made.sealed, made.analysis.record)[1]["set aside"]["text"]
 
 
 # ---- files of several processes
@@ -146,7 +146,7 @@ def test_every_attempt_goes_on_from_the_furthest_and_damages_no_other(tmp_path: 
     with JobJournal(own, Point) as journal:
         assert [p.index for p in journal.records()] == [0, 1, 2]
         journal.seal()
-    assert {p.name for p in left_behind(sealed)} == {f"a.{o}.part" for o in ("one", "two", "three")}  # fmt: skip
+    assert {p.name for p in left_behind(sealed)} == {f"a.{o}.part" for o in ("one", "two", "three")}
     sealed.with_name("a.four.part-journal").touch()  # whose file another process has removed
     clear(sealed)
     assert [p.name for p in tmp_path.iterdir()] == ["a.job"]
@@ -181,9 +181,7 @@ def bits(study: ToyStudy) -> np.ndarray:
     return np.asarray(tree["toy"].value.values)
 
 
-def test_last_shard_puts_the_result_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_last_shard_puts_the_result_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "executor", lambda kind, workers, apart=False: executor(kind, workers))
     factors = (1.5, 2.5, 3.5, 4.5, 5.5)
     whole = ToyStudy(tmp_path / "whole.toml", factors)
@@ -251,7 +249,7 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match="does not say where the scheduler is"):
         check_kind("dask")
     monkeypatch.setattr("stickslip.study.keep.workers.find_spec", lambda _name: None)
-    with pytest.raises(StickslipError, match=r"distributed: not installed\. Use: pip install 'stickslip\[cluster\]'"):  # fmt: skip
+    with pytest.raises(StickslipError, match=r"distributed: not installed\. Use: pip install 'stickslip\[cluster\]'"):
         run_study(study, kind="dask=tcp://127.0.0.1:1")
     with pytest.raises(StickslipError, match="executorlib: not installed"):
         run_study(study, kind="slurm")
@@ -263,10 +261,10 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
 def test_machine_that_would_give_other_numbers_is_refused(tmp_path: Path) -> None:
     made, token = order(tmp_path), tmp_path / "run.on"
     answer = solve_far(made.packed(), token, {}, {})
-    assert f"does not see {tmp_path}. Put the study into a folder that all machines share" in str(answer.error)  # fmt: skip
+    assert f"does not see {tmp_path}. Put the study into a folder that all machines share" in str(answer.error)
     token.touch()
     answer = solve_far(made.packed(), token, {"numpy": "0.9"}, {})
-    assert f"has other versions, whose numbers may differ: numpy {np.__version__} for 0.9" in str(answer.error)  # fmt: skip
+    assert f"has other versions, whose numbers may differ: numpy {np.__version__} for 0.9" in str(answer.error)
 
 
 class Losing:
@@ -286,7 +284,7 @@ class Losing:
 
 
 @pytest.mark.parametrize(("begun", "given"), [(True, 3), (False, 30)])
-def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, *, begun: bool, given: int) -> None:  # fmt: skip
+def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, *, begun: bool, given: int) -> None:
     made = order(tmp_path), order(tmp_path, 1)
     losing = Losing(begun=begun)
     with executor(losing, 1) as hands:  # type: ignore[arg-type]
@@ -307,9 +305,7 @@ def test_one_process_and_none_of_its_own_by_default() -> None:
         assert hands.cell is not None
 
 
-def test_what_is_not_complete_is_written_in_a_tenth_of_the_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_not_complete_is_written_in_a_tenth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     clock, written = [0.0], []
 
     def write() -> None:

@@ -42,10 +42,7 @@ def point(index: int) -> Point:
 
 def same(a: Point, b: Point) -> bool:
     pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(Point)]
-    return all(
-        type(x) is type(y) and np.array_equal(x, y, equal_nan=not isinstance(x, str | None))
-        for x, y in pairs
-    )
+    return all(type(x) is type(y) and np.array_equal(x, y, equal_nan=not isinstance(x, str | None)) for x, y in pairs)
 
 
 def test_records_come_back_bit_for_bit_in_their_order(tmp_path: Path) -> None:
@@ -129,9 +126,7 @@ def test_file_of_another_job_is_refused(tmp_path: Path) -> None:
 
 def test_job_that_is_at_work_is_not_opened_again(tmp_path: Path) -> None:
     with JobJournal(tmp_path / "a.part", Point) as first:
-        with pytest.raises(
-            InputError, match=r"another run is at work in it\. Wait for it, or stop"
-        ):
+        with pytest.raises(InputError, match=r"another run is at work in it\. Wait for it, or stop"):
             JobJournal(tmp_path / "a.part", Point)
         first.add(point(0))
 
@@ -140,9 +135,7 @@ def test_job_that_is_at_work_is_not_opened_again(tmp_path: Path) -> None:
 def test_damaged_file_is_told(tmp_path: Path, end: str) -> None:
     path = tmp_path / f"a{end}"
     path.write_bytes(b"no database at all" * 100)
-    with pytest.raises(
-        InputError, match=r"the file of a job cannot be used .*start over with --fr"
-    ):
+    with pytest.raises(InputError, match=r"the file of a job cannot be used .*start over with --fr"):
         JobJournal(path, Point) if end == ".part" else read_sealed(path, Point)
 
 
@@ -175,9 +168,7 @@ with JobJournal(Path(sys.argv[1]), Point) as journal:
 
 def test_kill_in_the_middle_of_an_insert_leaves_whole_records(tmp_path: Path) -> None:
     path = tmp_path / "a.part"
-    ended = subprocess.run(
-        [sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent)], check=False
-    )
+    ended = subprocess.run([sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent)], check=False)
     assert ended.returncode == -9
     with JobJournal(path, Point) as journal:
         assert [p.index for p in journal.records()] == [0, 1]
@@ -216,9 +207,7 @@ FLIPS = pytest.mark.parametrize("count", [300, pytest.param(5000, marks=pytest.m
 
 @FLIPS
 @pytest.mark.parametrize("end", [".part", ".job"])
-def test_a_flipped_bit_of_a_job_is_refused_or_changes_nothing(
-    tmp_path: Path, end: str, count: int
-) -> None:
+def test_a_flipped_bit_of_a_job_is_refused_or_changes_nothing(tmp_path: Path, end: str, count: int) -> None:
     """Anywhere in the file: names of notes, numbers of records, SQLite's own pages."""
     path = tmp_path / "a.part"
     with JobJournal(path, Point) as journal:
@@ -249,9 +238,7 @@ def test_a_flipped_bit_of_a_job_is_refused_or_changes_nothing(
     assert set(told) == {(str(path), True)}
 
 
-def test_pieces_of_a_stopped_computation_are_found_again_and_given_up_at_its_end(
-    tmp_path: Path,
-) -> None:
+def test_pieces_of_a_stopped_computation_are_found_again_and_given_up_at_its_end(tmp_path: Path) -> None:
     path, made = tmp_path / "a.part", []
 
     def make(value: int) -> dict[str, np.ndarray]:

@@ -33,9 +33,7 @@ def griffin(omega: float, stepping: TimeStepping) -> TransientResult:
     law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
     structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
     gap = np.array([[1.0], [0.0], [0.0]])
-    return integrate(
-        structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping
-    )
+    return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
 
 
 @pytest.mark.parametrize("omega", GRIFFIN_EXACT)
@@ -71,9 +69,7 @@ def bounce(steps: int) -> float:
     t = period * np.arange(1, steps + 1) / steps
     since = t - flight
     exact = np.where(
-        t < flight,
-        speed * t - gravity * t**2 / 2,
-        -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi),
+        t < flight, speed * t - gravity * t**2 / 2, -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi)
     )
     return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
 
@@ -91,9 +87,7 @@ def test_refinement_reports_an_error_that_covers_the_true_one() -> None:
     gap, load = np.array([[1.0], [0.0], [0.0]]), load_of(1, {1: [0.1]})
     stepping = TimeStepping(steps_per_period=128, tolerance=1e-7)
     for omega, exact in GRIFFIN_EXACT.items():
-        refined = integrate_refined(
-            structure, gap, [law], load, omega, np.array([0]), stepping=stepping
-        )
+        refined = integrate_refined(structure, gap, [law], load, omega, np.array([0]), stepping=stepping)
         true = abs(abs(refined.first_harmonic[0]) / exact - 1)
         assert refined.fine.settled
         assert true <= refined.error < 1e-3
@@ -102,9 +96,7 @@ def test_refinement_reports_an_error_that_covers_the_true_one() -> None:
 def test_refinement_of_an_unsettled_motion_does_not_extrapolate_and_widens_its_error() -> None:
     structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
     load, stepping = load_of(1, {1: [0.1]}), TimeStepping(steps_per_period=32, max_periods=12)
-    refined = integrate_refined(
-        structure, np.zeros((0, 1)), [], load, 1.1, np.array([0]), stepping=stepping
-    )
+    refined = integrate_refined(structure, np.zeros((0, 1)), [], load, 1.1, np.array([0]), stepping=stepping)
     assert not refined.fine.settled
     np.testing.assert_array_equal(refined.first_harmonic, refined.fine.average)
     assert refined.error >= refined.coarse.scatter + refined.fine.scatter > 0.0

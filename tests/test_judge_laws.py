@@ -16,9 +16,15 @@ from stickslip.response.time import transient
 def judged(law, steps, tolerance=1e-9, start=None):
     system, load = on_one_contact(law)
     return verlet.integrate(
-        system.structure, system.interface.gap_operator, system.interface.laws, load, OMEGA, np.arange(3),
-        start, TimeStepping(steps_per_period=steps, tolerance=tolerance),
-    )  # fmt: skip
+        system.structure,
+        system.interface.gap_operator,
+        system.interface.laws,
+        load,
+        OMEGA,
+        np.arange(3),
+        start,
+        TimeStepping(steps_per_period=steps, tolerance=tolerance),
+    )
 
 
 def marched(law, gaps):
@@ -47,16 +53,20 @@ def test_integration_over_compiled_laws_agrees(name):
     coarse, fine = (judged(law, n, 1e-7).harmonics for n in (512, 1024))
     limit = fine + (fine - coarse) / 3.0
     found = transient.integrate(
-        system.structure, system.interface.gap_operator, system.interface.laws, load, OMEGA, np.arange(3),
+        system.structure,
+        system.interface.gap_operator,
+        system.interface.laws,
+        load,
+        OMEGA,
+        np.arange(3),
         stepping=transient.TimeStepping(steps_per_period=512, tolerance=1e-7),
-    )  # fmt: skip
+    )
     assert found.settled
     assert np.max(np.abs(found.harmonics - limit)) < 2e-4 * np.max(np.abs(limit[1]))
 
 
 @pytest.mark.parametrize(
-    ("ratio", "exact"),
-    [(r, complex(1.0 / r**2, np.sqrt(1.0 - 1.0 / r**2) / r)) for r in (1.5, 2.0, 5.0)],
+    ("ratio", "exact"), [(r, complex(1.0 / r**2, np.sqrt(1.0 - 1.0 / r**2) / r)) for r in (1.5, 2.0, 5.0)]
 )
 def test_planar_slider_on_a_circle_is_the_closed_form(ratio, exact):
     errors = []

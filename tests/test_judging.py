@@ -37,9 +37,7 @@ def chain(harmonic: int) -> tuple[ss.System, ss.HarmonicLoad]:
 def response(harmonic: int = 1, **how: object) -> tuple[object, list[object]]:
     """Return problem and accepted points around the first resonance."""
     span = tuple(2 * np.pi * f / harmonic for f in HERTZ)
-    sweep = ss.Sweep(
-        omega_range=span, frequencies=STEPS, peak_points=0, **{"low": (0, harmonic), **how}
-    )  # type: ignore[arg-type]
+    sweep = ss.Sweep(omega_range=span, frequencies=STEPS, peak_points=0, **{"low": (0, harmonic), **how})  # type: ignore[arg-type]
     made, load = chain(harmonic)
     points = ss.response.accepted_points(list(ss.forced_response(made, load, sweep)))
     return ss.response.forced_problem(made, load, sweep), points
@@ -55,10 +53,7 @@ def test_set_holds_what_quadratic_and_cubic_forces_feed(kept, driven):
     own = sorted({*kept, *driven} - {0})
     assert found[-1] == 3 * own[-1]
     for a in own:
-        for signal in (
-            np.cos(a * time) ** 3,
-            *(np.cos(a * time) * np.sin(b * time + 0.3) for b in own),
-        ):
+        for signal in (np.cos(a * time) ** 3, *(np.cos(a * time) * np.sin(b * time + 0.3) for b in own)):
             fed = np.flatnonzero(np.abs(np.fft.rfft(signal)) > 1e-9 * time.size)
             assert set(fed.tolist()) <= set(found)
 
@@ -104,9 +99,7 @@ def test_even_silence_is_not_exact():
 def test_exact_is_what_nothing_acts_on():
     """Below the onset of slip a solution is exact with one harmonic; a mean that never slips changes nothing of it."""
     problem, points = response(1, high=1)
-    soft = replace(
-        problem.low.linear.load, harmonics={1: 1e-3 * problem.low.linear.load.harmonics[1]}
-    )
+    soft = replace(problem.low.linear.load, harmonics={1: 1e-3 * problem.low.linear.load.harmonics[1]})
     sweep = problem.sweep
     quiet = ss.response.forced_problem(problem.system, soft, sweep)
     for p in ss.response.accepted_points(list(ss.forced_response(problem.system, soft, sweep))):
@@ -117,9 +110,7 @@ def test_exact_is_what_nothing_acts_on():
 def test_reference_without_the_odd_harmonics_is_not_enough():
     """A strategy that is asked for a reference of 0, 1, 2 looks at 3 by itself."""
     made, load = chain(1)
-    sweep = ss.Sweep(
-        omega_range=(60.0, 80.0), low=1, high=2, at=(2 * math.pi * 11.3,), peak_points=0
-    )
+    sweep = ss.Sweep(omega_range=(60.0, 80.0), low=1, high=2, at=(2 * math.pi * 11.3,), peak_points=0)
     for name in ("guarded_alert", "goal_oriented"):
         named = replace(sweep, selection=name)
         first = next(p for p in ss.forced_response(made, load, named) if p.stage == "low")
@@ -168,12 +159,8 @@ def test_largest_change_of_an_output_decides():
     # 0.01 / 1, 0.02 / 0.5, 1e-4 / 0.01, and of the rotations 1e-6 / 1e-5
     error, place, harmonic = measure.change(before, moved)
     assert (error, place, harmonic) == (pytest.approx(0.1), 3, 1)
-    assert ErrorMeasure(np.arange(3), (1,), units[:3]).change(before, moved)[0] == pytest.approx(
-        0.04
-    )
-    assert ErrorMeasure(np.array([2, 0]), (1,), units[:2]).change(before, moved)[
-        0
-    ] == pytest.approx(0.01)
+    assert ErrorMeasure(np.arange(3), (1,), units[:3]).change(before, moved)[0] == pytest.approx(0.04)
+    assert ErrorMeasure(np.array([2, 0]), (1,), units[:2]).change(before, moved)[0] == pytest.approx(0.01)
     # a unit in which nothing moves at all
     before[1, 3:] = moved[1, 3:] = 0.0
     assert measure.change(before, moved)[0] == pytest.approx(0.04)
@@ -182,9 +169,7 @@ def test_largest_change_of_an_output_decides():
 def test_several_driven_harmonics_are_one_vector():
     before, moved = np.zeros((3, 1), dtype=complex), np.zeros((3, 1), dtype=complex)
     before[1:, 0], moved[1:, 0] = [3.0, 4.0], [0.0, 1.0]
-    assert ErrorMeasure(np.array([0]), (1, 2), np.array([0])).change(before, moved)[
-        0
-    ] == pytest.approx(0.2)
+    assert ErrorMeasure(np.array([0]), (1, 2), np.array([0])).change(before, moved)[0] == pytest.approx(0.2)
     assert ErrorMeasure(np.array([0]), (1, 2)).change(before, moved)[0] == pytest.approx(0.25)
 
 
@@ -193,9 +178,7 @@ def test_units_do_not_change_an_error():
     before, moved = (rng.normal(size=(4, 6)) + 1j * rng.normal(size=(4, 6)) for _ in range(2))
     measure = ErrorMeasure(np.arange(6), (1, 3), np.array([0, 1, 0, 1, 1, 0]))
     scale = np.where(measure.units == 0, 1e3, 2.0)
-    assert measure.change(before * scale, moved * scale) == pytest.approx(
-        measure.change(before, moved)
-    )
+    assert measure.change(before * scale, moved * scale) == pytest.approx(measure.change(before, moved))
 
 
 def test_change_of_the_whole_motion_counts_harmonics_that_were_missing():
@@ -251,10 +234,7 @@ def test_study_tells_the_amplitude_that_it_measures(tmp_path, measure):
     """Dataset, axis and peak of each measure agree with the motion; the third harmonic near resonance is told where it is left out."""
     (tmp_path / "study.toml").write_text(f'{PLANE}measure = "{measure}"\n')
     data = ss.Study.from_file(tmp_path / "study.toml").run().data["forced_response"]
-    motion = (
-        data.output_displacement.values[0, :, :, 0]
-        + 1j * data.output_displacement.values[0, :, :, 1]
-    )
+    motion = data.output_displacement.values[0, :, :, 0] + 1j * data.output_displacement.values[0, :, :, 1]
     own = amplitudes(motion, (1,), measure)
     assert data.attrs["amplitude_of"] == measure
     np.testing.assert_allclose(data.amplitude.values[0], own, rtol=1e-12)

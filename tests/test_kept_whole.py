@@ -110,7 +110,13 @@ def test_run_refuses_what_check_refuses(tmp_path):
     assert "contact.joint.law: is rigid_coulomb, which needs a reduced model" in told
 
 
-@pytest.mark.parametrize("more", ["[modes]\nshapes = false\n", "[campbell]\nspeeds_rpm = [1000.0, 10000.0]\npoints = 2\nengine_orders = [1]\n[rotation]\nspeed_rpm = 5000\ncentrifugal = false\n"])  # fmt: skip
+@pytest.mark.parametrize(
+    "more",
+    [
+        "[modes]\nshapes = false\n",
+        "[campbell]\nspeeds_rpm = [1000.0, 10000.0]\npoints = 2\nengine_orders = [1]\n[rotation]\nspeed_rpm = 5000\ncentrifugal = false\n",
+    ],
+)
 def test_natural_frequencies_need_no_reduction(tmp_path, more):
     code, told = said("run", study(tmp_path, more), "--no-report")
     assert code == 0, told

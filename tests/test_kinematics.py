@@ -13,14 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from stickslip.contact.facets import (
-    DEGREE,
-    KINDS,
-    REFERENCE_NODES,
-    positions,
-    shape_functions,
-    shape_gradients,
-)
+from stickslip.contact.facets import DEGREE, KINDS, REFERENCE_NODES, positions, shape_functions, shape_gradients
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.pairing import (
     contact_frames,
@@ -76,11 +69,7 @@ def test_shape_functions(kind):
 def test_degree_of_shape_functions(kind):
     """All polynomials of the quadrature's degree, fitted to a shape function on random points, leave nothing."""
     at = np.random.default_rng(0).random((60, 2))
-    powers = [
-        at[:, 0] ** i * at[:, 1] ** j
-        for i in range(DEGREE[kind] + 1)
-        for j in range(DEGREE[kind] + 1 - i)
-    ]
+    powers = [at[:, 0] ** i * at[:, 1] ** j for i in range(DEGREE[kind] + 1) for j in range(DEGREE[kind] + 1 - i)]
     basis = np.column_stack(powers)
     left = basis @ np.linalg.lstsq(basis, shape_functions(kind, at))[0] - shape_functions(kind, at)
     assert np.abs(left).max() < 1e-12
@@ -121,9 +110,11 @@ def common_area(first, second):
     from scipy.optimize import linprog
 
     inner = linprog(
-        [0, 0, -1], A_ub=np.column_stack([planes[:, :2], np.ones(len(planes))]), b_ub=-planes[:, 2],
+        [0, 0, -1],
+        A_ub=np.column_stack([planes[:, :2], np.ones(len(planes))]),
+        b_ub=-planes[:, 2],
         bounds=[(None, None)] * 2 + [(0, None)],
-    )  # fmt: skip
+    )
     if not inner.success or inner.x[2] < 1e-9:
         return 0.0
     return ConvexHull(HalfspaceIntersection(planes, inner.x[:2]).intersections).volume
@@ -165,8 +156,10 @@ def test_closest_point_against_minimisation(kind):
         starts = np.linspace(low, 1.0, 4)
         best = min(
             minimize(distance, (a, b), bounds=bounds, constraints=inside, method="SLSQP", tol=1e-14).fun
-            for a in starts for b in starts if not triangle or a + b <= 1
-        )  # fmt: skip
+            for a in starts
+            for b in starts
+            if not triangle or a + b <= 1
+        )
         assert math.sqrt(distance(reference[0])) <= math.sqrt(best) + 1e-7
         corners = REFERENCE_NODES[3 if triangle else 4]
         start, end = corners, np.roll(corners, -1, axis=0)
@@ -206,10 +199,9 @@ def test_frames_are_right_handed_and_t_follows_the_direction():
 def test_direction_parallel_to_the_normal():
     a, b = two_planes((EVEN, EVEN), (EVEN, EVEN))
     with pytest.raises(
-        InputError,
-        match=r"direction of t: \(0.0, 0.0, 2.0\) is parallel to the normal \[0.0, 0.0, 1.0\] of",
+        InputError, match=r"direction of t: \(0.0, 0.0, 2.0\) is parallel to the normal \[0.0, 0.0, 1.0\] of"
     ):
-        node_to_node(a, b, tolerance=1e-6, direction=(0.0, 0.0, 2.0))  # fmt: skip
+        node_to_node(a, b, tolerance=1e-6, direction=(0.0, 0.0, 2.0))
 
 
 def all_ways(a, b):
@@ -232,9 +224,7 @@ def test_rigid_motions(kinds, gap):
         assert np.allclose(gaps, np.cross(turn, [0, 0, gap]), rtol=0, atol=1e-14)
         only = np.concatenate([np.zeros(a.points.size), motion(b.points, shift, turn)])
         gaps = (pairing.gap_operator @ only).reshape(-1, 3)
-        assert np.allclose(
-            gaps, shift + np.cross(turn, pairing.positions + np.array([0, 0, gap])), atol=1e-13
-        )
+        assert np.allclose(gaps, shift + np.cross(turn, pairing.positions + np.array([0, 0, gap])), atol=1e-13)
 
 
 def cylinders(kind, fine, gap=0.0, n_a=(6, 3), n_b=(5, 4), swap=False):
@@ -253,8 +243,13 @@ def cylinders(kind, fine, gap=0.0, n_a=(6, 3), n_b=(5, 4), swap=False):
     return (b, a) if swap else (a, b)
 
 
-@given(st.tuples(grids, grids), st.tuples(grids, grids), st.sampled_from(["tri", "quad", "tri6", "quad8"]),
-       st.sampled_from(["tri", "quad", "tri6", "quad8"]), st.integers(0, 10_000))  # fmt: skip
+@given(
+    st.tuples(grids, grids),
+    st.tuples(grids, grids),
+    st.sampled_from(["tri", "quad", "tri6", "quad8"]),
+    st.sampled_from(["tri", "quad", "tri6", "quad8"]),
+    st.integers(0, 10_000),
+)
 @settings(max_examples=25)
 def test_action_is_reaction(grid_a, grid_b, kind_a, kind_b, seed):
     a, b = two_planes(grid_a, grid_b, (kind_a, kind_b))
@@ -272,7 +267,11 @@ def test_action_is_reaction(grid_a, grid_b, kind_a, kind_b, seed):
 @pytest.mark.parametrize("gap", [0.0, 0.05])
 def test_action_is_reaction_on_curved_surfaces(way, kind, gap):
     a, b = cylinders(kind, 1, gap)
-    pairing = WAYS[way](a, b, direction=(0.0, 1.0, 0.0), tolerance=0.1) if way == "node" else WAYS[way](a, b, direction=(0.0, 1.0, 0.0))  # fmt: skip
+    pairing = (
+        WAYS[way](a, b, direction=(0.0, 1.0, 0.0), tolerance=0.1)
+        if way == "node"
+        else WAYS[way](a, b, direction=(0.0, 1.0, 0.0))
+    )
     normal = np.kron(np.random.default_rng(0).random(pairing.n_points), [0.0, 0.0, 1.0])
     points = np.vstack([a.points, b.points])
     force = (pairing.gap_operator.T @ normal).reshape(-1, 3)
@@ -286,8 +285,12 @@ def test_action_is_reaction_on_curved_surfaces(way, kind, gap):
 # ---- the patch test --------------------------------------------------------------------------------------------------
 
 
-@given(st.tuples(grids, grids), st.tuples(grids, grids), st.sampled_from(["tri", "quad", "tri6", "quad8"]),
-       st.sampled_from(["tri", "quad", "tri6", "quad8"]))  # fmt: skip
+@given(
+    st.tuples(grids, grids),
+    st.tuples(grids, grids),
+    st.sampled_from(["tri", "quad", "tri6", "quad8"]),
+    st.sampled_from(["tri", "quad", "tri6", "quad8"]),
+)
 @settings(max_examples=40)
 def test_segments_pass_a_uniform_pressure_to_both_sides(grid_a, grid_b, kind_a, kind_b):
     a, b = two_planes(grid_a, grid_b, (kind_a, kind_b))
@@ -295,10 +298,7 @@ def test_segments_pass_a_uniform_pressure_to_both_sides(grid_a, grid_b, kind_a, 
     force = pressure_loads(pairing).reshape(-1, 3)
     assert pairing.weights.sum() == pytest.approx(1.0, rel=1e-9)  # slivers of 1e-10 are dropped
     assert pairing.weights.min() > 0
-    for surface, rows, sign in (
-        (a, slice(0, len(a.points)), 1),
-        (b, slice(len(a.points), None), -1),
-    ):
+    for surface, rows, sign in ((a, slice(0, len(a.points)), 1), (b, slice(len(a.points), None), -1)):
         assert np.abs(force[rows, 2] * -sign - consistent_loads(surface)).max() < 1e-9
 
 
@@ -314,9 +314,7 @@ def consistent_loads(surface):
             here, share = np.column_stack([u, v * (1 - u)]), weight * (1 - u) / 4
         else:
             here, share = at, weight
-        first, second = np.einsum(
-            "gak,kc->agc", shape_gradients(len(row), here), surface.points[row]
-        )
+        first, second = np.einsum("gak,kc->agc", shape_gradients(len(row), here), surface.points[row])
         area = np.linalg.norm(np.cross(first, second), axis=1) * share
         loads[row] += area @ shape_functions(len(row), here)
     return loads
@@ -390,9 +388,13 @@ def test_kinds_can_be_mixed():
     filled = np.column_stack([triangles.facets[right], np.full(right.sum(), -1)])
     mixed = Surface(quads.points, quads.displacement, np.vstack([quads.facets[left], filled]))
     b = plane(even(5), even(5), up=False, offset=0, n=mixed.displacement.shape[1] * 4)
-    mixed = replace(mixed, displacement=scipy.sparse.csr_array(
-        (mixed.displacement.data, mixed.displacement.indices, mixed.displacement.indptr),
-        shape=(len(mixed.points) * 3, b.displacement.shape[1])))  # fmt: skip
+    mixed = replace(
+        mixed,
+        displacement=scipy.sparse.csr_array(
+            (mixed.displacement.data, mixed.displacement.indices, mixed.displacement.indptr),
+            shape=(len(mixed.points) * 3, b.displacement.shape[1]),
+        ),
+    )
     for pairing in (segment_to_segment(mixed, b), segment_to_segment(b, mixed)):
         assert pairing.weights.sum() == pytest.approx(1.0, rel=1e-12)
         assert np.abs(pairing.initial_gap).max() < 1e-15
@@ -417,10 +419,7 @@ def test_cylinder_in_cylinder(kind, order, swap, way):
         errors.append(np.abs(pairing.initial_gap - gap).max())
         radial = pairing.positions * [1, 0, 1]
         radial /= np.linalg.norm(radial, axis=1, keepdims=True) * (-1 if swap else 1)
-        inner = (
-            np.abs(np.arctan2(pairing.positions[:, 0], pairing.positions[:, 2]))
-            < 0.6 - 1.2 / 5 / fine
-        )
+        inner = np.abs(np.arctan2(pairing.positions[:, 0], pairing.positions[:, 2])) < 0.6 - 1.2 / 5 / fine
         tilts.append(np.abs(pairing.frames[inner, :, 2] - radial[inner]).max())
         areas.append(pairing.weights.sum() / (1.2 * (1 + gap * swap)) - 1)
         assert np.abs(pairing.frames[:, :, 0] - [0, 1, 0]).max() < 1e-12
@@ -428,9 +427,7 @@ def test_cylinder_in_cylinder(kind, order, swap, way):
     assert errors[1] < {2: 2e-3, 4: 5e-7}[order]  # the sagitta of a facet of 5.7 degrees is 1.2e-3
     # away from the rim, where a node has facets on one side only
     assert tilts[1] < {2: 1e-3, 4: 2e-5}[order]
-    if not (
-        way == "segment" and swap
-    ):  # planes of a concave side lean inward: at the rim they miss gap times slope
+    if not (way == "segment" and swap):  # planes of a concave side lean inward: at the rim they miss gap times slope
         assert abs(areas[1]) < abs(areas[0]) / 2 ** (order - 0.2)
         assert abs(areas[1]) < {2: 1e-3, 4: 5e-7}[order]
 
@@ -441,20 +438,10 @@ def test_interpolated_normals_are_continuous_but_keep_edges():
     spread = [np.ptp(normals[a.facets == node], axis=0).max() for node in range(len(a.points))]
     assert max(spread) < 1e-15
     # a box: three faces around a corner keep their own normals
-    corner = np.array(
-        [
-            [0, 0, 0],
-            [1, 0, 0],
-            [1, 1, 0],
-            [0, 1, 0],
-            [0, 0, -1],
-            [1, 0, -1],
-            [0, 1, -1],
-            [1, 1, -1.0],
-        ]
+    corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, -1], [1, 0, -1], [0, 1, -1], [1, 1, -1.0]])
+    box = Surface(
+        corner, scipy.sparse.eye_array(24, format="csr"), np.array([[0, 1, 2, 3], [0, 4, 5, 1], [1, 5, 7, 2]])
     )
-    box = Surface(corner, scipy.sparse.eye_array(24, format="csr"),
-                  np.array([[0, 1, 2, 3], [0, 4, 5, 1], [1, 5, 7, 2]]))  # fmt: skip
     own = box.corner_normals()
     assert np.allclose(own[0], [0, 0, 1])
     assert np.allclose(own[1], [0, -1, 0])
@@ -468,9 +455,7 @@ def test_given_normals_are_used():
     radial = pairing.positions * [1, 0, 1]
     radial /= np.linalg.norm(radial, axis=1, keepdims=True)
     assert np.abs(pairing.frames[:, :, 2] - radial).max() < 1e-3  # linear between exact normals
-    with pytest.raises(
-        InputError, match=r"Surface.normals: need one unit vector for each of 28 nodes"
-    ):
+    with pytest.raises(InputError, match=r"Surface.normals: need one unit vector for each of 28 nodes"):
         replace(a, normals=2 * exact.normals)
 
 
@@ -489,8 +474,12 @@ def test_node_to_node_with_a_rigid_damper_is_the_damper_gap_operator():
     b = nodal_surface(points.position[flat], blade_dofs, n, none)
     t = tuple(points.frame[flat[0], :, 0])
     pairing = node_to_node(a, b, tolerance=1e-9, direction=t)
-    small = type(points)(*(tuple(x[i] for i in flat) for x in (points.names, points.side)),
-                         points.position[flat], points.frame[flat], points.area[flat])  # fmt: skip
+    small = type(points)(
+        *(tuple(x[i] for i in flat) for x in (points.names, points.side)),
+        points.position[flat],
+        points.frame[flat],
+        points.area[flat],
+    )
     want = gap_operator(small, blade_dofs, np.arange(6), n, damper.body())
     assert np.abs(pairing.gap_operator.toarray() - want).max() < 1e-15
     assert np.allclose(pairing.frames, points.frame[flat], rtol=0, atol=1e-15)
@@ -507,10 +496,9 @@ def test_surface_of_a_structure_finds_its_dofs():
     one, two = segment_to_segment(found, other), segment_to_segment(a, b)
     assert abs(one.gap_operator - two.gap_operator).max() == 0
     with pytest.raises(
-        InputError,
-        match=r"structure_surface: 1 nodes have no dofs x, y, z in the structure, e.g. \[999\]",
+        InputError, match=r"structure_surface: 1 nodes have no dofs x, y, z in the structure, e.g. \[999\]"
     ):
-        structure_surface(structure, np.array([[0, 1, 999]]))  # fmt: skip
+        structure_surface(structure, np.array([[0, 1, 999]]))
 
 
 def test_held_nodes_have_no_columns():
@@ -545,10 +533,9 @@ def test_nodes_without_a_partner_are_named():
 def test_nodes_beyond_the_rim_are_named():
     a, b = two_planes((even(4) * 1.2, even(2)), (even(3), even(2)))
     with pytest.raises(
-        InputError,
-        match=r"node_to_segment: 3 nodes of side A .*node 1[234] at \(1.2, 0(\.5)?, 0\) m, 0.2 m off",
+        InputError, match=r"node_to_segment: 3 nodes of side A .*node 1[234] at \(1.2, 0(\.5)?, 0\) m, 0.2 m off"
     ):
-        node_to_segment(a, b)  # fmt: skip
+        node_to_segment(a, b)
     assert node_to_segment(a, b, tolerance=0.21).n_points == 15
     some = node_to_segment(a, b, outside="skip")
     assert some.n_points == 12
@@ -568,9 +555,7 @@ def test_surfaces_out_of_reach_or_turned_round():
         with pytest.raises(InputError, match="normals point outward"):
             way(a, inward)
     far = plane(EVEN + 0.5, EVEN, up=False, n=a.displacement.shape[1])
-    with pytest.raises(
-        InputError, match=r"8 of 16 facets of side A have no facet of side B opposite"
-    ):
+    with pytest.raises(InputError, match=r"8 of 16 facets of side A have no facet of side B opposite"):
         segment_to_segment(a, far)
     some = segment_to_segment(a, far, outside="skip")
     assert some.weights.sum() == pytest.approx(0.5, rel=1e-12)
@@ -587,7 +572,7 @@ def test_surfaces_are_checked():
         ({"facets": np.array([[0, 1, 99]])}, "names node 99, but there are 25 points"),
         ({"facets": np.array([[0, 1, 2]])}, "1 facets have no area or are not convex, e.g. facet 0"),
         ({"facets": np.array([[0, 1, 6, 6]])}, "no area or are not convex"),
-    ]  # fmt: skip
+    ]
     for change, message in cases:
         with pytest.raises(InputError, match=message):
             replace(a, **change)
@@ -621,9 +606,11 @@ def friction_joint(pairing, structure, held):
     free = np.setdiff1d(np.arange(structure.n), held)
     structure = replace(
         structure,
-        mass=structure.mass[free][:, free], stiffness=structure.stiffness[free][:, free],
-        damping=structure.damping[free][:, free], dofs=structure.dofs.take(free),
-    )  # fmt: skip
+        mass=structure.mass[free][:, free],
+        stiffness=structure.stiffness[free][:, free],
+        damping=structure.damping[free][:, free],
+        dofs=structure.dofs.take(free),
+    )
     pairing = replace(pairing, gap_operator=pairing.gap_operator[:, free])
     law = ElasticCoulomb(k_t=5e11, k_w=5e11, k_n=1e12, mu=0.3, preload=1e7)
     interface = paired_interface(pairing, law)
@@ -660,7 +647,7 @@ def test_friction_joint_of_two_flexible_blocks():
     held = np.flatnonzero((z < z.min() + 1e-9) | (z > z.max() - 1e-9))
     sweep = Sweep(
         omega_range=(2 * np.pi * 2780, 2 * np.pi * 3100), selection="always_low", samples=64, points=4, peak_points=4
-    )  # fmt: skip
+    )
     ways = (node_to_segment(b, a), segment_to_segment(a, b, degree=2))
     systems = [friction_joint(way, structure, held) for way in ways]
     by_nodes, by_segments = (peak_of(system, 400.0, sweep) for system in systems)

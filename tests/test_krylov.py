@@ -69,8 +69,7 @@ def system(seed: int = 0, relative: bool = True) -> System:
     structure = body(seed=seed)
     rng = np.random.default_rng(seed + 1)
     laws = tuple(
-        ElasticCoulomb(k_t=1.0, k_w=0.8, k_n=1.5, mu=0.4, preload=float(p))
-        for p in rng.uniform(0.5, 1.5, N_CONTACTS)
+        ElasticCoulomb(k_t=1.0, k_w=0.8, k_n=1.5, mu=0.4, preload=float(p)) for p in rng.uniform(0.5, 1.5, N_CONTACTS)
     )
     operator = np.zeros((3 * N_CONTACTS, structure.n))
     operator[:, : 3 * N_CONTACTS] = np.eye(3 * N_CONTACTS)
@@ -121,9 +120,7 @@ def assert_same(found: np.ndarray, expected: np.ndarray, digits: float = 1e-13) 
 # ---- products ------------------------------------------------------------------------------------------------------------
 
 
-@given(
-    st.integers(0, 2**31), st.integers(1, 4), st.integers(0, 4), st.sampled_from([5, 7, 9]), st.integers(3, 8)
-)  # fmt: skip
+@given(st.integers(0, 2**31), st.integers(1, 4), st.integers(0, 4), st.sampled_from([5, 7, 9]), st.integers(3, 8))
 @settings(max_examples=30, deadline=None)
 def test_contact_product_is_that_of_the_assembled_matrix(seed, n_contacts, order, pairs, n):
     rng = np.random.default_rng(seed)
@@ -142,9 +139,7 @@ def test_contact_product_is_that_of_the_assembled_matrix(seed, n_contacts, order
         (True, np.einsum("apbq,ap->bq", full, gaps)),
     ):
         out = np.ones((m, n))
-        contact_product(
-            blocks, rows.columns, rows.values, v, transposed, np.empty((3, m)), np.empty((3, m)), out
-        )  # fmt: skip
+        contact_product(blocks, rows.columns, rows.values, v, transposed, np.empty((3, m)), np.empty((3, m)), out)
         # sums of a few hundred numbers of size one
         np.testing.assert_allclose(out - 1.0, (operator.T @ force).T, rtol=0, atol=1e-12)
 
@@ -162,9 +157,7 @@ def test_means_and_what_they_leave_make_up_the_blocks(seed, n_contacts, order, p
     for c in range(n_contacts):
         whole = real_matrix(means[:, c]).reshape(m, 3, m, 3)
         for k, (force, gap) in enumerate(PAIRS[:pairs]):
-            np.testing.assert_allclose(
-                left[c, k] + whole[:, force, :, gap], blocks[c, k], rtol=0, atol=1e-14
-            )
+            np.testing.assert_allclose(left[c, k] + whole[:, force, :, gap], blocks[c, k], rtol=0, atol=1e-14)
 
 
 def test_means_are_the_nearest_complex_numbers():
@@ -195,10 +188,7 @@ def test_products_are_those_of_the_condensed_matrices(proportional):
     linear = condense(structure, np.arange(3 * N_CONTACTS), forces)
     assert linear.diagonal is proportional
     order, n = 3, linear.n
-    condensed, products = (
-        linear.condensed(OMEGA, order),
-        linear.products(OMEGA, harmonics_of(order)),
-    )
+    condensed, products = (linear.condensed(OMEGA, order), linear.products(OMEGA, harmonics_of(order)))
     rows = rng.standard_normal((2 * order + 1, n))
     q = to_complex(rows)[:, :, None]
     product, slope = products.product_and_slope(rows)
@@ -286,9 +276,7 @@ def test_gmres_is_exact_after_as_many_products_as_unknowns(seed, n):
     matrix, right = rng.standard_normal((n, n)) + 2.0 * np.eye(n), rng.standard_normal(n)
     most = int(rng.integers(1, n + 1))
     solution, left = gmres(lambda v: matrix @ v, right, 1e-10, most)
-    assert left == pytest.approx(
-        np.linalg.norm(right - matrix @ solution) / np.linalg.norm(right), abs=1e-8
-    )
+    assert left == pytest.approx(np.linalg.norm(right - matrix @ solution) / np.linalg.norm(right), abs=1e-8)
     # the smallest residual of the Krylov space, by least squares over its powers
     powers = [right / np.linalg.norm(right)]
     for _ in range(most - 1):
@@ -390,9 +378,7 @@ def test_solution_by_a_shared_factor_is_that_of_lu(name, shared):
         left = np.linalg.norm(at.jac.matvec(found) + at.residual) / np.linalg.norm(at.residual)
         assert left <= 2.01 * tolerance  # of the second pass; see ROUNDING
         assert krylov.counts.failures == 0
-        np.testing.assert_array_equal(
-            Krylov(tolerance=tolerance).solve(at.jac, -at.residual), found
-        )
+        np.testing.assert_array_equal(Krylov(tolerance=tolerance).solve(at.jac, -at.residual), found)
     assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
     kept = at.jac.preconditioner()
     assert isinstance(kept, SharedFactor)
@@ -438,9 +424,7 @@ def test_masses_at_few_coordinates_leave_each_harmonic_its_factors():
     n = 150
     chain = 2.5 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     masses = (np.arange(n) % 10 == 0).astype(float)
-    structure = Structure(
-        np.diag(masses), 0.01 * chain, chain, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3)))
-    )
+    structure = Structure(np.diag(masses), 0.01 * chain, chain, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3))))
     law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.3, preload=1.0)
     interface = Interface(tuple(f"c{i}" for i in range(n // 3)), (law,) * (n // 3), np.eye(n))
     load = HarmonicLoad(np.zeros(n), {1: masses.astype(complex)})
@@ -582,7 +566,7 @@ def test_bordered_system_at_a_fold(lacks, nearby, method):
     tight = Krylov(method=method, tolerance=1e-11, tangent_tolerance=1e-6)
     for right, tolerance in ((np.eye(30 + lacks)[-1], 1e-6), (np.ones(30 + lacks), 1e-11)):
         for system, matrix in ((bordered, whole), (bordered.transposed, whole.T)):
-            found, _ = tight.solve_bordered(system.jac, system.column, system.row, system.corner, right)  # fmt: skip
+            found, _ = tight.solve_bordered(system.jac, system.column, system.row, system.corner, right)
             left = matrix @ found - right
             # the rounding of the product that judges comes on top
             assert np.linalg.norm(left) <= 2.0 * tolerance * np.linalg.norm(right)
@@ -687,9 +671,7 @@ def test_harmonic_without_stiffness_has_no_preconditioner():
 
 
 def test_array_and_unknown_method_are_refused():
-    with pytest.raises(
-        InputError, match="Krylov needs a Jacobian that makes its preconditioner, and got ndarray"
-    ):
+    with pytest.raises(InputError, match="Krylov needs a Jacobian that makes its preconditioner, and got ndarray"):
         Krylov().solve(np.eye(2), np.ones(2))
     with pytest.raises(InputError, match=r"Krylov\.method.*'qmr'"):
         Krylov(method="qmr")
@@ -734,7 +716,7 @@ def test_size_chooses_the_form(monkeypatch):
 def test_products_pay_from_some_three_hundred_unknowns():
     def pay(coordinates, order):
         contacts = coordinates // 3
-        return products_pay(linear_costs(coordinates, order + 1, 5 * contacts * (2 * order + 1) ** 2))  # fmt: skip
+        return products_pay(linear_costs(coordinates, order + 1, 5 * contacts * (2 * order + 1) ** 2))
 
     assert not pay(24, 3)  # 168 unknowns
     assert not pay(36, 3)  # 252
@@ -799,7 +781,7 @@ def test_what_a_krylov_method_does_not_solve_is_factorised():
     assert krylov.solve(at.jac, right[:-1]) is None
     automatic = Automatic(krylov=krylov)
     for jac in (at.jac, at.jac.transposed):
-        assert_same(automatic.solve(jac, right[:-1]), np.linalg.solve(jac.dense(), right[:-1]), 1e-9)  # fmt: skip
+        assert_same(automatic.solve(jac, right[:-1]), np.linalg.solve(jac.dense(), right[:-1]), 1e-9)
     border = (at.jac_p, x, 0.5)
     found, sign = Automatic(krylov=krylov).solve_bordered(at.jac, *border, right)
     whole = np.block([[at.jac.dense(), at.jac_p[:, None]], [x[None], np.array([[0.5]])]])
@@ -839,9 +821,7 @@ def test_branch_is_the_same():
     ends = []
     for form in ("structured", "dense"):
         made = replace(balance, jacobian=form)
-        following = Following(
-            newton=Newton(tolerance=1e-12, max_iterations=25), control=control, weights=weights
-        )
+        following = Following(newton=Newton(tolerance=1e-12, max_iterations=25), control=control, weights=weights)
         start = start_point(made, bonded_start(made, 0.3, system()), 0.3, following)
         points = [start, *trace(made, start, 0.5, following)]
         assert all(point.solution.status.converged for point in points)
@@ -865,9 +845,7 @@ def test_alert_is_the_same():
     assert iterated.error == pytest.approx(direct.error, rel=1e-9)
     assert iterated.worst == direct.worst
     assert direct.error > 1e-3  # there is something to compare
-    assert jacobian_alert(low, high, solution.x, OMEGA, measure).error == pytest.approx(
-        direct.error, rel=1e-9
-    )
+    assert jacobian_alert(low, high, solution.x, OMEGA, measure).error == pytest.approx(direct.error, rel=1e-9)
 
 
 def test_alert_without_a_solution_is_infinite():
@@ -887,13 +865,7 @@ def test_tolerance_is_set_through_the_choice_of_solver():
 
 def test_forced_response_is_the_same(monkeypatch):
     sweep = Sweep(
-        omega_range=(0.3, 0.5),
-        low=1,
-        high=3,
-        samples=64,
-        points=6,
-        peak_points=2,
-        newton=Newton(tolerance=1e-12),
+        omega_range=(0.3, 0.5), low=1, high=3, samples=64, points=6, peak_points=2, newton=Newton(tolerance=1e-12)
     )
     made, forces = system(), load(STATES["gross slip"])
     dense = list(forced_response(made, forces, sweep))
@@ -903,9 +875,7 @@ def test_forced_response_is_the_same(monkeypatch):
     assert all(p.converged for p in [*dense, *iterated])
     assert {p.stage for p in iterated} >= {"low", "high"}
     for found, expected in zip(
-        [p for p in iterated if p.stage == "low"][::100],
-        [p for p in dense if p.stage == "low"][::100],
-        strict=True,
+        [p for p in iterated if p.stage == "low"][::100], [p for p in dense if p.stage == "low"][::100], strict=True
     ):
         assert_same(found.coefficients, expected.coefficients, 1e-9)
     last = [[p for p in points if p.stage == "low"][-1] for points in (iterated, dense)]

@@ -84,9 +84,7 @@ def test_factors_are_not_those_of_a_solution_far_from_them():
     """A step that leaves a hundredth of the residual ended where the Jacobian is another one."""
     springs = Springs(bend=0.3)
     latest, factors = Latest(springs), LastFactors(Dense())
-    solution = newton(
-        lambda v: latest.linearise(v, 3.0), np.zeros(2), Newton(tolerance=0.05), linear=factors
-    )
+    solution = newton(lambda v: latest.linearise(v, 3.0), np.zeros(2), Newton(tolerance=0.05), linear=factors)
     assert solution.status.converged
     assert solution.residual_norm > 1e-3 * np.abs(factors.residual).max()
     assert factors.at(solution) is None

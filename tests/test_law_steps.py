@@ -31,7 +31,7 @@ def test_steps_are_those_of_the_law_chained(law):
     parameters, s = np.asarray(law.parameters(), dtype=float), state.size
     starts, whole = np.zeros((40, s)), np.zeros((len(samples), 3 + s, 9 + s))
     end = state.copy()
-    steps_along(law_address(law.kernel), 0, gap, velocity, end, parameters, share, samples, starts, whole)  # fmt: skip
+    steps_along(law_address(law.kernel), 0, gap, velocity, end, parameters, share, samples, starts, whole)
     found = np.zeros((40, 3, 6))
     every = np.arange(40, dtype=np.int64)
     tangents_at(law_address(law.kernel), gap, velocity, starts, every, parameters, found)

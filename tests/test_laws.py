@@ -25,26 +25,45 @@ some = st.floats(-1, 1)
 share = st.floats(0, 1)
 three = st.tuples(some, some, some)
 populations = (
-    st.builds(ss.contact.UniformBand, n_sliders=st.integers(1, 6), half_width=st.floats(0.1, 1), elastic_share=st.floats(0, 0.5))
+    st.builds(
+        ss.contact.UniformBand,
+        n_sliders=st.integers(1, 6),
+        half_width=st.floats(0.1, 1),
+        elastic_share=st.floats(0, 0.5),
+    )
     | st.builds(ss.contact.FourParameter, chi=st.floats(-0.9, 0), beta=st.floats(0, 3), n_sliders=st.integers(2, 6))
     | st.just(ss.contact.FirstLoading(displacement=(1.0, 2.0, 4.0), force=(2.0, 3.0, 3.5)))
-)  # fmt: skip
+)
 EXAMPLES = {
     "bonded": st.builds(ss.Bonded, k_t=stiff, k_w=stiff, k_n=stiff),
-    "unilateral_spring": st.builds(ss.UnilateralSpring, k_n=stiff, preload=share) | st.builds(ss.UnilateralSpring, k_n=stiff, initial_gap=share),
-    "cubic_spring": st.builds(ss.CubicSpring, cubic_t=some, cubic_w=some, cubic_n=some, k_t=stiff, k_w=stiff, k_n=stiff),
+    "unilateral_spring": st.builds(ss.UnilateralSpring, k_n=stiff, preload=share)
+    | st.builds(ss.UnilateralSpring, k_n=stiff, initial_gap=share),
+    "cubic_spring": st.builds(
+        ss.CubicSpring, cubic_t=some, cubic_w=some, cubic_n=some, k_t=stiff, k_w=stiff, k_n=stiff
+    ),
     "polynomial_spring": st.builds(ss.PolynomialSpring, along_t=three, along_w=st.tuples(stiff), along_n=three),
     "jenkins": st.builds(ss.Jenkins, k_t=stiff, limit=share, k_w=stiff, k_n=stiff),
     "elastic_coulomb": st.builds(ss.ElasticCoulomb, k_t=stiff, k_w=stiff, k_n=stiff, mu=share, preload=some),
-    "coupled_coulomb": st.builds(ss.CoupledCoulomb, k_t=stiff, k_w=st.none() | stiff, k_n=stiff, mu=share, preload=some),
-    "regularised_coulomb": st.builds(ss.RegularisedCoulomb, mu=share, transition_velocity=st.floats(0.1, 3), k_n=stiff, preload=some),
+    "coupled_coulomb": st.builds(
+        ss.CoupledCoulomb, k_t=stiff, k_w=st.none() | stiff, k_n=stiff, mu=share, preload=some
+    ),
+    "regularised_coulomb": st.builds(
+        ss.RegularisedCoulomb, mu=share, transition_velocity=st.floats(0.1, 3), k_n=stiff, preload=some
+    ),
     "dahl": st.builds(ss.Dahl, k_t=stiff, limit=st.floats(0.1, 3), k_w=stiff, k_n=stiff),
     "bouc_wen": st.builds(
-        lambda beta, ratio, **others: ss.BoucWen(beta=beta, gamma=ratio * beta, **others), beta=stiff, ratio=st.floats(-0.5, 1), k_t=stiff,
-        alpha=st.floats(0, 0.9), a=st.floats(0.3, 3), exponent=st.sampled_from([1.0, 1.5, 2.0, 4.0]), k_w=stiff, k_n=stiff,
+        lambda beta, ratio, **others: ss.BoucWen(beta=beta, gamma=ratio * beta, **others),
+        beta=stiff,
+        ratio=st.floats(-0.5, 1),
+        k_t=stiff,
+        alpha=st.floats(0, 0.9),
+        a=st.floats(0.3, 3),
+        exponent=st.sampled_from([1.0, 1.5, 2.0, 4.0]),
+        k_w=stiff,
+        k_n=stiff,
     ),
     "iwan": st.builds(ss.Iwan, k_t=stiff, limit=share, k_w=stiff, k_n=stiff, population=populations),
-}  # fmt: skip
+}
 ELASTIC = ("bonded", "unilateral_spring", "cubic_spring", "polynomial_spring")
 WITH_MEMORY = ("coupled_coulomb", "dahl", "bouc_wen")
 every_law = pytest.mark.parametrize("name", list(LAWS))
@@ -65,7 +84,7 @@ def stiffness_of(law):
     """Largest stiffness near gaps of size one: what forces and derivatives are measured by."""
     if isinstance(law, ss.PolynomialSpring):
         return 100.0
-    others = [abs(getattr(law, name, None) or 0.0) for name in ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")]  # fmt: skip
+    others = [abs(getattr(law, name, None) or 0.0) for name in ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")]
     return max(*others, 1.0) * (30.0 if isinstance(law, ss.CubicSpring) else 1.0)
 
 
@@ -106,7 +125,7 @@ def test_law_is_a_value(name, data):
 def test_a_small_motion_from_rest_meets_the_stuck_stiffness(name, data):
     law = data.draw(EXAMPLES[name])
     if name in ("unilateral_spring", "elastic_coulomb", "coupled_coulomb", "regularised_coulomb"):
-        law = replace(law, preload=1.0, **({"initial_gap": 0.0} if name == "unilateral_spring" else {}))  # fmt: skip
+        law = replace(law, preload=1.0, **({"initial_gap": 0.0} if name == "unilateral_spring" else {}))
     for parameter in ("limit", "mu"):
         if hasattr(law, parameter) and name != "bouc_wen":
             law = replace(law, **{parameter: 1.0})
@@ -116,7 +135,7 @@ def test_a_small_motion_from_rest_meets_the_stuck_stiffness(name, data):
         moved[d] = 1e-7
         after = step(law, moved, np.zeros(3), law.initial_state())[0][:3]
         # smooth laws bend by 1e-7 on the way, and faster below an exponent of 2
-        assert (after - before)[d] / 1e-7 == pytest.approx(law.stuck_stiffness()[d], rel=2e-5, abs=1e-7)  # fmt: skip
+        assert (after - before)[d] / 1e-7 == pytest.approx(law.stuck_stiffness()[d], rel=2e-5, abs=1e-7)
 
 
 # ---- derivatives ------------------------------------------------------------------------------------------------------------
@@ -172,9 +191,7 @@ def test_derivatives_of_the_coefficients(name, data, seed, omega):
     m, used, total = 5, 0, 0
     for q in range(m):
         for b in range(3):
-            behind, ahead = one_sided(
-                lambda p: evaluate(p, law, 40, omega).coefficients, coefficients, 3 * q + b, 1e-5
-            )
+            behind, ahead = one_sided(lambda p: evaluate(p, law, 40, omega).coefficients, coefficients, 3 * q + b, 1e-5)
             total += 1
             if np.max(np.abs(ahead - behind)) > 1e-3 * scale:
                 continue
@@ -188,7 +205,10 @@ def test_derivatives_of_the_coefficients(name, data, seed, omega):
             assert np.max(np.abs(central[:, uncovered]), initial=0.0) < 5e-5 * scale
     assert used >= 0.7 * total
     h = 1e-5 * omega
-    slope = (evaluate(coefficients, law, 40, omega + h).coefficients - evaluate(coefficients, law, 40, omega - h).coefficients) / (2 * h)  # fmt: skip
+    slope = (
+        evaluate(coefficients, law, 40, omega + h).coefficients
+        - evaluate(coefficients, law, 40, omega - h).coefficients
+    ) / (2 * h)
     assert np.max(np.abs(slope - period.by_omega)) < 1e-4 * scale
     if name != "regularised_coulomb":
         assert not np.any(period.by_omega)
@@ -268,13 +288,19 @@ def test_mirrored_motion_mirrored_friction(name, data, seed):
 def scaled(law, factor):
     """The same law for gaps and forces larger by `factor`."""
     if isinstance(law, ss.CubicSpring):
-        return replace(law, **{n: getattr(law, n) / factor**2 for n in ("cubic_t", "cubic_w", "cubic_n")})  # fmt: skip
+        return replace(law, **{n: getattr(law, n) / factor**2 for n in ("cubic_t", "cubic_w", "cubic_n")})
     if isinstance(law, ss.PolynomialSpring):
-        return replace(law, **{n: tuple(c / factor**i for i, c in enumerate(getattr(law, n))) for n in ("along_t", "along_w", "along_n")})  # fmt: skip
+        return replace(
+            law,
+            **{
+                n: tuple(c / factor**i for i, c in enumerate(getattr(law, n)))
+                for n in ("along_t", "along_w", "along_n")
+            },
+        )
     if isinstance(law, ss.BoucWen):
-        return replace(law, beta=law.beta / factor**law.exponent, gamma=law.gamma / factor**law.exponent)  # fmt: skip
+        return replace(law, beta=law.beta / factor**law.exponent, gamma=law.gamma / factor**law.exponent)
     lengths_and_forces = ("limit", "preload", "initial_gap", "transition_velocity")
-    return replace(law, **{n: factor * getattr(law, n) for n in lengths_and_forces if hasattr(law, n)})  # fmt: skip
+    return replace(law, **{n: factor * getattr(law, n) for n in lengths_and_forces if hasattr(law, n)})
 
 
 @every_law
@@ -290,9 +316,7 @@ def test_forces_scale_with_the_unit_of_length(name, data, seed, power):
     assert np.max(np.abs(b.blocks - a.blocks)) <= 1e-8 * size
 
 
-@pytest.mark.parametrize(
-    "name", ["bonded", "unilateral_spring", "jenkins", "elastic_coulomb", "iwan"]
-)
+@pytest.mark.parametrize("name", ["bonded", "unilateral_spring", "jenkins", "elastic_coulomb", "iwan"])
 @settings(max_examples=30, deadline=None)
 @given(data=st.data(), seed=seeds, order=st.integers(0, 4), samples=st.integers(20, 100))
 def test_intervals_are_the_march_of_a_piecewise_linear_law(name, data, seed, order, samples):
@@ -307,7 +331,9 @@ def test_intervals_are_the_march_of_a_piecewise_linear_law(name, data, seed, ord
         assert np.max(np.abs(fast.blocks - slow.blocks)) <= 1e-10 * size
 
 
-@pytest.mark.parametrize("name", [n for n in LAWS if n not in ("bonded", "unilateral_spring", "jenkins", "elastic_coulomb", "iwan")])  # fmt: skip
+@pytest.mark.parametrize(
+    "name", [n for n in LAWS if n not in ("bonded", "unilateral_spring", "jenkins", "elastic_coulomb", "iwan")]
+)
 def test_other_laws_do_not_claim_to_be_piecewise_linear(name):
     assert not hasattr(LAWS[name], "elements")
 
@@ -358,7 +384,7 @@ def test_planar_friction_near_incipient_slip(excess):
     # the smallest disc that the path fits into needs no slip; one that is smaller by `excess` slips a little in every cycle,
     # and the start is forgotten the more slowly the smaller that is
     coefficients = np.zeros((7, 3))
-    coefficients[1, 0], coefficients[2, 1], coefficients[3, 1], coefficients[4, 0] = 1.0, 0.7, 0.3, 0.2  # fmt: skip
+    coefficients[1, 0], coefficients[2, 1], coefficients[3, 1], coefficients[4, 0] = 1.0, 0.7, 0.3, 0.2
     path = (basis(3, 128) @ coefficients)[:, :2]
     law = ss.CoupledCoulomb(k_t=1.0, k_n=0.0, mu=1.0, preload=smallest_disc(path) * (1.0 - excess))
     period = evaluate(coefficients, law, 128)
@@ -377,9 +403,11 @@ def smallest_disc(path):
     centre = np.zeros(2)
     for _ in range(3):
         found = minimize(
-            lambda c: np.max(np.hypot(*(path - c).T)), centre, method="Nelder-Mead",
+            lambda c: np.max(np.hypot(*(path - c).T)),
+            centre,
+            method="Nelder-Mead",
             options={"xatol": 1e-13, "fatol": 1e-15, "maxiter": 2000},
-        )  # fmt: skip
+        )
         centre = found.x
     return found.fun
 
@@ -466,9 +494,7 @@ def test_bouc_wen_steps_are_exact(exponent):
 
     x, z, state = 0.0, np.zeros(1), law.initial_state()
     for move in (0.4, 1.0, -0.2, -3.0, 0.05, 9.0, -30.0, 2.0):
-        want = solve_ivp(
-            rate(np.sign(move)), (0, abs(move)), z, rtol=1e-10, atol=1e-12, max_step=0.02
-        )
+        want = solve_ivp(rate(np.sign(move)), (0, abs(move)), z, rtol=1e-10, atol=1e-12, max_step=0.02)
         x, z = x + move, want.y[:, -1]
         out, _, _ = step(law, np.array([x, 0.0, 0.0]), np.zeros(3), state)
         state = out[3:]
@@ -513,33 +539,66 @@ REFUSED = [
     (lambda: ss.Bonded(k_t=-1.0, k_w=0.0, k_n=0.0), r"Bonded\.k_t: must be finite and not negative, got -1"),
     (lambda: ss.CoupledCoulomb(k_t="4e5", k_n=0.0, mu=0.3), r"CoupledCoulomb\.k_t: .* got '4e5'"),
     (lambda: ss.UnilateralSpring(k_n=0.0), r"UnilateralSpring\.k_n: must be positive, got 0"),
-    (lambda: ss.UnilateralSpring(k_n=1.0, initial_gap=-1.0), r"UnilateralSpring\.initial_gap: must be finite and not negative"),
-    (lambda: ss.UnilateralSpring(k_n=1.0, preload=1.0, initial_gap=1.0), "has a preload of 1.0 N and an initial gap of 1.0 m.*give one of them"),
+    (
+        lambda: ss.UnilateralSpring(k_n=1.0, initial_gap=-1.0),
+        r"UnilateralSpring\.initial_gap: must be finite and not negative",
+    ),
+    (
+        lambda: ss.UnilateralSpring(k_n=1.0, preload=1.0, initial_gap=1.0),
+        "has a preload of 1.0 N and an initial gap of 1.0 m.*give one of them",
+    ),
     (ss.CubicSpring, "CubicSpring: all contact stiffnesses are zero"),
     (lambda: ss.CubicSpring(cubic_n=np.nan), r"CubicSpring\.cubic_n: must be finite, got nan"),
     (lambda: ss.PolynomialSpring(along_t=(0.0,)), "PolynomialSpring: all coefficients are zero"),
     (lambda: ss.PolynomialSpring(along_w=(np.inf,)), r"PolynomialSpring\.along_w: must be finite, got"),
     (lambda: ss.Jenkins(k_t=1.0, limit=-1.0), r"Jenkins\.limit: must be finite and not negative, got -1"),
     (lambda: ss.Jenkins(k_t=0.0, limit=1.0), "Jenkins: all contact stiffnesses are zero"),
-    (lambda: ss.CoupledCoulomb(k_t=1.0, k_n=1.0, mu=-0.1), r"CoupledCoulomb\.mu: must be finite and not negative, got -0.1"),
-    (lambda: ss.CoupledCoulomb(k_t=1.0, k_n=1.0, mu=0.1, preload=np.inf), r"CoupledCoulomb\.preload: must be finite, got inf"),
-    (lambda: ss.RegularisedCoulomb(mu=0.1, transition_velocity=0.0), r"RegularisedCoulomb\.transition_velocity: must be positive"),
+    (
+        lambda: ss.CoupledCoulomb(k_t=1.0, k_n=1.0, mu=-0.1),
+        r"CoupledCoulomb\.mu: must be finite and not negative, got -0.1",
+    ),
+    (
+        lambda: ss.CoupledCoulomb(k_t=1.0, k_n=1.0, mu=0.1, preload=np.inf),
+        r"CoupledCoulomb\.preload: must be finite, got inf",
+    ),
+    (
+        lambda: ss.RegularisedCoulomb(mu=0.1, transition_velocity=0.0),
+        r"RegularisedCoulomb\.transition_velocity: must be positive",
+    ),
     (lambda: ss.Dahl(k_t=1.0, limit=0.0), r"Dahl\.limit: must be positive, got 0"),
     (lambda: ss.BoucWen(k_t=1.0, beta=0.0, gamma=0.0), r"BoucWen\.beta: must be positive"),
-    (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=1.5), r"BoucWen\.gamma: must be above -beta and at most beta = 1.0, got 1.5"),
+    (
+        lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=1.5),
+        r"BoucWen\.gamma: must be above -beta and at most beta = 1.0, got 1.5",
+    ),
     (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=-1.0), r"BoucWen\.gamma: must be above -beta"),
     (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=0.0, alpha=1.5), r"BoucWen\.alpha: must lie in \[0, 1\], got 1.5"),
-    (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=0.0, exponent=0.5), r"BoucWen\.exponent: must lie in \[1, 20\], got 0.5"),
+    (
+        lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=0.0, exponent=0.5),
+        r"BoucWen\.exponent: must lie in \[1, 20\], got 0.5",
+    ),
     (lambda: ss.Iwan(k_t=1.0, limit=np.nan), r"Iwan\.limit: must be finite and not negative, got nan"),
     (lambda: ss.contact.UniformBand(n_sliders=0), r"UniformBand\.n_sliders: must be at least 1, got 0"),
     (lambda: ss.contact.UniformBand(half_width=1.1), r"UniformBand\.half_width: must lie in \(0, 1\], got 1.1"),
     (lambda: ss.contact.UniformBand(elastic_share=1.0), r"UniformBand\.elastic_share: must lie in \[0, 1\), got 1.0"),
     (lambda: ss.contact.FourParameter(chi=-1.0, beta=0.0), r"FourParameter\.chi: must lie in \(-1, 0\], got -1.0"),
-    (lambda: ss.contact.FourParameter(chi=0.0, beta=-1.0), r"FourParameter\.beta: must be finite and not negative, got -1.0"),
-    (lambda: ss.contact.FirstLoading(displacement=(1.0,), force=(1.0,)), "FirstLoading: got 1 displacements and 1 forces"),
-    (lambda: ss.contact.FirstLoading(displacement=(2.0, 1.0), force=(1.0, 1.5)), r"FirstLoading\.displacement: must rise from above zero"),
-    (lambda: ss.contact.FirstLoading(displacement=(1.0, 2.0), force=(1.0, 3.0)), r"FirstLoading\.force: must rise ever more slowly"),
-]  # fmt: skip
+    (
+        lambda: ss.contact.FourParameter(chi=0.0, beta=-1.0),
+        r"FourParameter\.beta: must be finite and not negative, got -1.0",
+    ),
+    (
+        lambda: ss.contact.FirstLoading(displacement=(1.0,), force=(1.0,)),
+        "FirstLoading: got 1 displacements and 1 forces",
+    ),
+    (
+        lambda: ss.contact.FirstLoading(displacement=(2.0, 1.0), force=(1.0, 1.5)),
+        r"FirstLoading\.displacement: must rise from above zero",
+    ),
+    (
+        lambda: ss.contact.FirstLoading(displacement=(1.0, 2.0), force=(1.0, 3.0)),
+        r"FirstLoading\.force: must rise ever more slowly",
+    ),
+]
 
 
 @pytest.mark.parametrize(("make", "message"), REFUSED, ids=[m for _, m in REFUSED])
@@ -599,9 +658,7 @@ def test_first_loading_of_an_iwan_element():
 
 @pytest.mark.parametrize("chi", [0.0, -0.4, -0.8])
 def test_micro_slip_grows_with_the_power_of_its_population(chi):
-    law = ss.Iwan(
-        k_t=1.0, limit=1.0, population=ss.contact.FourParameter(chi=chi, beta=0.5, n_sliders=200)
-    )
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.contact.FourParameter(chi=chi, beta=0.5, n_sliders=200))
     assert case_b1_iwan.slope(law, np.array([0.1, 0.2, 0.4])) == pytest.approx(3 + chi, abs=5e-3)
 
 

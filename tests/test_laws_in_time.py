@@ -62,7 +62,7 @@ CASES: dict[str, Any] = {
     "bouc_wen": ss.BoucWen(k_t=2.0, k_w=1.5, k_n=1.0, beta=3.0, gamma=2.0, alpha=0.1, exponent=1.5),
     "iwan": ss.Iwan(k_t=2.0, k_w=1.5, k_n=1.0, limit=0.6),
     "user": Drag(k=2.0, c=0.3),
-}  # fmt: skip
+}
 LIFTS = {"unilateral_spring", "elastic_coulomb", "coupled_coulomb", "regularised_coulomb"}
 OMEGA = 1.3
 
@@ -75,7 +75,7 @@ def model(name: str) -> tuple:
     """A mass in space that a contact of a law holds against the ground."""
     structure = structure_of(
         np.eye(3), np.diag([0.2, 0.25, 0.3]), np.array([[1.0, 0.2, 0.1], [0.2, 1.4, 0.0], [0.1, 0.0, 1.2]])
-    )  # fmt: skip
+    )
     load = load_of(3, {1: [1.5, 1.0 + 0.4j, 0.9j], 3: [0.1, 0.2j, 0.1]}, [0.0, 0.05, -0.05])
     return structure, np.eye(3), [CASES[name]], load
 
@@ -152,9 +152,14 @@ def test_balance_with_many_harmonics_has_the_same_motion(name: str) -> None:
     system = ss.System(structure, contacts, outputs=np.arange(3))
     order = 31
     sweep = ss.Sweep(
-        omega_range=(OMEGA, 1.0001 * OMEGA), low=order, high=order, selection="always_low",
-        frequencies=2, peak_points=0, samples=2048,
-    )  # fmt: skip
+        omega_range=(OMEGA, 1.0001 * OMEGA),
+        low=order,
+        high=order,
+        selection="always_low",
+        frequencies=2,
+        peak_points=0,
+        samples=2048,
+    )
     problem = ss.response.forced_problem(system, load, sweep)
     point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     assert point.converged

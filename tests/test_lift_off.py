@@ -27,9 +27,14 @@ OMEGA = 2.0 * np.pi * 1067.0
 def test_without_a_rescue_a_frequency_is_given_up_after_the_correctors_own_starts() -> None:
     plates = two_plates(8)
     sweep = Sweep(
-        omega_range=(OMEGA, 1.1 * OMEGA), at=(OMEGA, 1.1 * OMEGA), low=9, high=9, selection="always_high", peak_points=0,
+        omega_range=(OMEGA, 1.1 * OMEGA),
+        at=(OMEGA, 1.1 * OMEGA),
+        low=9,
+        high=9,
+        selection="always_high",
+        peak_points=0,
         rescue="off",
-    )  # fmt: skip
+    )
     points = list(forced_response(plates.system, plates.load(0.3), sweep))
     assert not any(p.converged for p in points)
     spent = Counter({p.index: 0 for p in points})
@@ -43,7 +48,7 @@ def test_without_a_rescue_a_frequency_is_given_up_after_the_correctors_own_start
 def repeated(share: float) -> Repetition:
     plates = two_plates(8)
     system = plates.system
-    return repetition(system.structure, system.interface, plates.load(share), OMEGA, system.outputs, 9)  # fmt: skip
+    return repetition(system.structure, system.interface, plates.load(share), OMEGA, system.outputs, 9)
 
 
 def test_the_march_tells_what_repeats_from_what_does_not() -> None:
@@ -68,7 +73,7 @@ def test_a_stop_is_hit_in_every_period_or_in_every_second(omega: float, every: i
     contacts = ss.Interface(("stop",), (ss.UnilateralSpring(k_n=20.0),), gap)
     found = repetition(
         structure_of(np.eye(1), 0.1 * np.eye(1), np.eye(1)), contacts, load_of(1, {1: [1.0]}), omega, np.array([0]), 5
-    )  # fmt: skip
+    )
     assert found.every == every
     assert found.verdict == ("periodic" if every == 1 else "not periodic")
     if every > 1:
@@ -80,7 +85,7 @@ def test_a_frequency_is_found_from_the_motion_in_time() -> None:
     omegas = (OMEGA, 1.02 * OMEGA)
     sweep = Sweep(
         omega_range=omegas, at=omegas, low=5, high=5, selection="always_high", peak_points=0, rescue="in_time"
-    )  # fmt: skip
+    )
     load = plates.load(0.03)
     known = list(forced_response(plates.system, load, sweep))
     problem = forced_problem(plates.system, load, sweep)
@@ -108,9 +113,12 @@ def test_a_frequency_is_found_from_the_motion_in_time() -> None:
 
 def test_a_verdict_tells_what_the_motion_in_time_did() -> None:
     lost = SimpleNamespace(
-        status=np.array([0, Status.NOT_PERIODIC, Status.STALLED]), converged=np.array([True, False, False]), hz=np.zeros(3), nearer="more points",
+        status=np.array([0, Status.NOT_PERIODIC, Status.STALLED]),
+        converged=np.array([True, False, False]),
+        hz=np.zeros(3),
+        nearer="more points",
         texts=lambda name: {"marched_sentence": ["periodic in time", "in time it wanders", ""]}[name],
-    )  # fmt: skip
+    )
     of_points = [finding for finding in unsolved(lost) if finding.points]  # type: ignore[arg-type]
     assert [f.points for f in of_points] == [(1,), (2,)]
     assert of_points[0].why.endswith("no balance stands for it; in time it wanders)")
@@ -119,7 +127,7 @@ def test_a_verdict_tells_what_the_motion_in_time_did() -> None:
 
 
 def test_as_many_points_are_marched_as_the_study_says() -> None:
-    points = [SimpleNamespace(point=SimpleNamespace(omega=w, converged=w == 3.0)) for w in range(1, 7)]  # fmt: skip
+    points = [SimpleNamespace(point=SimpleNamespace(omega=w, converged=w == 3.0)) for w in range(1, 7)]
     response = SimpleNamespace(accepted=points, top=points[2])
     for most, wanted in ((1, [2]), (3, [1, 2, 4]), (9, [1, 2, 4, 5, 6])):
         question = SimpleNamespace(not_periodic_points=most)

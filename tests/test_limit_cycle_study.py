@@ -58,9 +58,7 @@ def test_the_benchmark_from_a_study_and_its_words(tmp_path: Path) -> None:
     # the line over the amplitude goes through the limit cycles
     along = figures["limit_cycle_frequency"]
     at = np.array(along.data[0].x) / along.layout.meta["factor"]
-    for amplitude, hz in zip(
-        case["cycle_amplitude"].values, case["cycle_frequency_hz"].values, strict=True
-    ):
+    for amplitude, hz in zip(case["cycle_amplitude"].values, case["cycle_frequency_hz"].values, strict=True):
         nearest = int(np.argmin(np.abs(at - amplitude)))
         assert (at[nearest], along.data[0].y[nearest]) == pytest.approx((amplitude, hz), rel=1e-12)
     assert "985" not in str(cycle_table(Cycles(case)))
@@ -75,8 +73,8 @@ def test_harmonics_are_raised_and_time_confirms(tmp_path: Path) -> None:
     assert case["cycle_harmonics"].values.min() > 10
     assert case["cycle_stability"].values.tolist() == ["stable", "unstable"]
     assert np.all(case["cycle_along"].values < 1e-5)
-    assert float(case["cycle_time_amplitude"][0]) == pytest.approx(float(case["cycle_amplitude"][0]), rel=1e-4)  # fmt: skip
-    assert float(case["cycle_time_frequency_hz"][0]) == pytest.approx(float(case["cycle_frequency_hz"][0]), rel=1e-4)  # fmt: skip
+    assert float(case["cycle_time_amplitude"][0]) == pytest.approx(float(case["cycle_amplitude"][0]), rel=1e-4)
+    assert float(case["cycle_time_frequency_hz"][0]) == pytest.approx(float(case["cycle_frequency_hz"][0]), rel=1e-4)
     assert np.isnan(float(case["cycle_time_amplitude"][1]))
     assert not [v for v in outcome.verdicts if v.rank]
 
@@ -85,9 +83,7 @@ def test_python_gives_the_same_and_a_sealed_mode_is_not_solved_again(tmp_path: P
     (case,) = study_of(B13, tmp_path).cases()
     model = case.build()
     front = ss.Model(**{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs")})
-    result = front.limit_cycle(
-        harmonics=1, most_harmonics=1, points=15, amplitude_mm=[150.0, 3000.0]
-    )
+    result = front.limit_cycle(harmonics=1, most_harmonics=1, points=15, amplitude_mm=[150.0, 3000.0])
     own = one_case(result.data["limit_cycle"].to_dataset(), 0)
     question = LIMIT_CYCLE.inputs(case, model)
     with JobJournal(tmp_path / "a.part", LIMIT_CYCLE.record) as journal:
@@ -182,9 +178,7 @@ def test_waves_without_a_found_cycle_compete_from_where_they_slip(tmp_path: Path
 
 
 def test_what_friction_cannot_bound_is_told(tmp_path: Path) -> None:
-    outcome = answered(
-        changed(B13, {"part.blade.dashpots_n_s_per_m": '[["ground", 1, -0.2]]'}), tmp_path
-    )
+    outcome = answered(changed(B13, {"part.blade.dashpots_n_s_per_m": '[["ground", 1, -0.2]]'}), tmp_path)
     case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
     assert "cycle_amplitude" not in case
     assert any("friction cannot bound it" in v.why for v in outcome.verdicts)
@@ -202,7 +196,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:
         LIMIT_CYCLE.inputs(wheel, wheel.build())
     rigid = B13.replace('law = "jenkins"', 'law = "rigid_coulomb"').replace(
         "tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.1", "friction_coefficient = 0.3\npreload_n = 1.0"
-    )  # fmt: skip
+    )
     (stiff,) = study_of(rigid, tmp_path).cases()
     with pytest.raises(InputError, match="a contact is rigid"):
         LIMIT_CYCLE.inputs(stiff, stiff.build())
@@ -251,14 +245,11 @@ def test_blades_that_hardly_differ_come_to_the_cycle_of_the_tuned_wheel(tmp_path
     """Undamped modes of such a wheel stand still and are fed from one side as much as they lose on the other."""
     flow(tmp_path)
     text = SHROUDS.replace("in_time = true\nperiods = 60\n", "")
-    blades = (
-        "[mistuning.blades]\nof = 'wheel.blade'\ndeviations = [1e-6, -2e-6, 0.5e-6, 1e-6, -1e-6]\n"
-    )
+    blades = "[mistuning.blades]\nof = 'wheel.blade'\ndeviations = [1e-6, -2e-6, 0.5e-6, 1e-6, -1e-6]\n"
     tuned, mistuned = (
-        one_case(answered(written, tmp_path).tree["limit_cycle"].to_dataset(), 0)
-        for written in (text, text + blades)
+        one_case(answered(written, tmp_path).tree["limit_cycle"].to_dataset(), 0) for written in (text, text + blades)
     )
-    for name, off in (("mode_damping_ratio", 1e-4), ("cycle_amplitude", 1e-4), ("cycle_frequency_hz", 2e-6)):  # fmt: skip
+    for name, off in (("mode_damping_ratio", 1e-4), ("cycle_amplitude", 1e-4), ("cycle_frequency_hz", 2e-6)):
         np.testing.assert_allclose(mistuned[name].values, tuned[name].values, rtol=off)
 
 
@@ -296,8 +287,13 @@ def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
     n, M, blades = 5, np.tile([1.2, 0.33], 5), 2 * np.arange(5) + 1
     K, C, G = np.zeros((3, 2 * n, 2 * n), dtype=complex)
     for s in range(n):
-        disk, blade, next_disk, next_blade = (np.eye(2 * n)[i % (2 * n)] for i in 2 * s + np.arange(4))  # fmt: skip
-        for k, c, row in ((6.5e5, 4.5, disk), (2.2e5, 0, disk - next_disk), (7.9e4, 0.9, disk - blade), (7.5e3, 0, blade - next_blade)):  # fmt: skip
+        disk, blade, next_disk, next_blade = (np.eye(2 * n)[i % (2 * n)] for i in 2 * s + np.arange(4))
+        for k, c, row in (
+            (6.5e5, 4.5, disk),
+            (2.2e5, 0, disk - next_disk),
+            (7.9e4, 0.9, disk - blade),
+            (7.5e3, 0, blade - next_blade),
+        ):
             K += k * np.outer(row, row)
             C += c * np.outer(row, row)
         for j, own in fluid.items():
@@ -305,7 +301,7 @@ def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
     C, K = C - G.imag / (2 * np.pi * 80), K - G.real
     states = np.block([[0 * K, np.eye(2 * n)], [-K / M[:, None], -C / M[:, None]]])
     values, vectors = np.linalg.eig(states)
-    for name, own in (("frequency_hz", np.abs(values) / (2 * np.pi)), ("damping_ratio", -values.real / np.abs(values))):  # fmt: skip
+    for name, own in (("frequency_hz", np.abs(values) / (2 * np.pi)), ("damping_ratio", -values.real / np.abs(values))):
         there = case[f"linear_{name}"].values.ravel()
         np.testing.assert_allclose(np.sort(there), np.sort(own[values.imag > 0]), rtol=1e-8)
     grows = np.flatnonzero((values.real > 0) & (values.imag > 0))
@@ -313,4 +309,4 @@ def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
     assert case["wave_number"].values.tolist() == waves
     ratio = -values[grows].real / np.abs(values[grows])
     np.testing.assert_allclose(case["mode_damping_ratio"].values, ratio, rtol=1e-8)
-    assert case["cycle_time_amplitude"].values[0] == pytest.approx(case["cycle_amplitude"].values[0], rel=1e-3)  # fmt: skip
+    assert case["cycle_time_amplitude"].values[0] == pytest.approx(case["cycle_amplitude"].values[0], rel=1e-3)

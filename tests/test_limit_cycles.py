@@ -48,7 +48,7 @@ def oscillator(c: float) -> tuple[System, HarmonicLoad]:
     gap = np.zeros((3, 1))
     gap[0, 0] = 1.0
     contacts = Interface(("damper",), (Jenkins(k_t=0.5, limit=0.1),), gap)
-    return System(lumped(np.eye(1), np.eye(1), c * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))  # fmt: skip
+    return System(lumped(np.eye(1), np.eye(1), c * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))
 
 
 def motions(c: float, how: Discretisation) -> SelfExcited:
@@ -86,9 +86,7 @@ def test_modes_that_grow_are_those_of_the_eigenvalues_with_coriolis_and_flow(who
     assert np.any(values.real > 0)
     assert np.any(values.real < 0)
     np.testing.assert_allclose([m.omega for m in found], np.abs(values), rtol=1e-6)
-    np.testing.assert_allclose(
-        [m.ratio for m in found], -values.real / np.abs(values), rtol=1e-3, atol=1e-7
-    )
+    np.testing.assert_allclose([m.ratio for m in found], -values.real / np.abs(values), rtol=1e-3, atol=1e-7)
 
 
 @pytest.mark.parametrize(("rows", "order"), [(ONE, 1), (MANY, 21)])
@@ -122,18 +120,12 @@ def test_there_is_none_beyond_what_friction_can_dissipate():
 def test_the_damping_that_a_cycle_of_given_amplitude_needs_has_the_published_maximum():
     problem = motions(-0.1, Discretisation(order=1))
     cycle = limit_cycles(problem, curve(problem))[0]
-    points = parameter_over_amplitude(
-        problem, oscillator, -0.1, cycle.unknowns, (cycle.amplitude, AT), 10
-    )
+    points = parameter_over_amplitude(problem, oscillator, -0.1, cycle.unknowns, (cycle.amplitude, AT), 10)
     assert points[-1].amplitude == pytest.approx(AT, rel=1e-12)
     assert points[-1].level == pytest.approx(-LARGEST, abs=6e-8)
     # the limit of the damper scales all amplitudes: with c as it is, that of a cycle is proportional to it
-    scaled = parameter_over_amplitude(
-        problem, "limit", 0.1, cycle.unknowns, (cycle.amplitude, 3 * cycle.amplitude), 5
-    )
-    assert [p.level for p in scaled] == pytest.approx(
-        [0.1 * p.amplitude / cycle.amplitude for p in scaled], rel=1e-7
-    )
+    scaled = parameter_over_amplitude(problem, "limit", 0.1, cycle.unknowns, (cycle.amplitude, 3 * cycle.amplitude), 5)
+    assert [p.level for p in scaled] == pytest.approx([0.1 * p.amplitude / cycle.amplitude for p in scaled], rel=1e-7)
 
 
 def test_harmonics_are_raised_until_the_amplitude_stays_and_multipliers_say_what_the_slope_says():
@@ -165,8 +157,12 @@ def test_time_integration_goes_to_the_stable_cycle_and_away_from_the_unstable_on
     system, load = oscillator(c)
 
     def marched(cycle, factor, periods, settles=0.0):
-        start = start_from_harmonics(factor * cycle.coefficients, cycle.omega, system.interface.gap_operator, system.interface.laws)  # fmt: skip
-        return march_periods(system.structure, system.interface, load, cycle.omega, np.array([0]), start, periods, 1024, settles=settles)  # fmt: skip
+        start = start_from_harmonics(
+            factor * cycle.coefficients, cycle.omega, system.interface.gap_operator, system.interface.laws
+        )
+        return march_periods(
+            system.structure, system.interface, load, cycle.omega, np.array([0]), start, periods, 1024, settles=settles
+        )
 
     for factor in (0.8, 1.3):
         found = marched(small, factor, 60)
@@ -187,7 +183,7 @@ def test_where_slip_begins_is_found_beside_a_large_static_displacement():
     structure = lumped(np.eye(2), np.diag([1.0, 4.0]), np.diag([-0.1, 0.1]))
     system = System(structure, Interface(("slips", "sticks"), laws, gap), np.array([0]))
     load = HarmonicLoad(np.array([0.0, 1e4]))
-    problem = self_excited_motions(system, load, stuck_modes(system, 1)[0], 0, Discretisation(order=1))  # fmt: skip
+    problem = self_excited_motions(system, load, stuck_modes(system, 1)[0], 0, Discretisation(order=1))
     slips = slip_amplitude(problem)
     assert slips == pytest.approx(0.2, rel=0.02)
     points = damping_over_amplitude(problem, (0.5 * slips, 100.0 * slips), 20)
@@ -218,7 +214,7 @@ def test_what_has_no_limit_cycle_is_refused():
 @pytest.mark.parametrize("how", ["one structure", "modal waves", "solved waves"])
 def test_damping_by_mass_is_that_of_matrices_with_it(how):
     rng, rate = np.random.default_rng(3), 0.07
-    root = rng.normal(size=(7, 7)) + (0j if how == "one structure" else 1j) * rng.normal(size=(7, 7))  # fmt: skip
+    root = rng.normal(size=(7, 7)) + (0j if how == "one structure" else 1j) * rng.normal(size=(7, 7))
     root = root.real if how == "one structure" else root
     stiffness, mass = root @ root.conj().T + np.eye(7), np.diag(rng.uniform(1, 2, 7))
     damping = 0.02 * stiffness + (0.05 * rng.normal(size=(7, 7)) if how == "solved waves" else 0.0)

@@ -121,9 +121,7 @@ def test_complex_unsymmetric_matrices_against_direct_solutions(side):
     assert isinstance(linear, TravellingStiffness)
     far = np.setdiff1d(np.arange(N), NEAR)
     rng = np.random.default_rng(5)
-    q = rng.standard_normal((ORDER + 1, NEAR.size)) + 1j * rng.standard_normal(
-        (ORDER + 1, NEAR.size)
-    )
+    q = rng.standard_normal((ORDER + 1, NEAR.size)) + 1j * rng.standard_normal((ORDER + 1, NEAR.size))
     q[0] = q[0].real
     found, moved = linear.condensed(OMEGA, ORDER), linear.recover(OMEGA, q)
     changed = linear.recover_change(OMEGA, q)
@@ -179,18 +177,12 @@ def test_derivatives_and_products_of_complex_unsymmetric_matrices(side):
     products = linear.products(OMEGA, harmonics_of((1, 3)))
     rng = np.random.default_rng(2)
     rows, other = rng.standard_normal((2, 5, NEAR.size))
-    whole = StructuredJacobian(
-        products, np.zeros((0, 5, 5, 5)), _no_contacts(), 1.0
-    ).dense()  # the real form of Z
+    whole = StructuredJacobian(products, np.zeros((0, 5, 5, 5)), _no_contacts(), 1.0).dense()  # the real form of Z
     np.testing.assert_allclose(products.product(rows).ravel(), whole @ rows.ravel(), atol=1e-12)
-    np.testing.assert_allclose(
-        products.transposed_product(other).ravel(), whole.T @ other.ravel(), atol=1e-12
-    )
+    np.testing.assert_allclose(products.transposed_product(other).ravel(), whole.T @ other.ravel(), atol=1e-12)
     slope = products.product_and_slope(rows)[1]
     ahead, behind = (linear.products(OMEGA + d, harmonics_of((1, 3))) for d in (step, -step))
-    np.testing.assert_allclose(
-        slope, (ahead.product(rows) - behind.product(rows)) / (2 * step), atol=1e-7
-    )
+    np.testing.assert_allclose(slope, (ahead.product(rows) - behind.product(rows)) / (2 * step), atol=1e-7)
 
 
 def _no_contacts():
@@ -205,9 +197,7 @@ def test_a_forced_response_with_complex_unsymmetric_matrices(side):
     operator[0, 1], operator[2, 4] = 1.0, 1.0
     law = ElasticCoulomb(k_t=2.0, k_w=0.0, k_n=1.0, mu=0.3, preload=0.5)
     system = System(side, Interface(("c",), (law,), operator), np.array([0, 1]))
-    sweep = Sweep(
-        omega_range=(0.6, 0.8), at=(0.6, OMEGA), low=3, high=4, selection="jacobian_alert", peak_points=0
-    )  # fmt: skip
+    sweep = Sweep(omega_range=(0.6, 0.8), at=(0.6, OMEGA), low=3, high=4, selection="jacobian_alert", peak_points=0)
     load = some_load()
     problem = forced_problem(system, load, sweep)
     points = accepted_points(list(forced_response(system, load, sweep)))
@@ -242,9 +232,7 @@ def lopsided(sectors=5):
     rng = np.random.default_rng(7)
     more = rng.standard_normal((2, free.n, free.n)) / free.n
     stiffness = dense(free.stiffness) + 0.3 * (more[0] + 1j * more[1])
-    structure = replace(
-        free, stiffness=stiffness, mass=dense(free.mass), damping=dense(free.damping)
-    )
+    structure = replace(free, stiffness=stiffness, mass=dense(free.mass), damping=dense(free.damping))
     return replace(sector, structure=structure), low, high
 
 
@@ -308,10 +296,7 @@ def test_krylov_steps_on_a_wheel_are_those_of_arrays():
     linear = system.condensed(load, 3)
     assert isinstance(linear, TravellingStiffness)
     omega = 2 * math.pi * 624
-    made = {
-        form: harmonic_balance(linear, system.interface, 3, 64, "events", form)
-        for form in ("dense", "structured")
-    }
+    made = {form: harmonic_balance(linear, system.interface, 3, 64, "events", form) for form in ("dense", "structured")}
     x = np.random.default_rng(0).standard_normal(made["dense"].size)
     one, other = (made[form].linearise(x, omega) for form in ("dense", "structured"))
     assert isinstance(other.jac, StructuredJacobian)
@@ -324,10 +309,7 @@ def test_krylov_steps_on_a_wheel_are_those_of_arrays():
     krylov = Krylov()
     ends = [
         ss.solve.newton(lambda y, b=b: b.linearise(y, omega), np.zeros(x.size), options)
-        for b, options in (
-            (made["dense"], FINE),
-            (made["structured"], replace(FINE, linear=krylov)),
-        )
+        for b, options in ((made["dense"], FINE), (made["structured"], replace(FINE, linear=krylov)))
     ]
     assert all(end.status.converged for end in ends)
     assert krylov.counts.products > 0
@@ -349,9 +331,7 @@ def test_a_peak_of_a_wheel_is_tracked(condition):
         laws = (Jenkins(k_t=2e7, limit=limit),)
         changed = replace(system, interface=replace(system.interface, laws=laws))
         at = tuple(float(peak.omega * (1 + s)) for s in (-2e-4, 0.0, 2e-4))
-        sweep = Sweep(
-            omega_range=span, at=at, low=3, high=3, samples=64, selection="always_low", peak_points=0
-        )  # fmt: skip
+        sweep = Sweep(omega_range=span, at=at, low=3, high=3, samples=64, selection="always_low", peak_points=0)
         problem = forced_problem(changed, load, sweep)
         points = accepted_points(list(forced_response(changed, load, sweep)))
         below, top, above = map(problem.amplitude, points)
@@ -381,20 +361,16 @@ def test_rigid_contacts_between_the_sectors_of_a_wheel():
 
     one = answered(
         side, Interface(names, (law,), operator), HarmonicLoad(np.zeros(side.n), {1: side.project(force, 1)})
-    )  # fmt: skip
+    )
     assert np.any(one.state == 1)
     assert np.any(one.state == 0)
     whole = reduced_wheel(sector, np.concatenate([low, high]), sector.independent.size - 6)
     pairs = ss.contact.neighbour_interface(whole.structure, sectors, law, **PLACE)
-    structure, gap = ss.reduction.in_relative_coordinates(
-        whole.structure, pairs.gap_operator, pairs.names
-    )
+    structure, gap = ss.reduction.in_relative_coordinates(whole.structure, pairs.gap_operator, pairs.names)
     load = whole.load(force, m)
     turned = structure.basis.T @ load
     everything = answered(
-        structure,
-        Interface(pairs.names, pairs.laws, gap),
-        HarmonicLoad(np.zeros(structure.n), {1: turned}),
+        structure, Interface(pairs.names, pairs.laws, gap), HarmonicLoad(np.zeros(structure.n), {1: turned})
     )
     scale = np.abs(one.contact_force).max()
     assert np.abs(everything.contact_force[0] - one.contact_force[0]).max() < 1e-6 * scale

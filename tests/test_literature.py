@@ -34,18 +34,12 @@ def test_two_uncoupled_springs_on_a_circle_are_not_a_planar_law():
     assert abs(force[1, 0] / 2 - (0.25 + 0.43301270j)) > 0.2  # the coupled law's
 
 
-@pytest.mark.parametrize(
-    "row", case_b3_blade_with_damper.RESPONSE, ids=lambda row: f"fc={row[0]}-W={row[1]}"
-)
+@pytest.mark.parametrize("row", case_b3_blade_with_damper.RESPONSE, ids=lambda row: f"fc={row[0]}-W={row[1]}")
 def test_blade_with_friction_damper_at_one_and_eleven_harmonics(row):
     limit, omega = float(row[0]), float(row[1])
     # half a unit of the last digit printed
-    assert case_b3_blade_with_damper.response(limit, omega, 1) == pytest.approx(
-        float(row[2]), abs=5.01e-9
-    )
-    assert case_b3_blade_with_damper.response(limit, omega, 11) == pytest.approx(
-        float(row[3]), abs=5.01e-9
-    )
+    assert case_b3_blade_with_damper.response(limit, omega, 1) == pytest.approx(float(row[2]), abs=5.01e-9)
+    assert case_b3_blade_with_damper.response(limit, omega, 11) == pytest.approx(float(row[3]), abs=5.01e-9)
 
 
 def test_peak_of_the_blade_with_its_best_damper():
@@ -70,10 +64,7 @@ def test_time_integration_of_the_blade_damper_blade():
 
 
 def test_natural_frequencies_of_the_blade_damper_blade():
-    for stuck, printed in (
-        (True, case_b6_blade_damper_blade.STUCK),
-        (False, case_b6_blade_damper_blade.FRICTIONLESS),
-    ):
+    for stuck, printed in ((True, case_b6_blade_damper_blade.STUCK), (False, case_b6_blade_damper_blade.FRICTIONLESS)):
         ours = case_b6_blade_damper_blade.frequencies(stuck=stuck)
         assert ours == pytest.approx([float(f) for f in printed], abs=5.1e-6)
 
@@ -87,9 +78,7 @@ def test_alert_prediction_and_real_error(hertz):
     half_unit = 0.5 * 10.0 ** -len(predicted.split(".")[1])
     assert 100 * low.predicted_error == pytest.approx(float(predicted), abs=1.001 * half_unit)
     half_unit = 0.5 * 10.0 ** -len(real.split(".")[1])
-    assert 100 * case_b7_alert.real_error(problem, low, high) == pytest.approx(
-        float(real), abs=1.001 * half_unit
-    )
+    assert 100 * case_b7_alert.real_error(problem, low, high) == pytest.approx(float(real), abs=1.001 * half_unit)
 
 
 def test_below_the_threshold_does_not_mean_below_it_in_truth():
@@ -117,8 +106,6 @@ def test_residual_traction_changes_the_response_where_contacts_stick():
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(
-    "case", [case_b7_alert, case_b8_residual_traction], ids=lambda case: case.__name__
-)
+@pytest.mark.parametrize("case", [case_b7_alert, case_b8_residual_traction], ids=lambda case: case.__name__)
 def test_every_row_holds(case):
     assert [r["quantity"] for r in case.run() if not r["holds"]] == []

@@ -110,9 +110,7 @@ def test_grolet_keeps_what_the_tangent_foretells_for_each_coordinate(threshold):
     right = -by_omega.reshape(-1) / (2 * size) * (step.next_omega - step.omega)
     ahead = rows + np.linalg.solve(jacobian(), right).reshape(rows.shape)
     shares = np.array([share_of_each(ahead, h) for h in range(ORDER + 1)])
-    expected = tuple(
-        tuple(h for h in range(ORDER + 1) if h < 2 or shares[h, i] > threshold) for i in range(6)
-    )
+    expected = tuple(tuple(h for h in range(ORDER + 1) if h < 2 or shares[h, i] > threshold) for i in range(6))
     verdict = Grolet(threshold=threshold, per_dof=True).judge(step)
     assert verdict.indicator == pytest.approx(shares[[2, 4, 5]].max(), rel=1e-4)
     assert verdict.following_by_dof == expected
@@ -127,7 +125,7 @@ def two_masses():
     """A mass on a slider beside a mass on a spring, which do not hear each other."""
     structure = ss.model.lumped(
         mass=np.eye(2), stiffness=np.diag([1.0, 1.3]), damping=0.02 * np.eye(2), names=("rubs", "hangs")
-    )  # fmt: skip
+    )
     gap = np.zeros((6, 2))
     gap[0, 0] = gap[3, 1] = 1.0
     laws = ss.Jenkins(k_t=0.5, limit=0.03), ss.Bonded(k_t=0.2, k_w=0.0, k_n=0.0)
@@ -167,7 +165,7 @@ def test_through_the_frequencies_and_taken_up_again():
     assert wrong.max() < 0.02
     sweep = ss.Sweep(
         omega_range=(155 * HZ, 173 * HZ), frequencies=7, selection=strategy, high=5, passages="single", peak_points=0
-    )  # fmt: skip
+    )
     points = list(forced_response(system, load, sweep))
     assert any(p.by_dof is not None for p in points)
     for done in (1, 3, len(points) - 1):

@@ -117,7 +117,7 @@ def test_machine_in_series_is_taken_out_where_it_is_given() -> None:
     assert rigid.k_t == pytest.approx(1 / (1 / K + 1 / machine), rel=1e-9)
     assert "cannot tell the contact from the machine" in said(rigid)
     noise = noisy(force)
-    series, own = (ss.contact.fit_loops([(measured, noise)], machine_stiffness=k) for k in (None, machine))  # fmt: skip
+    series, own = (ss.contact.fit_loops([(measured, noise)], machine_stiffness=k) for k in (None, machine))
     fit = ss.contact.fit_loops([(measured, force)], machine_stiffness=machine)
     assert fit.k_t == pytest.approx(K, rel=1e-9)
     assert "machine" not in said(fit)
@@ -135,7 +135,7 @@ def test_without_a_normal_load_only_the_limit_is_told() -> None:
     assert math.isnan(fit.mu)
     assert fit.limit == pytest.approx(LIMIT, abs=4 * fit.deviations["limit"])
     assert "normal load is not given" in said(fit)
-    loaded = ss.contact.fit_loops([(x, noisy(force))], normal_load=100.0, normal_load_deviation=10.0)  # fmt: skip
+    loaded = ss.contact.fit_loops([(x, noisy(force))], normal_load=100.0, normal_load_deviation=10.0)
     assert loaded.deviations["mu"] == pytest.approx(0.05, rel=0.01)
 
 
@@ -243,14 +243,12 @@ def test_the_command_prints_estimates_and_lines_for_the_study(tmp_path: Path) ->
     words = ["fit", str(recorded(tmp_path)), "--normal-load", "100", "--normal-load-deviation", "1"]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    value, off = map(float, re.search(r"friction coefficient\s+(\S+) ± (\S+)", done.output).groups())  # fmt: skip
+    value, off = map(float, re.search(r"friction coefficient\s+(\S+) ± (\S+)", done.output).groups())
     assert value == pytest.approx(0.5, abs=0.003)
     assert off == pytest.approx(0.005, rel=0.1)
     lines = done.output.split("study file\n")[1].split("\nFiles")[0]
     keys = tomllib.loads(lines)
-    table = ContactTable.model_validate(
-        keys | {"between": ["a.tip", "b.tip"], "normal_stiffness_n_per_m": 1e7}
-    )
+    table = ContactTable.model_validate(keys | {"between": ["a.tip", "b.tip"], "normal_stiffness_n_per_m": 1e7})
     assert table.law == "elastic_coulomb"
     assert keys["tangential_stiffness_n_per_m"] == pytest.approx(K, rel=0.02)
     page = (tmp_path / "loops.fit.html").read_text()
@@ -278,13 +276,14 @@ def test_without_a_load_the_lines_are_those_of_a_constant_limit(tmp_path: Path) 
         ("force_n,force_n\n1,2\n", "names the column 'force_n' twice"),
         ("displacement_um,displacement_m,force_n\n1,1,2\n", "has both displacement_m and displacement_um"),
         ("displacement_um,force_n\n", "holds no numbers"),
-        ("loop,displacement_um,force_n\na,1,1\nb,2,2\na,3,3\n", "line 4: loop: comes back to an earlier recording, got 'a'"),
+        (
+            "loop,displacement_um,force_n\na,1,1\nb,2,2\na,3,3\n",
+            "line 4: loop: comes back to an earlier recording, got 'a'",
+        ),
         ("displacement_um,force_n\n1,2\n2,3\n", "loops.csv.0.: has 2 samples"),
     ],
-)  # fmt: skip
-def test_a_file_that_cannot_be_read_is_named_with_line_and_column(
-    tmp_path: Path, text: str, message: str
-) -> None:
+)
+def test_a_file_that_cannot_be_read_is_named_with_line_and_column(tmp_path: Path, text: str, message: str) -> None:
     done = CliRunner().invoke(app, ["fit", str(write(tmp_path, text))])
     assert done.exit_code == 2
     assert re.search(message, done.stderr), done.stderr
@@ -301,7 +300,7 @@ def test_recordings_of_a_file_are_told_apart(tmp_path: Path) -> None:
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_marks_and_line_ends_of_other_programs_are_read(tmp_path: Path, end: str) -> None:
     path = tmp_path / "loops.csv"
-    path.write_bytes(b"\xef\xbb\xbf" + end.join(["Displacement_um, Force_N", "1, 2", "", "3,4"]).encode())  # fmt: skip
+    path.write_bytes(b"\xef\xbb\xbf" + end.join(["Displacement_um, Force_N", "1, 2", "", "3,4"]).encode())
     ((x, force),) = ss.model.read_loops(path)
     np.testing.assert_allclose(x, [1e-6, 3e-6])
     np.testing.assert_allclose(force, [2.0, 4.0])

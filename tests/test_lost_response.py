@@ -38,7 +38,7 @@ def test_a_response_that_cannot_begin_has_a_result_a_page_and_a_verdict(
         yield
 
     monkeypatch.setattr(analysis, "forced_response", fails)
-    study = write_four_masses(tmp_path, FEW | {"vary.load.shaker.force_n": "[1.0]", "harmonics.high": high})  # fmt: skip
+    study = write_four_masses(tmp_path, FEW | {"vary.load.shaker.force_n": "[1.0]", "harmonics.high": high})
     for _ in range(2):  # the second time from the files
         code, told, result = run(study)
         data = result["forced_response"]
@@ -63,7 +63,7 @@ def test_a_response_without_a_converged_point_has_a_result_a_page_and_a_verdict(
         return found
 
     monkeypatch.setattr(HarmonicBalance, "linearise", lost)
-    code, told, result = run(write_four_masses(tmp_path, FEW | {"vary.load.shaker.force_n": "[1.0]"}))  # fmt: skip
+    code, told, result = run(write_four_masses(tmp_path, FEW | {"vary.load.shaker.force_n": "[1.0]"}))
     assert code == 1
     assert "no point converged: there is no peak" in told
     assert np.all(result["forced_response"]["status"].values != 0)

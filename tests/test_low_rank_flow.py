@@ -5,14 +5,7 @@ import pytest
 
 from stickslip.response.stability import low_rank_flow
 from stickslip.response.stability.contact_states import ContactStates
-from stickslip.response.stability.low_rank_flow import (
-    HYPERBOLA,
-    NODES,
-    REACH,
-    FullFlow,
-    LowRankFlow,
-    flow_of,
-)
+from stickslip.response.stability.low_rank_flow import HYPERBOLA, NODES, REACH, FullFlow, LowRankFlow, flow_of
 from stickslip.response.stability.modal_states import ModalStates
 from stickslip.response.stability.propagation import transition
 
@@ -24,9 +17,7 @@ def states(held=1.0, damping=2e-3):
     rng = np.random.default_rng(3)
     speed = np.geomspace(1.0, 800.0, N)
     gaps = 0.2 * rng.standard_normal((6, N)) * speed**0.5
-    modes = ModalStates(
-        1.0, held * np.diag(speed**2), np.diag(0.01 + damping * speed**2), speed, gaps, np.eye(N)
-    )
+    modes = ModalStates(1.0, held * np.diag(speed**2), np.diag(0.01 + damping * speed**2), speed, gaps, np.eye(N))
     length = 2.0 * np.pi / 24.0
     stick = np.arange(24) % 4 != 1
     open_ = np.arange(24) % 6 == 5
@@ -55,9 +46,7 @@ def test_nodes_are_exact_within_the_hyperbola():
     z, weights = (values[:NODES] for values in HYPERBOLA)
     along, down = np.linspace(0.0, REACH, 40), np.geomspace(1e-3, 1e5, 60)
     inside = np.concatenate([1j * along, -down, 1j * REACH - down * (1.0 + 1j), 1j * along - 1.0])
-    found = np.sum(
-        weights / (z - inside[:, None]) + weights.conj() / (z.conj() - inside[:, None]), 1
-    )
+    found = np.sum(weights / (z - inside[:, None]) + weights.conj() / (z.conj() - inside[:, None]), 1)
     np.testing.assert_allclose(0.5 * found, np.exp(inside), atol=5e-13)
 
 

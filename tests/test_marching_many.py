@@ -16,15 +16,11 @@ def lifted(damping: float = 0.0) -> Marcher:
     plates = two_plates(12)
     system, load = plates.system, plates.load(0.3)
     structure = system.structure
-    own = (
-        structure.damping.toarray() if hasattr(structure.damping, "toarray") else structure.damping
-    )
+    own = structure.damping.toarray() if hasattr(structure.damping, "toarray") else structure.damping
     own = own.copy()
     own[system.outputs[2], system.outputs[2]] += damping
     interface = system.interface
-    return prepared(
-        replace(structure, damping=own), interface.gap_operator, interface.laws, load, OMEGA, STEPS
-    )
+    return prepared(replace(structure, damping=own), interface.gap_operator, interface.laws, load, OMEGA, STEPS)
 
 
 def marched(marcher: Marcher) -> np.ndarray:
@@ -47,9 +43,7 @@ def test_correcting_rows_of_newtons_matrix_is_factoring_it() -> None:
     assert changes.taken[0] > 0 or np.any(changes.unit)  # and rows were corrected
     laws, newton = lifted()._work
     none = newton.changes._replace(
-        row=np.zeros(0, dtype=np.int64),
-        unit=np.zeros((0, marcher.k)),
-        less=np.zeros((0, marcher.k)),
+        row=np.zeros(0, dtype=np.int64), unit=np.zeros((0, marcher.k)), less=np.zeros((0, marcher.k))
     )
     anew = marched(replace(marcher, _work=(laws, newton._replace(changes=none))))
     size = np.abs(anew).max(axis=0)

@@ -95,8 +95,13 @@ def test_the_result_keeps_them_with_their_source(run: tuple[Path, ss.Result]) ->
     assert "standard deviation" in data["measured_amplitude_error"].attrs["long_name"]
     table = result.measured
     assert table.keys() == [
-        KEY, "excitation (N)", "frequency (Hz)", "its half-width (Hz)", "amplitude (m)", "its standard deviation (m)",
-    ]  # fmt: skip
+        KEY,
+        "excitation (N)",
+        "frequency (Hz)",
+        "its half-width (Hz)",
+        "amplitude (m)",
+        "its standard deviation (m)",
+    ]
     np.testing.assert_allclose(table["frequency (Hz)"], [13.8, 13.2, 12.9, np.nan])
     assert len(ss.Result(result.data).measured) == 4
 
@@ -108,9 +113,7 @@ def test_other_points_cost_no_other_computation(run: tuple[Path, ss.Result], cap
     (path.parent / "peaks.csv").write_text(FILE)
     assert "jobs to do: 0" in (path.parent / "results" / "run.log").read_text()
     assert list(again.measured[KEY]) == [4]
-    np.testing.assert_array_equal(
-        again["forced_response"].amplitude, before["forced_response"].amplitude
-    )
+    np.testing.assert_array_equal(again["forced_response"].amplitude, before["forced_response"].amplitude)
     assert [t.xaxis for t in again.plot("optimisation").data if t.name == "measured"] == ["x2"]
 
 
@@ -137,11 +140,12 @@ def test_forces_of_values_between_the_cases_are_those_of_the_study(tmp_path: Pat
 def test_a_force_that_depends_on_more_than_the_file_tells_is_refused(tmp_path: Path) -> None:
     more = f'[[vary]]\nload.second.force_n = [1.0, 9.0]\n[load.second]\non = "chain.m2"\nforce_n = 1.0\n{TABLE}'
     path = write(tmp_path, f"{KEY},peak_amplitude_mm\n3,1\n", ("\n[vary]", "\n[[vary]]"), more)
-    with pytest.raises(InputError, match=r"line 2: the force depends on load.second.force_n, which the file does not tell. Add a column"):  # fmt: skip
+    with pytest.raises(
+        InputError,
+        match=r"line 2: the force depends on load.second.force_n, which the file does not tell. Add a column",
+    ):
         measured_peaks(read_file(path))
-    (tmp_path / "peaks.csv").write_text(
-        f"{KEY},load.second.force_n,peak_amplitude_mm\n3,1,1\n3,9,1\n"
-    )
+    (tmp_path / "peaks.csv").write_text(f"{KEY},load.second.force_n,peak_amplitude_mm\n3,1,1\n3,9,1\n")
     np.testing.assert_allclose(measured_peaks(read_file(path)).excitation, [3.0, 9.0])
 
 
@@ -166,23 +170,47 @@ def test_points_of_other_varied_keys_go_to_their_curves(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{KEY},peak_amplitude_um\n1,x\n", "peaks.csv: line 2: peak_amplitude_um: is no finite number, got 'x'. Leave the cell empty"),
+        (
+            f"{KEY},peak_amplitude_um\n1,x\n",
+            "peaks.csv: line 2: peak_amplitude_um: is no finite number, got 'x'. Leave the cell empty",
+        ),
         (f"{KEY},peak_amplitude_um\n\n1,-3\n", "peaks.csv: line 3: peak_amplitude_um: must be above zero, got '-3'"),
-        (f"{KEY},peak_amplitude_um,peak_amplitude_std_um\n1,3,-1\n", "line 2: peak_amplitude_std_um: must not be negative, got '-1'"),
-        (f"{KEY},peak_amplitude_um,peak_amplitud_std_um\n1,3,1\n", "line 1: has a column 'peak_amplitud_std_um'.*Did you mean 'peak_amplitude_std_um'"),
-        (f"{KEY},peak_amplitude_um,run\n1,3,1\n", f"line 1: has a column 'run', which is not known. The columns are {KEY}, peak_amplitude_um"),
-        ("load.shaker.forc_n,peak_amplitude_um\n1,3\n", f"line 1: has no column {KEY}. Did you mean 'load.shaker.forc_n'"),
+        (
+            f"{KEY},peak_amplitude_um,peak_amplitude_std_um\n1,3,-1\n",
+            "line 2: peak_amplitude_std_um: must not be negative, got '-1'",
+        ),
+        (
+            f"{KEY},peak_amplitude_um,peak_amplitud_std_um\n1,3,1\n",
+            "line 1: has a column 'peak_amplitud_std_um'.*Did you mean 'peak_amplitude_std_um'",
+        ),
+        (
+            f"{KEY},peak_amplitude_um,run\n1,3,1\n",
+            f"line 1: has a column 'run', which is not known. The columns are {KEY}, peak_amplitude_um",
+        ),
+        (
+            "load.shaker.forc_n,peak_amplitude_um\n1,3\n",
+            f"line 1: has no column {KEY}. Did you mean 'load.shaker.forc_n'",
+        ),
         (f"{KEY},note\n1,3\n", "has neither peak amplitudes nor frequencies. Add a column such as peak_amplitude_um"),
         (f"{KEY},peak_amplitude_um,peak_frequency_hz\n1,,\n", "line 2: has neither amplitude nor frequency"),
         (f"{KEY},peak_amplitude_um,peak_amplitude_mm\n1,1,1\n", "has both peak_amplitude_mm and peak_amplitude_um"),
-        (f"{KEY},peak_amplitude_um,peak_amplitude_um_per_n\n1,1,1\n", "has both peak_amplitude_um and peak_amplitude_um_per_n"),
-        (f"{KEY},peak_amplitude_um,peak_amplitude_std_um_per_n\n1,1,1\n", "peak_amplitude_std is in m/N, peak_amplitude in m"),
-        (f"{KEY},peak_amplitude_um,peak_amplitude_std_um,peak_amplitude_half_width_um\n1,1,1,1\n", "has both peak_amplitude_std and peak_amplitude_half_width"),
+        (
+            f"{KEY},peak_amplitude_um,peak_amplitude_um_per_n\n1,1,1\n",
+            "has both peak_amplitude_um and peak_amplitude_um_per_n",
+        ),
+        (
+            f"{KEY},peak_amplitude_um,peak_amplitude_std_um_per_n\n1,1,1\n",
+            "peak_amplitude_std is in m/N, peak_amplitude in m",
+        ),
+        (
+            f"{KEY},peak_amplitude_um,peak_amplitude_std_um,peak_amplitude_half_width_um\n1,1,1,1\n",
+            "has both peak_amplitude_std and peak_amplitude_half_width",
+        ),
         (f"{KEY},peak_amplitude_um,excitation_n\n1,1,0\n", "line 2: excitation_n: must be above zero, got '0'"),
         (f"{KEY},peak_amplitude_um\n1,1,1\n", "line 2: has 3 cells, the first line 2"),
         (f"{KEY},peak_amplitude_um\n", "holds no numbers"),
     ],
-)  # fmt: skip
+)
 def test_a_file_is_refused_with_line_column_and_value_before_anything_is_computed(
     tmp_path: Path, text: str, message: str
 ) -> None:
@@ -200,12 +228,14 @@ def test_a_file_is_refused_with_line_column_and_value_before_anything_is_compute
         ("file =", "fil =", r"measured.fil: unknown key 'fil'. Did you mean 'file'"),
         (f"{KEY} = [1.0, 3.0, 5.0]", "", "measured: has nothing to be drawn over: .vary. varies no number"),
         (f"[forced_response]\nfrequency_hz = {QUICK}", "[modes]", "has peaks, and the study computes none"),
-        (f"{KEY} = [1.0, 3.0, 5.0]", f'{KEY} = [1.0, 3.0]\nmeasured.source = ["a", "b"]', "measured: is varied. Leave it out"),
+        (
+            f"{KEY} = [1.0, 3.0, 5.0]",
+            f'{KEY} = [1.0, 3.0]\nmeasured.source = ["a", "b"]',
+            "measured: is varied. Leave it out",
+        ),
     ],
-)  # fmt: skip
-def test_a_table_without_what_it_needs_is_refused(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+)
+def test_a_table_without_what_it_needs_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     path = write(tmp_path, FILE, (old, new))
     with pytest.raises(InputError, match=message):
         ss.Study.from_file(path)

@@ -30,9 +30,7 @@ def volumes(mesh):
 def test_contact_nodes_are_the_dampers_points(mesh):
     points = FlatCurvedDamper().contact_points()
     # blade 2 is a copy moved by the pitch: one rounding each way
-    np.testing.assert_allclose(
-        mesh.points[mesh.node_sets["contact"]], points.position, rtol=0, atol=1e-16
-    )
+    np.testing.assert_allclose(mesh.points[mesh.node_sets["contact"]], points.position, rtol=0, atol=1e-16)
     lines = [mesh.node_sets[f"contact_{line}"] for line in ("L1", "L2", "R")]
     np.testing.assert_array_equal(np.concatenate(lines), mesh.node_sets["contact"])
 
@@ -101,17 +99,13 @@ def test_below_zero_the_force_stands_on_the_shank_away_from_the_damper():
     pair = BladePair(**COARSE, force_span=-0.25)
     mesh = mesh_blade_pair(pair, FlatCurvedDamper().contact_points())
     (force,) = mesh.points[mesh.node_sets["force"]]
-    np.testing.assert_allclose(
-        force, [-pair.shank_thickness / 2, 0.0, 0.75 * pair.shank_tops[1]], atol=1e-9
-    )
+    np.testing.assert_allclose(force, [-pair.shank_thickness / 2, 0.0, 0.75 * pair.shank_tops[1]], atol=1e-9)
 
 
 def test_meshing_in_a_thread_gives_the_same_mesh(mesh):
     made = []
     points = FlatCurvedDamper().contact_points()
-    thread = threading.Thread(
-        target=lambda: made.append(mesh_blade_pair(BladePair(**COARSE), points))
-    )
+    thread = threading.Thread(target=lambda: made.append(mesh_blade_pair(BladePair(**COARSE), points)))
     thread.start()
     thread.join()
     np.testing.assert_array_equal(made[0].points, mesh.points)
@@ -126,9 +120,7 @@ def test_written_mesh_reads_back(mesh, tmp_path, suffix):
     back = meshio.read(tmp_path / f"blades{suffix}")
     np.testing.assert_array_equal(back.points, mesh.points)
     np.testing.assert_array_equal(back.cells_dict["tetra10"], mesh.cells)
-    np.testing.assert_array_equal(
-        np.flatnonzero(back.point_data["contact"]), np.sort(mesh.node_sets["contact"])
-    )
+    np.testing.assert_array_equal(np.flatnonzero(back.point_data["contact"]), np.sort(mesh.node_sets["contact"]))
 
 
 def test_unknown_mesh_format_is_refused(mesh, tmp_path):
@@ -145,10 +137,7 @@ def test_unknown_mesh_format_is_refused(mesh, tmp_path):
         ({"pitch": 0.008}, "BladePair.pitch: 0.008 m leaves no room.*overlap"),
         ({"platform_height": 0.010}, "BladePair.platform_height.*above the foot"),
         ({"force_span": 0.5}, r"BladePair.force_span: must lie in \(-1, 0.5\), got 0.5"),
-        (
-            {"force_span": -1e-6},
-            "BladePair.force_span: -1e-06 puts the force 6.98e-08 m from an end",
-        ),
+        ({"force_span": -1e-6}, "BladePair.force_span: -1e-06 puts the force 6.98e-08 m from an end"),
         ({"force_span": -1 + 1e-9}, "BladePair.force_span: .*from an end of the shank"),
         ({"hub_chord": 0.060}, "overhangs the platform"),
         ({"foot_depth": 0.010}, "smaller than the shank"),

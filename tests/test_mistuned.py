@@ -65,10 +65,7 @@ def test_without_deviations_all_sectors_do_what_one_does(modes):
     assert wheel.output_labels[4] == "tip[1].y"
     assert np.allclose(wheel.static_force.reshape(SECTORS, -1, 3), tuned.static_force, rtol=1e-9)
     hertz = (2140.0, 2200.0)
-    every, one = (
-        answered(wheel.system, wheel.load, hertz),
-        answered(tuned.system, tuned.load, hertz),
-    )
+    every, one = (answered(wheel.system, wheel.load, hertz), answered(tuned.system, tuned.load, hertz))
     for all_of_them, mine in zip(every, one, strict=True):
         assert mine.energy.max() > 1e-4  # slips
         assert mine.forces[0, :, 2].max() > -20.0  # a point is open for a part of the period
@@ -86,10 +83,7 @@ def assembled_wheel(mesh, model, matrices):
     whole, nodes = whole_wheel(mesh)
     full = rotating_solid(whole, STEEL).structure
     own = model.parts["blade"].structure
-    place = {
-        (int(n), c): i
-        for i, (n, c) in enumerate(zip(own.dofs.node, own.dofs.component, strict=True))
-    }
+    place = {(int(n), c): i for i, (n, c) in enumerate(zip(own.dofs.node, own.dofs.component, strict=True))}
     members = np.unique(own.dofs.node)
     rows = np.array([[place[int(n), c] for c in "xyz"] for n in members])
     out = scipy.sparse.csr_array((full.n, full.n))
@@ -99,8 +93,7 @@ def assembled_wheel(mesh, model, matrices):
         blocks = np.broadcast_to(turn, (len(rows), 3, 3))
         at = (np.repeat(rows[:, :, None], 3, 2), np.repeat(columns[:, None, :], 3, 1))
         into = scipy.sparse.csr_array(
-            (blocks.transpose(0, 2, 1).ravel(), (at[0].ravel(), at[1].ravel())),
-            shape=(own.n, full.n),
+            (blocks.transpose(0, 2, 1).ravel(), (at[0].ravel(), at[1].ravel())), shape=(own.n, full.n)
         )
         out = out + into.T @ matrix @ into
     return full, nodes, scipy.sparse.csr_array(out)
@@ -110,11 +103,7 @@ def mistuned_model():
     model = replace(sector_model(shrouded_sector()), speed=0.0)
     mistuning = Mistuning(
         blades={"blade": BladeMistuning(of="blade", deviations=DEVIATIONS)},
-        contacts={
-            "worn": ContactMistuning(
-                contact="shroud", quantity="friction_coefficient", values=FRICTION
-            )
-        },
+        contacts={"worn": ContactMistuning(contact="shroud", quantity="friction_coefficient", values=FRICTION)},
     )
     return replace(model, mistuning=mistuning)
 
@@ -124,9 +113,7 @@ def test_a_mistuned_wheel_answers_as_its_sectors_assembled_one_by_one():
     model = mistuned_model()
     found = assemble(model, H)
     mesh, own = model.parts["blade"].mesh, model.parts["blade"].structure
-    full, nodes, stiffness = assembled_wheel(
-        mesh, model, [(1 + d) ** 2 * own.stiffness for d in DEVIATIONS]
-    )
+    full, nodes, stiffness = assembled_wheel(mesh, model, [(1 + d) ** 2 * own.stiffness for d in DEVIATIONS])
     damped = rayleigh_damping(full, 0.003, (500.0, 3000.0))
     structure = replace(damped, stiffness=stiffness)
     _, gaps = whole_with_gaps(model)
@@ -151,9 +138,7 @@ def test_a_mistuned_wheel_answers_as_its_sectors_assembled_one_by_one():
     hertz = (2140.0, 2142.0)
     mine = answered(found.system, found.load, hertz)
     theirs = answered(
-        system,
-        HarmonicLoad(small.project(static), {h: small.project(f) for h, f in force.items()}),
-        hertz,
+        system, HarmonicLoad(small.project(static), {h: small.project(f) for h, f in force.items()}), hertz
     )
     for one, other in zip(mine, theirs, strict=True):
         assert one.energy.max() > 1e-5
@@ -164,9 +149,7 @@ def test_a_mistuned_wheel_answers_as_its_sectors_assembled_one_by_one():
             back = Axis().rotation(-2 * math.pi * s / SECTORS)
             there = other.outputs[:, 3 * s : 3 * s + 3] @ back.T
             apart = np.abs(one.outputs[:, 3 * s : 3 * s + 3] - there).max()
-            assert apart <= math.sqrt(3) * allowed(
-                "outputs", one, other
-            )  # of one turned, the length
+            assert apart <= math.sqrt(3) * allowed("outputs", one, other)  # of one turned, the length
 
 
 def test_all_modes_of_a_blade_are_the_whole_blade_and_a_common_deviation_scales_its_frequencies():
@@ -203,7 +186,7 @@ def test_a_blade_with_the_cyclic_face_counts_what_both_sectors_do_to_it(modes):
     stiffness = stiffness.toarray()
     members = np.setdiff1d(members, mesh.node_sets["cyclic_high"])
     blades = [dofs_of(full, nodes[s, members]).ravel() for s in range(SECTORS)]
-    more = [((1 + d) ** 2 - 1) * around_one_blade(stiffness, b) for b, d in zip(blades, DEVIATIONS, strict=True)]  # fmt: skip
+    more = [((1 + d) ** 2 - 1) * around_one_blade(stiffness, b) for b, d in zip(blades, DEVIATIONS, strict=True)]
     whole = replace(full, stiffness=stiffness + sum(more))
     one = BladeMistuning(of="blade.inner", deviations=DEVIATIONS, modes=modes)
     wheel = assemble(replace(model, mistuning=Mistuning(blades={"b": one})), 2)
@@ -262,7 +245,7 @@ def test_a_blade_tied_to_both_neighbours_is_held_by_both(tmp_path, spring, measu
             row[place[(n + ahead) % 5][int(b == "tip")]] -= 1
             K += k * np.outer(row, row)
     assert blade_alone_hz(model, "wheel.tip", 1, "") == pytest.approx(alone, rel=1e-12)
-    more = [((1 + d) ** 2 - 1) * around_one_blade(K, [p[1]]) for p, d in zip(place, DEVIATIONS, strict=True)]  # fmt: skip
+    more = [((1 + d) ** 2 - 1) * around_one_blade(K, [p[1]]) for p, d in zip(place, DEVIATIONS, strict=True)]
     squares = scipy.linalg.eigh(K + sum(more), np.diag(np.tile([1.0, 0.3], 5)), eigvals_only=True)
     found = wheel_modes(model, 10, "open").frequencies_hz
     np.testing.assert_allclose(2 * np.pi * found, np.sqrt(squares), rtol=1e-10)
@@ -273,21 +256,13 @@ def test_a_sector_with_a_part_of_its_own_is_that_part():
     model = replace(sector_model(shrouded_sector()), speed=0.0)
     mesh = model.parts["blade"].mesh
     other = solid_part(mesh, Material(young_modulus=1.5e11, density=8200.0), sectors=SECTORS)
-    wheel = replace(
-        model, mistuning=Mistuning(own={"repaired": OwnSector(sector=3, part="blade", by=other)})
-    )
+    wheel = replace(model, mistuning=Mistuning(own={"repaired": OwnSector(sector=3, part="blade", by=other)}))
     old, new = model.parts["blade"].structure, other.structure
-    full, _, stiffness = assembled_wheel(
-        mesh, model, [(new if s == 3 else old).stiffness for s in range(SECTORS)]
-    )
-    _, _, mass = assembled_wheel(
-        mesh, model, [(new if s == 3 else old).mass for s in range(SECTORS)]
-    )
+    full, _, stiffness = assembled_wheel(mesh, model, [(new if s == 3 else old).stiffness for s in range(SECTORS)])
+    _, _, mass = assembled_wheel(mesh, model, [(new if s == 3 else old).mass for s in range(SECTORS)])
     found = assemble(wheel, 2).bare.structure
     whole = replace(full, stiffness=stiffness, mass=mass)
-    np.testing.assert_allclose(
-        natural_frequencies(found, 12), natural_frequencies(whole, 12), rtol=1e-9
-    )
+    np.testing.assert_allclose(natural_frequencies(found, 12), natural_frequencies(whole, 12), rtol=1e-9)
 
 
 def test_a_clearance_in_sectors_is_added_to_that_of_the_contact():
@@ -306,7 +281,7 @@ def test_a_clearance_in_sectors_is_added_to_that_of_the_contact():
     assert refused.value.place == "mistuning.g.quantity"
     # a preload of the law beside a clearance of the contact
     spring = ss.UnilateralSpring(k_n=1e6, preload=20.0)
-    assert at_rest("", Contact(between=("", ""), law=spring, gap=5e-5)).initial_gap == pytest.approx(3e-5)  # fmt: skip
+    assert at_rest("", Contact(between=("", ""), law=spring, gap=5e-5)).initial_gap == pytest.approx(3e-5)
     assert at_rest("", Contact(between=("", ""), law=spring, gap=1e-5)).preload == pytest.approx(10)
 
 
@@ -361,22 +336,14 @@ def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():
     for rate in (0.0, 25.0):
         fast = fast.with_mass_damping(rate)
         structure = wheel.structure
-        slow = condense(
-            replace(structure, damping=structure.damping + rate * structure.mass),
-            retained,
-            found.load,
-        )
+        slow = condense(replace(structure, damping=structure.damping + rate * structure.mass), retained, found.load)
         omega, rng = 2 * math.pi * 2150, np.random.default_rng(1)
         mine, theirs = fast.condensed(omega, H), slow.condensed(omega, H)
         for name in ("stiffness", "derivative", "load", "load_derivative"):
             a, b = getattr(mine, name), getattr(theirs, name)
             for h in range(H + 1):
-                assert np.abs(a[h] - b[h]).max() <= 1e-9 * max(
-                    np.abs(b[h]).max(), 1e-9 * np.abs(b).max()
-                )
-        q = rng.standard_normal((H + 1, retained.size)) + 1j * rng.standard_normal(
-            (H + 1, retained.size)
-        )
+                assert np.abs(a[h] - b[h]).max() <= 1e-9 * max(np.abs(b[h]).max(), 1e-9 * np.abs(b).max())
+        q = rng.standard_normal((H + 1, retained.size)) + 1j * rng.standard_normal((H + 1, retained.size))
         q[0] = q[0].real
         one_way, other = fast.products(omega, (0, 1, 2, 3)), slow.products(omega, (0, 1, 2, 3))
         rows = rng.standard_normal((7, retained.size))
@@ -384,10 +351,7 @@ def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():
             (fast.recover(omega, q), slow.recover(omega, q)),
             (fast.recover_change(omega, q), slow.recover_change(omega, q)),
             (fast.strain_energy(omega, q), slow.strain_energy(omega, q)),
-            (
-                fast.output_rows(omega, 2, found.bare.outputs),
-                slow.output_rows(omega, 2, found.bare.outputs),
-            ),
+            (fast.output_rows(omega, 2, found.bare.outputs), slow.output_rows(omega, 2, found.bare.outputs)),
             (one_way.product(rows), other.product(rows)),
             (one_way.transposed_product(rows), other.transposed_product(rows)),
             (one_way.product_and_slope(rows)[1], other.product_and_slope(rows)[1]),

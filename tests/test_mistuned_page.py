@@ -59,9 +59,7 @@ def test_a_tile_tells_amplification_and_largest_blade() -> None:
     shown = cards(Response(wheel()))
     (tile,) = (c for c in shown if "amplification" in c.label)
     assert tile.value == "1.5"
-    assert tile.note.startswith(
-        "largest: blade 2 for load.shaker.ratio = 5; smallest of 2 cases 1.25, blade 0"
-    )
+    assert tile.note.startswith("largest: blade 2 for load.shaker.ratio = 5; smallest of 2 cases 1.25, blade 0")
     (shift,) = (c for c in shown if "shift of the peak" in c.label)
     assert "Hz (tip[0].x) for" in shift.note
     assert "Hz (tip[2].x) for" in shift.note

@@ -149,9 +149,7 @@ def largest(damping: np.ndarray, deviations: np.ndarray) -> float:
     return float(np.abs(np.linalg.solve(stiffness, force[:, None])).max())
 
 
-def test_a_wheel_exceeds_whiteheads_factor_where_its_excited_wave_is_damped_eight_times_as_much() -> (
-    None
-):
+def test_a_wheel_exceeds_whiteheads_factor_where_its_excited_wave_is_damped_eight_times_as_much() -> None:
     """The bound supposes one damping of all waves: with it B12 stays far below; a blade that moves alone has that of the other waves."""
     even = np.full(12, 0.004)
     none, some = np.zeros(12), np.array(DEVIATIONS)
@@ -160,9 +158,7 @@ def test_a_wheel_exceeds_whiteheads_factor_where_its_excited_wave_is_damped_eigh
     assert largest(damped, some) / largest(damped, none) > 1.05 * whitehead(12)
 
 
-def test_measured_blades_are_taken_from_a_file(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_measured_blades_are_taken_from_a_file(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Deviations from the mean of each mode, or from the model's own blade; both means are told."""
     caplog.set_level(logging.INFO, "stickslip")
     hertz = (1.0 + np.linspace(-0.02, 0.02, 12)) * 0.16
@@ -252,10 +248,7 @@ def test_six_blades_that_differ_are_no_mistake(tmp_path: Path, more: str) -> Non
         (FILE.replace("one", "twice"), "line 8: mode: stands there twice for blade 3"),
         (FILE.replace("one", "still"), "line 4: frequency_hz: is no frequency"),
         (FILE.replace("one", "five"), "five.csv: has no frequency of blade 5, mode 1"),
-        (
-            FILE.replace("one", "later"),
-            "line 7: blade: .* got '6'. Blades count from 0, not from 1",
-        ),
+        (FILE.replace("one", "later"), "line 7: blade: .* got '6'. Blades count from 0, not from 1"),
         (FILE.replace("one", "late"), "of blade 0, mode 1, 1 missing.* number them 0 to 5"),
         # a spread in the wrong unit
         (STIFF + RANDOM + SPREAD + SPREAD_M, "c.standard_deviation_m: is 1e-06 beside .*stiffness"),
@@ -277,10 +270,7 @@ def test_six_blades_that_differ_are_no_mistake(tmp_path: Path, more: str) -> Non
         # parts of their own
         (OWN.replace("repaired", "wheel"), "mistuning.o.by: is 'wheel', the wheel's own part"),
         (REPAIRED + OWN + OWN.replace(".o]", ".p]"), "mistuning.p.sector: is 2, .* mistuning.o"),
-        (
-            REPAIRED.replace("= 6", "= 7") + OWN,
-            "mistuning.o.by: is 'repaired' of 7 sectors.* has 6",
-        ),
+        (REPAIRED.replace("= 6", "= 7") + OWN, "mistuning.o.by: is 'repaired' of 7 sectors.* has 6"),
         (
             REPAIRED.replace('"disk", "tip"]', '"tip", "disk"]', 1) + OWN,
             "mistuning.o.by: is 'repaired' with the masses tip, disk, and 'wheel'",
@@ -300,9 +290,7 @@ def test_what_is_no_mistuning_is_refused_by_its_key(tmp_path: Path, more: str, s
 
 
 def test_a_wheel_is_needed_for_mistuning(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"mistuning.scatter: is given, and the model is no sector"
-    ):
+    with pytest.raises(InputError, match=r"mistuning.scatter: is given, and the model is no sector"):
         study_of(tmp_path, RING.replace("sectors = 12\n", ""))
 
 
@@ -312,15 +300,11 @@ def test_a_repeated_pattern_and_a_seed_are_in_the_model(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, np.tile([0.01, -0.01], 6))
 
 
-def test_the_example_runs_small_and_a_worn_wheel_agrees_with_time_integration(
-    tmp_path: Path,
-) -> None:
+def test_the_example_runs_small_and_a_worn_wheel_agrees_with_time_integration(tmp_path: Path) -> None:
     """Eight blades, one frequency near the peak, dampers slipping: `--verify` integrates all of them."""
     text = (ROOT / "examples" / "mistuned_wheel" / "study.toml").read_text()
     head, _, _ = text.partition("[vary]")
-    small = head.replace("sectors = 24", "sectors = 8").replace(
-        "engine_order = 6", "engine_order = 2"
-    )
+    small = head.replace("sectors = 24", "sectors = 8").replace("engine_order = 6", "engine_order = 2")
     small = small.replace("frequency_hz = [195.0, 207.0]\npoints = 30", "frequencies_hz = [199.5]")
     path = tmp_path / "study.toml"
     path.write_text(small)

@@ -14,24 +14,14 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
-from stickslip.response.nonlinear_modes.backbone import (
-    Backbone,
-    ModePoint,
-    ModeSweep,
-    nonlinear_mode,
-)
+from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, nonlinear_mode
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
 from stickslip.response.nonlinear_modes.flanks import along, slips_from
 from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, with_others
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
-from stickslip.response.nonlinear_modes.synthesis import (
-    free_motions,
-    motions_at,
-    resonances,
-    synthesise,
-)
+from stickslip.response.nonlinear_modes.synthesis import free_motions, motions_at, resonances, synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.self_excited.modes import stuck_modes
@@ -115,13 +105,11 @@ def test_a_level_is_met_at_every_point_and_the_phase_is_that_of_the_force():
 def test_a_curve_passes_its_resonances_at_their_frequency_once_at_a_top():
     """A top is one point, between the rising and the falling side; a closed curve begins and ends at its least amplitude."""
     c, *_ = ONE[-1]
-    for own, level in ((modal_oscillator(b4(0.1), PUSH), 1.0), (modal_oscillator(b4(0.1, c, 2000), PUSH), 0.05)):  # fmt: skip
+    for own, level in ((modal_oscillator(b4(0.1), PUSH), 1.0), (modal_oscillator(b4(0.1, c, 2000), PUSH), 0.05)):
         found, met = synthesise(own, level), resonances(own, level)
         assert met
         for one in met:
-            assert found.omega[found.place == one.place].tolist() == [one.omega] * (
-                1 if one.top else 2
-            )
+            assert found.omega[found.place == one.place].tolist() == [one.omega] * (1 if one.top else 2)
 
 
 def test_a_hardening_spring_has_an_unstable_branch_between_its_folds():
@@ -166,12 +154,12 @@ def test_a_linear_passage_is_that_of_the_quadrature(seconds):
     system, load = oscillator(100.0, 0.01)
     ends = (70.0, 130.0)
     points = tuple(point(a, 100.0, 0.01) for a in np.geomspace(1e-6, 1.0, 8))
-    own = modal_oscillator(Backbone(system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 0, points, ""), load)  # fmt: skip
+    own = modal_oscillator(Backbone(system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 0, points, ""), load)
     found = passage_through_resonance(own, 1.0, Swept(ends=ends, rate=60.0 / seconds))
     time, exact = swept_by_quadrature(100.0, 0.01, ends, seconds)
     assert found.finished
     assert found.amplitude.max() == pytest.approx(abs(exact).max(), rel=1e-4)
-    assert found.amplitude == pytest.approx(np.interp(found.time, time, abs(exact)), abs=1e-4 * abs(exact).max())  # fmt: skip
+    assert found.amplitude == pytest.approx(np.interp(found.time, time, abs(exact)), abs=1e-4 * abs(exact).max())
 
 
 def in_small_steps(limit, ends, seconds):
@@ -189,10 +177,7 @@ def in_small_steps(limit, ends, seconds):
     return largest
 
 
-@pytest.mark.parametrize(
-    ("limit", "ends", "away"),
-    [(8.0, (115.0, 75.0), 0.008), (30.0, (75.0, 115.0), 0.004)],
-)
+@pytest.mark.parametrize(("limit", "ends", "away"), [(8.0, (115.0, 75.0), 0.008), (30.0, (75.0, 115.0), 0.004)])
 def test_a_passage_with_friction_peaks_as_small_steps_in_time_do(limit, ends, away):
     system, _ = oscillator(100.0, 0.002, 0.3, limit)
     rest, mode = HarmonicLoad(np.zeros(1)), stuck_modes(system, 1)[0]
@@ -203,7 +188,7 @@ def test_a_passage_with_friction_peaks_as_small_steps_in_time_do(limit, ends, aw
     size = np.abs((own.displacement(found.place)[:, :, 0] @ turn).real).max(axis=1)
     in_time = in_small_steps(limit, ends, 10.0)
     assert size.max() == pytest.approx(in_time, rel=away)
-    assert size.max() < own.displacement(np.array([resonances(own, 1.0)[0].place]))[0, 1, 0].real  # fmt: skip
+    assert size.max() < own.displacement(np.array([resonances(own, 1.0)[0].place]))[0, 1, 0].real
 
 
 def test_what_the_synthesis_has_no_form_for_is_refused():
@@ -243,7 +228,7 @@ def test_a_mode_far_from_others_gives_the_peaks_of_the_direct_solution_and_says_
     system, load = pair(1.0)
     own = synthesis_of(system, load)
     others = other_modes(own)
-    direct = track_peak(system, load, "excitation", (0.5, 1.0, 3.0), (0.9, 1.1), discretisation=Discretisation(order=5))  # fmt: skip
+    direct = track_peak(system, load, "excitation", (0.5, 1.0, 3.0), (0.9, 1.1), discretisation=Discretisation(order=5))
     for level, solved in zip((0.5, 1.0, 3.0), direct, strict=True):
         (found,) = resonances(own, level)
         amplitude = abs(own.displacement(np.array([found.place]), np.array([1]))[0, 1, 0])
@@ -259,7 +244,7 @@ def test_a_mode_whose_neighbour_is_near_is_no_isolated_one_where_its_contact_sli
     others = other_modes(own)
     assert others.distance(1.0) < 0.12
     (strong,) = resonances(own, 3.0)
-    (direct,) = track_peak(system, load, "excitation", (3.0,), (0.9, 1.2), discretisation=Discretisation(order=5))  # fmt: skip
+    (direct,) = track_peak(system, load, "excitation", (3.0,), (0.9, 1.2), discretisation=Discretisation(order=5))
     amplitude = abs(own.displacement(np.array([strong.place]), np.array([1]))[0, 1, 0])
     assert abs(amplitude / direct.amplitude - 1.0) > 0.02
     assert isolation(others, strong, 1).foreign > 0.05
@@ -275,7 +260,7 @@ def test_with_the_other_modes_a_response_that_nothing_slips_in_is_exact():
     motion = with_others(other_modes(own), found, np.array([0, 1]))
     matrix = system.stuck_structure().stiffness
     for omega, both in zip(found.omega[near], motion[near], strict=True):
-        exact = np.linalg.solve(matrix - (omega**2 - 0.01j * omega) * np.eye(2), 0.05 * load.harmonics[1])  # fmt: skip
+        exact = np.linalg.solve(matrix - (omega**2 - 0.01j * omega) * np.eye(2), 0.05 * load.harmonics[1])
         np.testing.assert_allclose(both, exact, rtol=1e-5)
 
 
@@ -285,7 +270,7 @@ def test_along_a_curve_the_mode_is_alone_where_nothing_slips_or_little_of_the_ot
     others = other_modes(own)
     low, high = (synthesise(own, level) for level in (0.05, 3.0))
     quiet, loud = (along(others, found, 1) for found in (low, high))
-    np.testing.assert_allclose(loud.amplitude, np.abs(with_others(others, high, np.array([1]))[:, 0]))  # fmt: skip
+    np.testing.assert_allclose(loud.amplitude, np.abs(with_others(others, high, np.array([1]))[:, 0]))
     # others that move much are added exactly where nothing slips
     assert np.all(quiet.alone)
     assert np.max(quiet.share) > 0.2
@@ -315,9 +300,9 @@ def test_a_static_load_and_friction_of_a_coefficient_are_homogeneous():
     gap[0, 0] = gap[2, 1] = 1.0
     stiffness = np.diag([1.0, 0.5])
     law = ElasticCoulomb(k_t=0.5, k_w=0.5, k_n=0.5, mu=0.5, preload=0.0)
-    system = System(lumped(np.eye(2), stiffness, 0.02 * np.eye(2)), Interface(("c",), (law,), gap), np.array([0]))  # fmt: skip
+    system = System(lumped(np.eye(2), stiffness, 0.02 * np.eye(2)), Interface(("c",), (law,), gap), np.array([0]))
     rest = HarmonicLoad(np.array([0.0, -0.4]))
     mode = max(stuck_modes(system, 2), key=lambda m: abs(m.shape[0]))
-    found = nonlinear_mode(system, rest, mode, 0, Discretisation(order=3), ModeSweep(span=(0.1, 4.0), points=8))  # fmt: skip
+    found = nonlinear_mode(system, rest, mode, 0, Discretisation(order=3), ModeSweep(span=(0.1, 4.0), points=8))
     own = modal_oscillator(found, HarmonicLoad(rest.static, {1: np.array([0.1, 0.0])}))
     assert is_homogeneous(own)

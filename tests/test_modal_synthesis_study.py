@@ -20,10 +20,16 @@ most_harmonics = 3
 amplitude_mm = [100.0, 20000.0]
 """
 # of two masses on a weak spring: a neighbour that is near
-NEAR = STUDY.replace("masses_kg = [1.0]", "masses_kg = [1.0, 1.0]").replace(
-    'springs_n_per_m = [["ground", 1, 1.0]]',
-    'springs_n_per_m = [["ground", 1, 1.0], ["ground", 2, 1.0], [1, 2, 0.03]]',
-).replace('[["ground", 1, 0.02]]', '[["ground", 1, 0.01], ["ground", 2, 0.01]]').replace('on = "blade.m1"\nforce_n = 0.1', 'on = "blade.m2"\nforce_n = 0.02').replace("tangential_stiffness_n_per_m = 0.5", "tangential_stiffness_n_per_m = 0.2")  # fmt: skip
+NEAR = (
+    STUDY.replace("masses_kg = [1.0]", "masses_kg = [1.0, 1.0]")
+    .replace(
+        'springs_n_per_m = [["ground", 1, 1.0]]',
+        'springs_n_per_m = [["ground", 1, 1.0], ["ground", 2, 1.0], [1, 2, 0.03]]',
+    )
+    .replace('[["ground", 1, 0.02]]', '[["ground", 1, 0.01], ["ground", 2, 0.01]]')
+    .replace('on = "blade.m1"\nforce_n = 0.1', 'on = "blade.m2"\nforce_n = 0.02')
+    .replace("tangential_stiffness_n_per_m = 0.5", "tangential_stiffness_n_per_m = 0.2")
+)
 
 
 def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
@@ -37,7 +43,7 @@ def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
     assert np.all(np.abs(case["direct_error"].values) < 0.01)
     assert np.all(case["direct_seconds"].values > case["seconds"].values)
     assert np.all(case["passage_finished"].values == 1)
-    assert np.all(case["passage_peak_amplitude"].values[:, 0] < 1.001 * case["peak_amplitude"].values)  # fmt: skip
+    assert np.all(case["passage_peak_amplitude"].values[:, 0] < 1.001 * case["peak_amplitude"].values)
     assert not [v for v in outcome.verdicts if v.rank]
     figures = plots(outcome.tree)
     assert {"modal_synthesis", "modal_synthesis_peaks", "modal_synthesis_passage"} <= set(figures)
@@ -46,7 +52,9 @@ def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
     assert told.rows[0][6] == "trusted"
     through = outcome.summaries["modal_synthesis"][1]
     assert len(through.rows) == 2
-    assert case["passage_share"].values[:, 0] == pytest.approx(case["passage_peak_amplitude"].values[:, 0] / case["peak_amplitude"].values)  # fmt: skip
+    assert case["passage_share"].values[:, 0] == pytest.approx(
+        case["passage_peak_amplitude"].values[:, 0] / case["peak_amplitude"].values
+    )
     # one mass has no other mode: all of the curve is alone, and as far off as the text of the theory says
     assert np.all(case["alone"].values[case["curve"].values >= 0] == 1)
     assert np.all(np.abs(case["along_error"].values) < 0.03)
@@ -55,7 +63,7 @@ def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
 
 def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_path):
     model = ss.Study.from_file(study_of(NEAR, tmp_path).path).model()
-    result = model.modal_synthesis(levels=[0.5, 3.0], harmonics=5, most_harmonics=5, folder=tmp_path / "out")  # fmt: skip
+    result = model.modal_synthesis(levels=[0.5, 3.0], harmonics=5, most_harmonics=5, folder=tmp_path / "out")
     case = one_case(result.data["modal_synthesis"].to_dataset(), 0)
     assert list(case["answer"].values) == ["trusted", "refused"]
     assert np.isnan(case["peak_amplitude"].values[1])
@@ -67,7 +75,7 @@ def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_pat
     nothing = model.modal_synthesis(levels=[3.0], harmonics=5, most_harmonics=5)
     assert nothing.verdicts[-1].level == "wrong"
     assert "nothing is left" in nothing.verdicts[-1].why
-    below = model.modal_synthesis(levels=[1e-3], harmonics=3, most_harmonics=3, amplitude_mm=[2e4, 6e4], points=8)  # fmt: skip
+    below = model.modal_synthesis(levels=[1e-3], harmonics=3, most_harmonics=3, amplitude_mm=[2e4, 6e4], points=8)
     assert "begins with more than the level reaches" in below.verdicts[0].why
 
 
@@ -101,7 +109,7 @@ def test_what_it_has_no_form_for_is_refused_before_anything_is_computed(tmp_path
 
 
 def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_path):
-    text = f"{DETACHED}[modal_synthesis]\nlevels = [0.5, 1.0]\nharmonics = 1\nmost_harmonics = 1\namplitude_mm = [50.0, 3000.0]\n"  # fmt: skip
+    text = f"{DETACHED}[modal_synthesis]\nlevels = [0.5, 1.0]\nharmonics = 1\nmost_harmonics = 1\namplitude_mm = [50.0, 3000.0]\n"
     outcome = answered(text, tmp_path)
     case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
 
@@ -135,8 +143,6 @@ def test_a_level_at_which_nothing_slips_is_answered_in_proportion_however_small(
 
 def test_a_level_beyond_all_numbers_is_refused_by_its_value(tmp_path):
     with pytest.raises(InputError, match=r"modal_synthesis\.levels\[1\]: is 1e\+300, which no"):
-        answered(STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]"), tmp_path)  # fmt: skip
+        answered(STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]"), tmp_path)
     with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+30, with which"):
-        _bounded(
-            [1.0, 1e30], HarmonicLoad(np.zeros(1), {1: np.array([1e31 + 0j])})
-        )  # of loads in Python
+        _bounded([1.0, 1e30], HarmonicLoad(np.zeros(1), {1: np.array([1e31 + 0j])}))  # of loads in Python

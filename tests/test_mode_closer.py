@@ -34,14 +34,12 @@ def test_the_largest_damping_is_that_of_the_describing_function(points: int) -> 
     sweep = ModeSweep(span=(0.5, 300.0), points=points)
     found = followed(system, load, Discretisation(order=1), sweep)
     judge = minimize_scalar(
-        lambda a: -damping_by_hand(a, stiffness, spring, limit),
-        bounds=(2.1, 20.0),
-        method="bounded",
+        lambda a: -damping_by_hand(a, stiffness, spring, limit), bounds=(2.1, 20.0), method="bounded"
     )
     best = max(found.solutions, key=lambda p: p.ratio)
     # the parabola through three points is off its largest by EXTREME at most
     assert best.ratio == pytest.approx(-judge.fun, rel=EXTREME)
-    assert best.ratio == pytest.approx(damping_by_hand(best.amplitude, stiffness, spring, limit), rel=1e-3)  # fmt: skip
+    assert best.ratio == pytest.approx(damping_by_hand(best.amplitude, stiffness, spring, limit), rel=1e-3)
 
 
 def two_masses(coupling: float) -> tuple[System, HarmonicLoad]:
@@ -57,9 +55,7 @@ def resonance_by_hand(coupling: float) -> float:
 
     def off(a: float) -> float:
         stiffness = two_masses(coupling)[0].structure.stiffness
-        own, other = (
-            scipy.linalg.eigvalsh(stiffness + np.diag([share * a**2, 0.0])) for share in (0.75, 1.5)
-        )
+        own, other = (scipy.linalg.eigvalsh(stiffness + np.diag([share * a**2, 0.0])) for share in (0.75, 1.5))
         return float(3.0 * np.sqrt(own[0]) - np.sqrt(other[1]))
 
     return float(brentq(off, 0.1, 2.0))
@@ -67,9 +63,7 @@ def resonance_by_hand(coupling: float) -> float:
 
 @pytest.mark.parametrize("coupling", [0.5, 0.1])
 @pytest.mark.parametrize("points", [5, 30])
-def test_an_internal_resonance_is_found_where_a_harmonic_passes_another_mode(
-    coupling: float, points: int
-) -> None:
+def test_an_internal_resonance_is_found_where_a_harmonic_passes_another_mode(coupling: float, points: int) -> None:
     system, load = two_masses(coupling)
     sweep = ModeSweep(span=(0.05, 3.0), points=points)
     found = followed(system, load, Discretisation(order=5, samples=128), sweep)

@@ -27,9 +27,7 @@ RNG = np.random.default_rng(11)
 def structure(mass, stiffness, dofs=None):
     """Wrap matrices; without damping."""
     n = stiffness.shape[0]
-    table = dofs or Dofs(
-        np.arange(n), ("x",) * n, np.column_stack([np.arange(n), *np.zeros((2, n))])
-    )
+    table = dofs or Dofs(np.arange(n), ("x",) * n, np.column_stack([np.arange(n), *np.zeros((2, n))]))
     return Structure(mass, 0.0 * stiffness, stiffness, table)
 
 
@@ -84,12 +82,7 @@ def test_ring_has_its_closed_form_spectrum_with_every_pair(phase):
 
 
 @settings(deadline=None, max_examples=8)
-@given(
-    size=st.integers(401, 460),
-    n=st.integers(1, 30),
-    hermitian=st.booleans(),
-    seed=st.integers(0, 2**16),
-)
+@given(size=st.integers(401, 460), n=st.integers(1, 30), hermitian=st.booleans(), seed=st.integers(0, 2**16))
 def test_random_matrices_agree_with_dense_algebra(size, n, hermitian, seed):
     rng = np.random.default_rng(seed)
 
@@ -132,9 +125,7 @@ def test_a_free_body_without_a_shift_is_named():
     points, K = grid((10, 6, 5))
     dofs = nodal_dofs(points, np.arange(len(points)))
     M = scipy.sparse.eye_array(len(dofs), format="csr")
-    with pytest.raises(
-        SingularError, match=r"normal_modes: one body is not held.*300 nodes.*rotation about z"
-    ):
+    with pytest.raises(SingularError, match=r"normal_modes: one body is not held.*300 nodes.*rotation about z"):
         normal_modes(structure(M, K, dofs), 3, shift=0.0)
 
 
@@ -169,9 +160,7 @@ def test_more_modes_than_the_mass_has_are_refused():
     K = sparse(ring(n) + scipy.sparse.eye_array(n))
     few = np.zeros(n)
     few[:5] = 1.0
-    with pytest.raises(
-        InputError, match=r"6 asked of a structure with 900 dofs, of which 5 have mass"
-    ):
+    with pytest.raises(InputError, match=r"6 asked of a structure with 900 dofs, of which 5 have mass"):
         normal_modes(structure(sparse(np.diag(few)), K), 6)
     rank_one = scipy.sparse.csr_array(np.outer(few, few))
     with pytest.raises(InputError, match="whose mass has the rank 1"):
@@ -288,9 +277,7 @@ def test_free_bodies_are_named_with_their_motions():
     assert "36 nodes: 100, 101, 102, 103, 104, …" in text
     assert "translation along x, translation along y, translation along z, rotation about x" in text
     assert "Clamp it" in text
-    with pytest.raises(
-        SingularError, match=r"2 bodies are not held.*the first, the body of dof node100"
-    ):
+    with pytest.raises(SingularError, match=r"2 bodies are not held.*the first, the body of dof node100"):
         refuse_unheld(*two_blocks([0]), "place")
 
 
@@ -314,19 +301,11 @@ def test_held_bodies_pass():
 
 def test_rotational_dofs_turn_with_the_body():
     """Bending and stretching of a beam element in a plane are two bodies to the graph; bending alone can shift and turn."""
-    table = Dofs(
-        np.repeat([1, 2], 3),
-        ("x", "y", "rz") * 2,
-        np.repeat([[0.0, 0, 0], [2.0, 0, 0]], 3, axis=0),
-    )
-    bending = np.array(
-        [[12.0, 12, -12, 12], [12, 16, -12, 8], [-12, -12, 12, -12], [12, 8, -12, 16]]
-    )
+    table = Dofs(np.repeat([1, 2], 3), ("x", "y", "rz") * 2, np.repeat([[0.0, 0, 0], [2.0, 0, 0]], 3, axis=0))
+    bending = np.array([[12.0, 12, -12, 12], [12, 16, -12, 8], [-12, -12, 12, -12], [12, 8, -12, 16]])
     K = np.zeros((6, 6))
     K[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])] = bending
     K[np.ix_([0, 3], [0, 3])] = [[5.0, -5.0], [-5.0, 5.0]]
-    with pytest.raises(
-        SingularError, match=r"2 bodies are not held.*translation along y, rotation about z"
-    ):
+    with pytest.raises(SingularError, match=r"2 bodies are not held.*translation along y, rotation about z"):
         refuse_unheld(K, table, "place")
     refuse_unheld(K[3:, 3:], table.take(np.arange(3, 6)), "place")

@@ -30,17 +30,13 @@ AROUND = 24  # nodes on a circle
 
 def stage(sectors, inner, outer, base, clamp):
     """One sector of a ring with 24 nodes around, two circles of the flange at its top or bottom."""
-    mesh = wedge(
-        sectors, cells=(1, AROUND // sectors // 2, 1), inner=inner, outer=outer, clamp=clamp
-    )
+    mesh = wedge(sectors, cells=(1, AROUND // sectors // 2, 1), inner=inner, outer=outer, clamp=clamp)
     points = mesh.points + np.array([0.0, 0.0, base])
     radius = np.hypot(points[:, 0], points[:, 1])
     on = (np.abs(points[:, 2] - PLANE) < 1e-9) & (radius > 0.74) & (radius < 1.01)
     sets = dict(mesh.node_sets) | {"flange": np.flatnonzero(on)}
     mesh = SolidMesh(points, mesh.cells, sets)
-    return cyclic_sector(
-        assemble_solid(mesh, Material(), clamped=("root",) if clamp else ()), sectors
-    )
+    return cyclic_sector(assemble_solid(mesh, Material(), clamped=("root",) if clamp else ()), sectors)
 
 
 @pytest.fixture(scope="module")
@@ -69,18 +65,12 @@ def tied(stages):
     for key, dof in follows.items():
         column[dof] = column[leads[key]]
     tie = scipy.sparse.csr_array((np.ones(both.n), (np.arange(both.n), column)))
-    whole = [
-        scipy.sparse.csr_array(tie.T @ a @ tie) for a in (both.mass, both.damping, both.stiffness)
-    ]
+    whole = [scipy.sparse.csr_array(tie.T @ a @ tie) for a in (both.mass, both.damping, both.stiffness)]
     return normal_modes(Structure(*whole, both.dofs.take(stays)), 8).frequencies_hz
 
 
 def flange(stages, harmonics):
-    return Flange(
-        ("first", "second"),
-        tuple(s.structure.dof_set("flange") for s in stages.values()),
-        tuple(harmonics),
-    )
+    return Flange(("first", "second"), tuple(s.structure.dof_set("flange") for s in stages.values()), tuple(harmonics))
 
 
 def test_all_harmonics_are_the_node_by_node_tie_and_fewer_are_softer(stages, tied):
@@ -107,18 +97,13 @@ def test_few_harmonics_leave_diameters_apart_and_shapes_meet_on_the_flange(stage
     (told,) = unreached(assembly)
     assert "first 2, second 2 and 3" in told.why
     assert "harmonics 2, 3" in told.remedy
-    every = multistage(
-        fine, [flange(fine, (0, 1, 4, 9))]
-    )  # 4 and 9: wave 0, wave 4 (−2); wave 1, wave 3
+    every = multistage(fine, [flange(fine, (0, 1, 4, 9))])  # 4 and 9: wave 0, wave 4 (−2); wave 1, wave 3
     assert every.unreached == (("first", 2),)
     assert unreached(multistage(fine, [flange(fine, range(4))])) == []
     found = multistage_modes(assembly, 1, 3)
     waves = assembly.waves(1)
     moved = np.concatenate(
-        [
-            np.linalg.lstsq(fine[name].wave_tie(k).toarray(), found.shapes[name, k], rcond=None)[0]
-            for name, k in waves
-        ]
+        [np.linalg.lstsq(fine[name].wave_tie(k).toarray(), found.shapes[name, k], rcond=None)[0] for name, k in waves]
     )
     assert np.abs(constraints(assembly, waves) @ moved).max() < 1e-9 * np.abs(moved).max()
     # unit mass of all sectors; the neighbour is a phase ahead
@@ -134,9 +119,7 @@ def test_few_harmonics_leave_diameters_apart_and_shapes_meet_on_the_flange(stage
     more = multistage(fine, [flange(fine, range(13))])
     lowest = multistage_modes(more, 0, 12)
     assert lowest.nodal_diameter == 0
-    assert found.frequencies_hz[0] <= np.min(lowest.frequencies_hz[lowest.frequencies_hz > 1.0]) * (
-        1 + 1e-9
-    )
+    assert found.frequencies_hz[0] <= np.min(lowest.frequencies_hz[lowest.frequencies_hz > 1.0]) * (1 + 1e-9)
     # what stands alone lies below: the flange only holds
     alone = [normal_modes(travelling_wave(fine[name], 1), 3).frequencies_hz for name in fine]
     lowest = np.sort(np.concatenate(alone))[:3]
@@ -149,9 +132,7 @@ def test_what_does_not_fit_is_said(stages):
     other = flange(stages, (0, 1))
     at = stages["second"].structure.dofs.position[other.dofs[1]]
     short = other.dofs[1][np.hypot(at[:, 0], at[:, 1]) < 0.8]
-    with pytest.raises(
-        ss.InputError, match=r"flange of 'first' has nodes at the radius .* 'second' has none there"
-    ):
+    with pytest.raises(ss.InputError, match=r"flange of 'first' has nodes at the radius .* 'second' has none there"):
         multistage(stages, [replace(other, dofs=(other.dofs[0], short))])
     tilted = replace(stages["second"], axis=Axis((0.0, 0.1, 1.0)))
     with pytest.raises(ss.InputError, match="turn about different axes"):
@@ -165,9 +146,7 @@ def test_what_does_not_fit_is_said(stages):
 def test_few_harmonics_are_doubted_where_holding_the_others_changes_much():
     def found(stiffest):
         none = np.zeros((1, 0, 3), dtype=complex)
-        return WaveModes(
-            3, np.array([100.0]), none, np.zeros(1), 0.1, stiffest_hz=np.array(stiffest)
-        )
+        return WaveModes(3, np.array([100.0]), none, np.zeros(1), 0.1, stiffest_hz=np.array(stiffest))
 
     (said,) = flange_doubts([found([100.5]), found([104.0])])
     assert "nodal diameters 3 (up to 4 %)" in said.why
@@ -210,9 +189,7 @@ def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
         with pytest.raises(ss.InputError, match=message):
             ss.Study.from_file(file).check()
     file.write_text(few.replace("number = 4", "number = 4\nnodal_diameters = [3]"))
-    with pytest.raises(
-        ss.InputError, match="3 is no harmonic that a flange couples, these are 0, 1"
-    ):
+    with pytest.raises(ss.InputError, match="3 is no harmonic that a flange couples, these are 0, 1"):
         ss.Study.from_file(file).check()
     file.write_text(few.replace("harmonics = [0, 1]", ""))
     with pytest.raises(ss.InputError, match="harmonics"):

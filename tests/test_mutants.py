@@ -49,11 +49,11 @@ def test_twice():
 
 
 def kinds(source: str) -> set[tuple[str, str, str]]:
-    return {(m.before, m.after, m.kind) for m in mutants_of("a.py", source) if is_another(m, source)}  # fmt: skip
+    return {(m.before, m.after, m.kind) for m in mutants_of("a.py", source) if is_another(m, source)}
 
 
 def test_each_kind_of_mutant_is_made() -> None:
-    assert kinds("y = a < b") == {("a < b", "a <= b", "comparison"), ("a < b", "a >= b", "comparison")}  # fmt: skip
+    assert kinds("y = a < b") == {("a < b", "a <= b", "comparison"), ("a < b", "a >= b", "comparison")}
     assert ("a + b", "(a)", "dropped term") in kinds("y = a + b")
     assert ("a + b", "((a) - (b))", "operator") in kinds("y = a + b")
     assert ("-x", "(x)", "sign") in kinds("y = -x")
@@ -74,13 +74,13 @@ def test_each_kind_of_mutant_is_made() -> None:
 
 
 def test_a_seed_draws_the_same_and_another_others() -> None:
-    sources = {f"{k}.py": f"y{k} = {k} + 1\nif y{k} > 3:\n    y{k} -= f(1, y{k})\n" for k in range(20)}  # fmt: skip
+    sources = {f"{k}.py": f"y{k} = {k} + 1\nif y{k} > 3:\n    y{k} -= f(1, y{k})\n" for k in range(20)}
     first = drawn(sources, 10, 7)
     assert first == drawn(dict(reversed(sources.items())), 10, 7)
     assert first != drawn(sources, 10, 8)
     assert len({(m.path, m.line) for m in first}) == 10
     assert {m.path for m in drawn(sources, 99, 7, ("3.", "4."))} == {"3.py", "4.py"}
-    assert [m.core for m in drawn({"contact/a.py": "y = a + b", "cli.py": "y = a + b"}, 2, 1)].count(True) == 1  # fmt: skip
+    assert [m.core for m in drawn({"contact/a.py": "y = a + b", "cli.py": "y = a + b"}, 2, 1)].count(True) == 1
 
 
 def test_names_lead_from_compiled_functions_and_constants_to_lines_that_run() -> None:
@@ -123,7 +123,7 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
         ("min(kept) + 0 * len(kept)", "((min(kept)) - (0 * len(kept)))"): (one, ""),
         ("x * 2", "((x) / (2))"): (other, other),
         ("1 + 2", "((1) - (2))"): (one, one),
-    }  # fmt: skip
+    }
     copy = Copy(root, tmp_path / "copy", loaded=())
     try:
         for (before, after), (reached, by) in wanted.items():

@@ -30,13 +30,7 @@ def odd_tree() -> xr.DataTree:
             "small": ("case", np.array([1, 2], dtype=np.int16)),
         },
         coords={"output": ["a", "b"], "label": ("output", ["first", "second"])},
-        attrs={
-            "failed": 0,
-            "name": "x",
-            "blank": "",
-            "share": np.float64(0.1),
-            "words": ["a", "b"],
-        },
+        attrs={"failed": 0, "name": "x", "blank": "", "share": np.float64(0.1), "words": ["a", "b"]},
     )
     below = xr.Dataset({"x": (("output", "new"), np.ones((2, 1)))}, coords={"new": [0.5]})
     root = xr.Dataset({"time": ("output", [0.0, 1.0])}, coords={"output": ["a", "b"]})

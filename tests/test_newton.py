@@ -38,9 +38,7 @@ def smooth(x):
     """A smooth system with the solution (1, 2, 3)."""
     a = np.array([[4.0, 1, 0], [1, 5, 2], [0, 2, 6]])
     goal = np.array([1.0, 2, 3])
-    return At(
-        a @ x + np.sin(x) - a @ goal - np.sin(goal), np.asfortranarray(a + np.diag(np.cos(x)))
-    )
+    return At(a @ x + np.sin(x) - a @ goal - np.sin(goal), np.asfortranarray(a + np.diag(np.cos(x))))
 
 
 def test_convergence_is_quadratic():
@@ -85,9 +83,7 @@ def test_line_search_saves_what_full_steps_lose():
 def test_a_kink_is_no_obstacle():
     # piecewise linear: slope 1 below, 10 above; semi-smooth Newton is finite
     solution = newton(
-        scalar(lambda x: x - 2 if x < 0 else 10 * x - 2, lambda x: 1.0 if x < 0 else 10.0),
-        np.array([-5.0]),
-        Newton(),
+        scalar(lambda x: x - 2 if x < 0 else 10 * x - 2, lambda x: 1.0 if x < 0 else 10.0), np.array([-5.0]), Newton()
     )
     assert solution.status is Status.CONVERGED
     assert solution.iterations <= 3
@@ -95,9 +91,7 @@ def test_a_kink_is_no_obstacle():
 
 def test_too_many_iterations():
     # a triple root: linear rate 2/3, so that 5 steps are not enough
-    solution = newton(
-        scalar(lambda x: x**3, lambda x: 3 * x**2), np.array([1.0]), Newton(max_iterations=5)
-    )
+    solution = newton(scalar(lambda x: x**3, lambda x: 3 * x**2), np.array([1.0]), Newton(max_iterations=5))
     assert (solution.status, solution.iterations) == (Status.TOO_MANY_ITERATIONS, 5)
     assert solution.x[0] == pytest.approx((2 / 3) ** 5)
 
@@ -117,20 +111,14 @@ def test_singular_jacobian():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_not_finite(bad):
-    solution = newton(
-        lambda x: At(np.array([bad, 0.0]), np.eye(2, order="F")), np.zeros(2), Newton()
-    )
+    solution = newton(lambda x: At(np.array([bad, 0.0]), np.eye(2, order="F")), np.zeros(2), Newton())
     assert solution.status is Status.NOT_FINITE
 
 
 def test_a_step_into_nan_is_shortened():
     # sqrt is NaN beyond zero: the full step from x = 0.1 leaves the domain, half of it does not
     with np.errstate(invalid="ignore"):
-        solution = newton(
-            scalar(lambda x: np.sqrt(x) - 1.5, lambda x: 0.5 / np.sqrt(x)),
-            np.array([30.0]),
-            Newton(),
-        )
+        solution = newton(scalar(lambda x: np.sqrt(x) - 1.5, lambda x: 0.5 / np.sqrt(x)), np.array([30.0]), Newton())
     assert solution.status is Status.CONVERGED
     assert solution.x[0] == pytest.approx(2.25)
 

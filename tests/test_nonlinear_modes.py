@@ -43,7 +43,7 @@ def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, Har
     gap = np.zeros((3, 1))
     gap[row, 0] = 1.0
     contacts = Interface(("c",), (law,), gap)
-    return System(lumped(np.eye(1), stiffness * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))  # fmt: skip
+    return System(lumped(np.eye(1), stiffness * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))
 
 
 def followed(system: System, load: HarmonicLoad, how: Discretisation, sweep: ModeSweep) -> Backbone:
@@ -70,9 +70,7 @@ def test_the_table_of_one_mass_on_a_friction_spring():
 
 def test_a_model_without_dimensions_slips_beyond_one():
     how, sweep = Discretisation(order=3), ModeSweep(points=8)
-    found = [
-        followed(*one_mass(Jenkins(k_t=0.5, limit=limit), 0), how, sweep) for limit in (1e-3, 10.0)
-    ]
+    found = [followed(*one_mass(Jenkins(k_t=0.5, limit=limit), 0), how, sweep) for limit in (1e-3, 10.0)]
     small, large = (backbone.points for backbone in found)
     top_small, top_large = (max(points, key=lambda p: p.ratio) for points in (small, large))
     assert top_large.amplitude == pytest.approx(1e4 * top_small.amplitude, rel=0.3)
@@ -92,7 +90,7 @@ def test_rows_of_the_rubbing_beam_with_21_harmonics(monkeypatch):
 def test_a_conservative_mode_needs_no_dummy_load():
     """A mass on a cubic spring: the frequency is that of an elliptic integral, and there is no damping."""
     system, load = one_mass(CubicSpring(cubic_t=0.5), 0)
-    found = followed(system, load, Discretisation(order=15, samples=256), ModeSweep(span=(1e-3, 3.0), points=10))  # fmt: skip
+    found = followed(system, load, Discretisation(order=15, samples=256), ModeSweep(span=(1e-3, 3.0), points=10))
     assert found.end == "amplitude reached"
     for point in found.points:
         top = float(np.sum(point.coefficients[:, 0]).real)
@@ -108,7 +106,7 @@ def test_a_one_sided_spring_has_a_mean_and_the_frequency_of_two_arcs():
     """A stop half way: to one side an arc about zero, beyond the gap one about where both springs are in balance."""
     gap, k = 0.4, 3.0
     system, load = one_mass(UnilateralSpring(k_n=k, initial_gap=gap), 2)
-    found = followed(system, load, Discretisation(order=41, samples=1024), ModeSweep(span=(0.1, 1.2), points=8))  # fmt: skip
+    found = followed(system, load, Discretisation(order=41, samples=1024), ModeSweep(span=(0.1, 1.2), points=8))
     time = np.linspace(0.0, 2.0 * np.pi, 20001)
     for point in found.points:
         if point.amplitude < gap:
@@ -150,15 +148,13 @@ def test_residuals_without_condensed_matrices_are_those_with_them():
         period = balance.forces(x, 7.0)
         whole = balance.linearise(x, 7.0, period).residual
         size = np.max(np.abs(whole))
-        np.testing.assert_allclose(
-            balance.residual(x, 7.0, period), whole, rtol=0, atol=1e-12 * size
-        )
+        np.testing.assert_allclose(balance.residual(x, 7.0, period), whole, rtol=0, atol=1e-12 * size)
         # the force is no straight line in the rate: the interior is damped too
-        ends = [replace(plain, linear=linear.with_mass_damping(rate + d)).linear_residual(x, 7.0) for d in (-1e-4, 1e-4)]  # fmt: skip
+        ends = [
+            replace(plain, linear=linear.with_mass_damping(rate + d)).linear_residual(x, 7.0) for d in (-1e-4, 1e-4)
+        ]
         slope = balance.by_mass_damping(x, 7.0, lambda h: chain.structure.of_harmonic(h).mass)
-        np.testing.assert_allclose(
-            slope, (ends[1] - ends[0]) / 2e-4, rtol=0, atol=1e-7 * np.max(np.abs(slope))
-        )
+        np.testing.assert_allclose(slope, (ends[1] - ends[0]) / 2e-4, rtol=0, atol=1e-7 * np.max(np.abs(slope)))
 
 
 def test_harmonics_are_raised_until_frequency_and_damping_stay():
@@ -169,7 +165,7 @@ def test_harmonics_are_raised_until_frequency_and_damping_stay():
     orders = {p.order for p in raised.points}
     assert min(orders) == 1
     assert max(orders) > 3
-    many = self_excited_motions(system, load, raised.mode, 0, Discretisation(order=61, samples=1024))  # fmt: skip
+    many = self_excited_motions(system, load, raised.mode, 0, Discretisation(order=61, samples=1024))
     for point in raised.points:
         exact = at_amplitude(many, point.amplitude)
         assert exact.converged
@@ -194,7 +190,7 @@ def test_all_four_folds_of_a_mode_in_resonance_with_another_are_followed():
 
 def test_a_mode_ends_at_gross_slip_where_that_is_asked():
     system, load = griffin(0.1)
-    found = followed(system, HarmonicLoad(load.static), Discretisation(order=3), ModeSweep(to_gross_slip=True))  # fmt: skip
+    found = followed(system, HarmonicLoad(load.static), Discretisation(order=3), ModeSweep(to_gross_slip=True))
     told = re.match(r"gross slip at ([\d.]+) mm", found.end)
     assert told
     assert 200.0 <= float(told[1]) < 300.0  # the slider lets go at 0.2 m
@@ -239,10 +235,15 @@ def test_both_concepts_agree_as_the_square_of_the_damping():
         friction = Interface(("d",), (Jenkins(k_t=stiffness, limit=0.2 * stiffness),), gap)
         system = System(lumped(np.eye(1), np.eye(1)), friction, np.array([0]))
         each = [
-            followed(system, HarmonicLoad(np.zeros(1)), Discretisation(order=5), ModeSweep(span=(0.1, 2.0), points=4, concept=concept))
+            followed(
+                system,
+                HarmonicLoad(np.zeros(1)),
+                Discretisation(order=5),
+                ModeSweep(span=(0.1, 2.0), points=4, concept=concept),
+            )
             for concept in ("periodic", "decaying")
-        ]  # fmt: skip
-        (w, z), (v, y) = (np.array([(p.omega, p.ratio) for p in e.solutions]).T for e in each)  # fmt: skip
+        ]
+        (w, z), (v, y) = (np.array([(p.omega, p.ratio) for p in e.solutions]).T for e in each)
         assert (w[0], z[0]) == pytest.approx((v[0], y[0]), abs=1e-12)
         assert z.max() > 0.05 * stiffness
         last = abs(w[-1] / v[-1] - 1.0)
@@ -257,7 +258,9 @@ def test_a_decaying_motion_is_that_of_the_eigenvalue_however_it_is_damped():
     gap = np.zeros((3, 2))
     gap[0, 0] = 1.0
     stiffness, damping = np.array([[2.0, -1.0], [-1.0, 1.0]]), np.diag([0.0, 0.5])
-    system = System(lumped(np.eye(2), stiffness, damping), Interface(("d",), (Jenkins(k_t=0.5, limit=0.1),), gap), np.array([1]))  # fmt: skip
+    system = System(
+        lumped(np.eye(2), stiffness, damping), Interface(("d",), (Jenkins(k_t=0.5, limit=0.1),), gap), np.array([1])
+    )
     stuck = stiffness + np.diag([0.5, 0.0])
     values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stuck, -damping]]))
     slowest = min(values[values.imag > 0], key=abs)
@@ -265,7 +268,9 @@ def test_a_decaying_motion_is_that_of_the_eigenvalue_however_it_is_damped():
     point = followed(system, HarmonicLoad(np.zeros(2)), Discretisation(order=3), sweep).points[-1]
     assert point.omega == pytest.approx(abs(slowest), rel=1e-10)
     assert point.ratio == pytest.approx(-slowest.real / abs(slowest), rel=1e-9)
-    steady = followed(system, HarmonicLoad(np.zeros(2)), Discretisation(order=3), replace(sweep, concept="periodic")).points[-1]  # fmt: skip
+    steady = followed(
+        system, HarmonicLoad(np.zeros(2)), Discretisation(order=3), replace(sweep, concept="periodic")
+    ).points[-1]
     assert abs(steady.ratio / point.ratio - 1.0) > 1e-3
 
 
@@ -273,7 +278,7 @@ def test_a_free_motion_decays_as_the_mode_says():
     """In time, by a program of its own: period after period of a mass that rubs lightly."""
     stiffness, slips = 0.0125, 0.2
     limits = np.array([slips * stiffness])
-    decay = free_decay(np.eye(1), np.zeros((1, 1)), np.array([stiffness]), limits, np.array([1.5]), 25, 400)  # fmt: skip
+    decay = free_decay(np.eye(1), np.zeros((1, 1)), np.array([stiffness]), limits, np.array([1.5]), 25, 400)
     gap = np.zeros((3, 1))
     gap[0, 0] = 1.0
     friction = Interface(("d",), (Jenkins(k_t=stiffness, limit=limits[0]),), gap)
@@ -309,7 +314,13 @@ def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_
     assert [v.level for v in said] == ["trusted"]
     assert "mode 1 followed from 100 to 2000 mm: the largest damping ratio is 7.3" in said[0].why
     figures = plots(outcome.tree)
-    assert {"nonlinear_mode_frequency", "nonlinear_mode_damping", "nonlinear_mode_energy", "nonlinear_mode_energy_damping", "backbones"} <= set(figures)  # fmt: skip
+    assert {
+        "nonlinear_mode_frequency",
+        "nonlinear_mode_damping",
+        "nonlinear_mode_energy",
+        "nonlinear_mode_energy_damping",
+        "backbones",
+    } <= set(figures)
     response, backbone = figures["backbones"].data
     top = int(np.nanargmax(response.y))
     order = np.argsort(backbone.y)
@@ -319,7 +330,9 @@ def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_
 
 def test_a_run_that_is_stopped_goes_on_inside_a_mode(tmp_path: Path, monkeypatch) -> None:
     """Every solve is on the disk before the next one: a run that was stopped has the bits of one that was not."""
-    alone = STUDY.replace(STUDY[STUDY.index("[forced_response]") : STUDY.index("[nonlinear_mode]")], "").replace("points = 10", "points = 5")  # fmt: skip
+    alone = STUDY.replace(STUDY[STUDY.index("[forced_response]") : STUDY.index("[nonlinear_mode]")], "").replace(
+        "points = 10", "points = 5"
+    )
     add, kinds = JobJournal.add, list[str]()
 
     def run(folder: str, stop: int) -> xr.Dataset:
@@ -351,7 +364,7 @@ def test_what_has_no_such_mode_is_refused(tmp_path: Path) -> None:
         answered(STUDY.replace("points = 10", "modes = [2]"), tmp_path)
 
 
-def case_of(end: str, status: list[int], change: list[float], problem: str = "") -> dict[str, xr.Variable]:  # fmt: skip
+def case_of(end: str, status: list[int], change: list[float], problem: str = "") -> dict[str, xr.Variable]:
     words = {"end": end, "problem": problem, "mode": 1, "wave_number": -1, "accuracy": 1e-3}
     words |= {"largest_damping_ratio": 0.05, "largest_damping_amplitude": 0.002}
     case = {name: xr.Variable(("branch",), [value]) for name, value in words.items()}
@@ -363,14 +376,20 @@ def case_of(end: str, status: list[int], change: list[float], problem: str = "")
 @pytest.mark.parametrize(
     ("end", "status", "change", "level", "words"),
     [
-        ("amplitude reached", [0, 0, -1], [1e-4, 1e-4, np.nan], "trusted", "mode 1 followed from 1 to 2 mm: the largest damping ratio is 5 % at 2 mm"),
+        (
+            "amplitude reached",
+            [0, 0, -1],
+            [1e-4, 1e-4, np.nan],
+            "trusted",
+            "mode 1 followed from 1 to 2 mm: the largest damping ratio is 5 % at 2 mm",
+        ),
         ("amplitude reached", [0, 0], [1e-4, 2e-3], "doubtful", "1 of its 2 motions still change by up to 0.2 %"),
         ("amplitude reached", [0, 0], [np.nan, np.nan], "doubtful", "one set of harmonics alone"),
         ("amplitude reached", [0, 2, 0], [0.0, np.nan, 0.0], "doubtful", "1 of its points are no motions"),
         ("lost at 1 m after 2 points", [0, 2], [0.0, np.nan], "doubtful", "mode 1: lost at 1 m"),
         ("lift-off ends it at 1 m", [0, 2], [0.0, np.nan], "trusted", "lift-off ends it"),
     ],
-)  # fmt: skip
+)
 def test_what_is_to_be_thought_of_a_mode(end, status, change, level, words):
     found = case_verdicts("", case_of(end, status, change))
     assert {v.level for v in found} == {level}

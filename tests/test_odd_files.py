@@ -29,7 +29,7 @@ from stickslip.study.keep.provenance import as_text
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
-SUFFIXES = (".inp", ".inp.gz", ".cdb", ".npz", ".mtx", ".mtx.gz", ".sti", ".h5", ".frd", ".full", ".rst", ".op2")  # fmt: skip
+SUFFIXES = (".inp", ".inp.gz", ".cdb", ".npz", ".mtx", ".mtx.gz", ".sti", ".h5", ".frd", ".full", ".rst", ".op2")
 
 
 @pytest.fixture
@@ -90,16 +90,11 @@ def test_a_named_pipe_that_a_deck_includes_is_refused(tmp_path: Path) -> None:
     [
         ("loop", "is a link that leads nowhere, or to itself. Remove it"),
         ("y" * 300, "cannot be written (File name too long). Give a shorter name."),
-        (
-            "/".join(60 * ["z" * 100]),
-            "cannot be written (File name too long). Give a shorter name.",
-        ),
+        ("/".join(60 * ["z" * 100]), "cannot be written (File name too long). Give a shorter name."),
         ("/".join(5 * ["z" * 100]), "Put the study into a folder with a shorter path."),
     ],
 )
-def test_a_results_folder_that_cannot_be_is_refused_with_what_helps(
-    tmp_path: Path, folder: str, words: str
-) -> None:
+def test_a_results_folder_that_cannot_be_is_refused_with_what_helps(tmp_path: Path, folder: str, words: str) -> None:
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(InputError) as caught, locked_folder(tmp_path / folder):
         pass
@@ -135,9 +130,7 @@ def test_a_full_disk_or_quota_is_no_reason_to_delete_anything(
 
 
 @pytest.mark.parametrize("what", ["note", "lock"])
-def test_a_limit_that_sqlite_meets_is_no_reason_to_delete_its_file(
-    tmp_path: Path, what: str
-) -> None:
+def test_a_limit_that_sqlite_meets_is_no_reason_to_delete_its_file(tmp_path: Path, what: str) -> None:
     """SQLite knows a full disk; a quota or a limit of the size of files is a disk error to it."""
     program = f"""
 import resource, signal, sys
@@ -159,9 +152,7 @@ with JobJournal(Path(sys.argv[1]) / "a.part") as journal:
     for i in range(100):
         journal.put(f"note {{i}}", {{"a": np.zeros(1000)}})
 """
-    ended = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=False
-    )
+    ended = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=False)
     last = ended.stderr.splitlines()[-1]
     assert "a limit of the size of files is met" in last, ended.stderr
     assert "Make room" in last
@@ -199,9 +190,7 @@ def test_names_that_are_no_utf8_stand_in_log_and_result(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Bytes of a file system without UTF-8: no traceback of the log, and a result that says its study."""
-    monkeypatch.setattr(
-        LOG, "propagate", False
-    )  # pytest-xdist cannot send such letters of a captured log
+    monkeypatch.setattr(LOG, "propagate", False)  # pytest-xdist cannot send such letters of a captured log
     name = os.fsdecode(b"st\xff.toml")
     with written_down(tmp_path / "run.log"):
         LOG.info(f"study {name}")

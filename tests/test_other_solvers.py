@@ -10,18 +10,14 @@ from evidence.validation.reference_data import COMPLETE, contact2d, has_complete
 @pytest.fixture
 def complete_curves() -> None:
     if not has_complete():
-        pytest.skip(
-            f"the complete curves of other solvers are not at {COMPLETE}; the rows in tests/data are tested"
-        )
+        pytest.skip(f"the complete curves of other solvers are not at {COMPLETE}; the rows in tests/data are tested")
 
 
 @pytest.mark.parametrize("name", case_nlvib.NAMES)
 def test_residual_vanishes_at_rows_of_nlvib(name):
     case = nlvib(name, complete=False)
     assert len(case.omega) >= 8
-    assert (
-        max(case_nlvib.residuals(case)) < 1e-9
-    )  # of the force; both programs sum the same samples
+    assert max(case_nlvib.residuals(case)) < 1e-9  # of the force; both programs sum the same samples
     wrong = case.rows + 1e-6 * np.max(np.abs(case.rows))
     moved = case.balance.linearise(wrong[0] / case.balance.displacement_scale, float(case.omega[0]))
     assert np.max(np.abs(moved.residual)) > 1e-9  # so the bound can fail

@@ -34,11 +34,7 @@ from stickslip.study.models.study import read_study
 
 EXAMPLE = EXAMPLES / "own_blades"
 PULL, RATIO, APEX, DEG = 2000.0, 200.0, 0.3186346, math.pi / 180
-SECTIONS = (
-    -0.0131,
-    0.0012,
-    0.0127,
-)  # no point lies on an edge of a facet, where either neighbour would do
+SECTIONS = (-0.0131, 0.0012, 0.0127)  # no point lies on an edge of a facet, where either neighbour would do
 FEW = {
     "vary.load.shaker.ratio": "[2000]",
     "forced_response.frequency_hz": "[165.0, 176.0]",
@@ -65,9 +61,7 @@ def about_y(degrees: float) -> np.ndarray:
     return Axis(direction=(0.0, 1.0, 0.0)).rotation(degrees * DEG)
 
 
-def test_the_study_finds_the_stuck_resonance_and_forces_that_balance_the_pull(
-    tmp_path: Path,
-) -> None:
+def test_the_study_finds_the_stuck_resonance_and_forces_that_balance_the_pull(tmp_path: Path) -> None:
     path = write(tmp_path, FEW)
     done("run", str(path), "--no-report")
     data = Result.open(tmp_path / "results").data
@@ -109,16 +103,10 @@ def hands() -> tuple[Structure, np.ndarray, tuple[ElasticCoulomb, ...], np.ndarr
     mesh = read_deck(EXAMPLE / "blade.inp").mesh
     blade = assemble_solid(mesh, Material(), clamped=("root",))
     blade = rayleigh_damping(blade, 0.005, (150.0, 300.0))
-    place = {
-        (n, c): i
-        for i, (n, c) in enumerate(zip(blade.dofs.node, blade.dofs.component, strict=True))
-    }
+    place = {(n, c): i for i, (n, c) in enumerate(zip(blade.dofs.node, blade.dofs.component, strict=True))}
 
     frames, shapes, positions = [], [], []
-    top, base = (
-        0.002 * math.sqrt(2),
-        0.014 * math.sqrt(2),
-    )  # distances of the side's ends from the apex
+    top, base = (0.002 * math.sqrt(2), 0.014 * math.sqrt(2))  # distances of the side's ends from the apex
     for side, sign in (("UNDER_RIGHT", -1.0), ("UNDER_LEFT", 1.0)):
         facets = facets_of(mesh, mesh.node_sets[side])
         normal = np.array([sign, 0.0, 1.0]) / math.sqrt(2)
@@ -142,9 +130,8 @@ def hands() -> tuple[Structure, np.ndarray, tuple[ElasticCoulomb, ...], np.ndarr
     xx = (0.004**2 + 0.028**2) / 24
     along = 0.04**2 / 12
     body = RigidBody(
-        mass=mass, inertia=(mass * (zz + along), mass * (xx + zz), mass * (xx + along)),
-        centre=(0.0, 0.0, APEX - depth),
-    ).moved(about_y(5.0), np.zeros(3))  # fmt: skip
+        mass=mass, inertia=(mass * (zz + along), mass * (xx + zz), mass * (xx + along)), centre=(0.0, 0.0, APEX - depth)
+    ).moved(about_y(5.0), np.zeros(3))
     both = join(left=left, right=turned(left, about_y(10.0)), damper=body.structure())
     at = {n: i for i, n in enumerate(dict.fromkeys(left.dofs.node[left.dofs.node >= 0].tolist()))}
     gaps = np.zeros((54, both.n))
@@ -180,9 +167,7 @@ def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
 
     for name in ("mass", "damping", "stiffness"):
         same(getattr(found.bare.structure, name), way.T @ getattr(structure, name) @ way)
-    same(
-        found.bare.interface.gap_operator, gaps @ way, 5e-12
-    )  # a projection ends at steps of 1e-12
+    same(found.bare.interface.gap_operator, gaps @ way, 5e-12)  # a projection ends at steps of 1e-12
     same(found.load.static, way.T @ static)
     same(found.load.harmonics[1], way.T @ force)
     for mine, theirs in zip(found.bare.interface.laws, laws, strict=True):
@@ -192,9 +177,13 @@ def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
     free = np.arange(structure.n - 6, structure.n)
     hand = System(structure, Interface(names, laws, gaps), free[:3], free=free).with_retention(5e4)
     sweep = Sweep(
-        omega_range=(2 * math.pi * 168, 2 * math.pi * 169), low=3, high=3,
-        selection="always_low", frequencies=2, peak_points=0,
-    )  # fmt: skip
+        omega_range=(2 * math.pi * 168, 2 * math.pi * 169),
+        low=3,
+        high=3,
+        selection="always_low",
+        frequencies=2,
+        peak_points=0,
+    )
     answers = []
     for system, load in ((found.system, found.load), (hand, HarmonicLoad(static, {1: force}))):
         problem = forced_problem(system, load, sweep)
@@ -202,11 +191,7 @@ def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
         assert point.converged
         answers.append(fields(problem, point))
     assert answers[1].energy.max() > 1e-5  # it slips
-    at = [
-        i
-        for i, name in enumerate(found.output_labels)
-        if name in ("damper.x", "damper.y", "damper.z")
-    ]
+    at = [i for i, name in enumerate(found.output_labels) if name in ("damper.x", "damper.y", "damper.z")]
     # near a resonance, both to the tolerance of Newton's method
     same(answers[0].outputs[:, at], answers[1].outputs, 1e-7)
     same(answers[0].forces, answers[1].forces, 1e-7)
@@ -232,10 +217,13 @@ def test_a_wedge_of_another_angle_than_its_undersides_is_warned_of(
             {"between": '["left.under_right", "damper.left"]'},
             'between = ["damper.left", "left.UNDER_RIGHT"], with pairing = "node_to_segment"',
         ),
-        ({"pairing": '"segment_to_segment"'}, 'facets, as segment_to_segment needs them there. Give pairing = "node_to_segment"'),
+        (
+            {"pairing": '"segment_to_segment"'},
+            'facets, as segment_to_segment needs them there. Give pairing = "node_to_segment"',
+        ),
         ({"pairing": '"node_to_node"'}, 'and 4 more. Give pairing = "node_to_segment": each point'),
     ],
-)  # fmt: skip
+)
 def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
     tmp_path: Path, changes: dict[str, str], message: str
 ) -> None:
@@ -245,9 +233,7 @@ def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
     assert "contact.left" in str(refused.value)
 
 
-def test_a_point_beyond_the_rim_is_told_so_and_how_much_the_tolerance_has_to_be(
-    tmp_path: Path,
-) -> None:
+def test_a_point_beyond_the_rim_is_told_so_and_how_much_the_tolerance_has_to_be(tmp_path: Path) -> None:
     along = '[{ move_m = [0.0, 0.0125, 0.3186346] }, { turn_deg = 5.0, axis = "y" }]'
     with pytest.raises(InputError) as error:
         check_study(read_study(write(tmp_path, {"part.damper.placed": along})))
@@ -261,10 +247,7 @@ def test_a_point_beyond_the_rim_is_told_so_and_how_much_the_tolerance_has_to_be(
     # of two outputs on sets of nodes the first node, which a user has to be told; a body has no others
     left, right = first_nodes(model.places, model.outputs)
     first = model.parts["left"].mesh.points[model.parts["left"].mesh.node_sets["TIP"][0]]
-    assert (
-        left
-        == f"output left: the first of the 35 nodes of left.TIP, at ({', '.join(f'{x:.6g}' for x in first)}) m"
-    )
+    assert left == f"output left: the first of the 35 nodes of left.TIP, at ({', '.join(f'{x:.6g}' for x in first)}) m"
     assert right.startswith("output right: ")
 
 

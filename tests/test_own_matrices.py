@@ -24,9 +24,7 @@ FEW = {
     "forced_response.stability": '"off"',
 }
 FEW["harmonics.selection"] = '"always_high"'  # steps of a branch follow rounding
-FEW["part.chain.reduction.method"] = (
-    '"none"'  # else its modes are coordinates, and round off otherwise
-)
+FEW["part.chain.reduction.method"] = '"none"'  # else its modes are coordinates, and round off otherwise
 TABLE = "node,component,x,y,z\n" + "".join(f"{i + 1},x,0,0,0\n" for i in range(20))
 SPRINGS = ", ".join(f'["{f"m{i}" if i else "ground"}", "m{i + 1}", 2e5]' for i in range(20))
 LUMPED = f'shape = "lumped"\nmasses_kg = {[0.5] * 20}\nsprings_n_per_m = [{SPRINGS}]\n'
@@ -115,45 +113,18 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
         ({"load.shaker.on": '"chain.dof21"'}, "there is no surface or set 'chain.dof21'"),
         ({"part.chain.file": '"none.npz"'}, "there is no file"),
         ({"part.chain.mass": '"M.mtx"'}, "M.mtx: is of 3 x 3, the model has 20 dofs"),
-        (
-            {"contact.stop.between": '["chain.dof0", "ground"]'},
-            "has 20 dofs, chain.dof1 to chain.dof20.",
-        ),
-        (
-            {"contact.joint.between": '["chain.dof12", "chain.DOF12"]'},
-            "pairs 'chain.dof12' with itself",
-        ),
-        (
-            {"contact.joint.pairing": '"segment_to_segment"'},
-            "contact.joint.pairing: is given, and 'chain.dof",
-        ),
-        (
-            {"contact.joint.normal": "[0.0, 0.0, 1.0]"},
-            "contact.joint.normal: is given, and 'chain.dof",
-        ),
+        ({"contact.stop.between": '["chain.dof0", "ground"]'}, "has 20 dofs, chain.dof1 to chain.dof20."),
+        ({"contact.joint.between": '["chain.dof12", "chain.DOF12"]'}, "pairs 'chain.dof12' with itself"),
+        ({"contact.joint.pairing": '"segment_to_segment"'}, "contact.joint.pairing: is given, and 'chain.dof"),
+        ({"contact.joint.normal": "[0.0, 0.0, 1.0]"}, "contact.joint.normal: is given, and 'chain.dof"),
         ({"output.peak": '"tip.dof20"'}, "no output 'tip.dof20'. Did you mean 'end.dof20'?"),
-        (
-            {"load.shaker.direction": '"y"'},
-            "load.shaker.direction: is given, but 'chain.dof20' is a single dof",
-        ),
-        (
-            {"modes.number": "21"},
-            "modes.number: is 21, and the model has 20 dofs with mass. Give at most 20.",
-        ),
-        (
-            {"modes.nodal_diameters": "[1]"},
-            "modes.nodal_diameters: are of a wheel, and no part is a sector of one",
-        ),
-        (
-            {"contact.brake.between": '["ground", "ground"]'},
-            "are both the ground. Name a place of a part first.",
-        ),
+        ({"load.shaker.direction": '"y"'}, "load.shaker.direction: is given, but 'chain.dof20' is a single dof"),
+        ({"modes.number": "21"}, "modes.number: is 21, and the model has 20 dofs with mass. Give at most 20."),
+        ({"modes.nodal_diameters": "[1]"}, "modes.nodal_diameters: are of a wheel, and no part is a sector of one"),
+        ({"contact.brake.between": '["ground", "ground"]'}, "are both the ground. Name a place of a part first."),
         ({"limits.memory_gb": "0.01"}, "the parts, some 2 nodes"),
         ({"damping.ratio": "1.0"}, "from 0 to below 1 (0.01 is 1 %)"),
-        (
-            {"reduction.fixed_interface_modes": "0"},
-            "It means: number of modes that craig_bampton keeps",
-        ),
+        ({"reduction.fixed_interface_modes": "0"}, "It means: number of modes that craig_bampton keeps"),
         ({"output.peak": '"end.x"'}, "no output 'end.x'. Known: end.dof20, middle.dof10."),
     ],
 )
@@ -215,7 +186,7 @@ M, K = matrices()
         ({"stiffness": K - 3e5 * np.diag(np.eye(20)[3])}, "stiffness: is not positive: a motion, dof4 the most"),
         ({"mass": M - np.diag(np.eye(20)[3])}, "mass: is negative, -0.5, at dof4"),
     ],
-)  # fmt: skip
+)
 def test_matrices_of_the_wrong_sign_are_refused_by_file_and_dof(tmp_path, arrays, message) -> None:
     said = refused("check", str(copied(tmp_path, {}, **arrays)))
     assert f"chain.npz: {message}" in said
@@ -263,9 +234,7 @@ def test_speeds_of_matrices_are_refused_together(tmp_path: Path) -> None:
     for name in ("chain.npz", "study.toml"):
         shutil.copy(EXAMPLE / name, tmp_path)
     path = tmp_path / "study.toml"
-    more = (
-        "[rotation]\nspeed_rpm = 100.0\n[campbell]\nspeeds_rpm = [0.0, 9.0]\nengine_orders = [2]\n"
-    )
+    more = "[rotation]\nspeed_rpm = 100.0\n[campbell]\nspeeds_rpm = [0.0, 9.0]\nengine_orders = [2]\n"
     path.write_text(path.read_text() + more)
     said = refused("check", str(path))
     assert "campbell: needs a part that a speed changes" in said

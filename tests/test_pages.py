@@ -42,9 +42,7 @@ def test_stuck_damper_leaves_the_multipliers_of_the_dashpot() -> None:
     found = ss.response.shoot(blade, damper.gap_operator, damper.laws, faint, omega, np.array([0]))
     # of the two springs the one along w has no stiffness and holds nothing
     expected = [1.0, *[np.exp(-0.2 * 2 * np.pi / omega / (2 * 0.1))] * 2, 0.0]
-    np.testing.assert_allclose(
-        np.sort(np.abs(found.floquet.multipliers))[::-1], expected, rtol=1e-9
-    )
+    np.testing.assert_allclose(np.sort(np.abs(found.floquet.multipliers))[::-1], expected, rtol=1e-9)
 
 
 def test_shoot_names_itself_when_it_refuses() -> None:

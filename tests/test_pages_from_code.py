@@ -27,7 +27,7 @@ def generate() -> ModuleType:
 
 def test_pages_in_the_repository_are_what_the_code_says(generate: ModuleType) -> None:
     pages = generate.kept()
-    there = {f"{p.parent.name}/{p.name}" for d in ("keys", "variables") for p in (DOCS / d).glob("*.md")}  # fmt: skip
+    there = {f"{p.parent.name}/{p.name}" for d in ("keys", "variables") for p in (DOCS / d).glob("*.md")}
     assert there | {"api.md"} == set(pages)
     old = [p for p, text in pages.items() if (DOCS / p).read_text(encoding="utf-8") != text]
     assert old == [], "run `python docs/generate.py`"

@@ -26,12 +26,7 @@ from stickslip.model.fe.free_solid import inertia_relief, rigid_motions
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import signals
 from stickslip.study.models.study import read_study
 
@@ -51,18 +46,18 @@ CONTACTS = {
 }
 
 
-def brick(radii: tuple[float, ...], angles: tuple[float, ...], heights: tuple[float, ...]) -> SolidMesh:  # fmt: skip
+def brick(radii: tuple[float, ...], angles: tuple[float, ...], heights: tuple[float, ...]) -> SolidMesh:
     """Return a piece of a ring; its faces are sets by where they lie."""
     shape = len(radii), len(angles), len(heights)
     number = np.arange(math.prod(shape)).reshape(shape)
-    points = np.array([[r * math.cos(a), r * math.sin(a), z] for r in radii for a in angles for z in heights])  # fmt: skip
+    points = np.array([[r * math.cos(a), r * math.sin(a), z] for r in radii for a in angles for z in heights])
     cells = [
         [number[i + a, j + b, k + c] for c in (0, 1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
         for i in range(shape[0] - 1)
         for j in range(shape[1] - 1)
         for k in range(shape[2] - 1)
     ]
-    sets = {"inside": number[0], "outside": number[-1], "cyclic_low": number[:, 0], "cyclic_high": number[:, -1]}  # fmt: skip
+    sets = {"inside": number[0], "outside": number[-1], "cyclic_low": number[:, 0], "cyclic_high": number[:, -1]}
     return SolidMesh(points, np.array(cells), {name: own.ravel() for name, own in sets.items()})
 
 
@@ -88,7 +83,7 @@ def segment() -> SolidMesh:
 
 def around(mesh: SolidMesh, names: tuple[str, ...]) -> SolidMesh:
     """Return all sectors of a ring, their faces merged, with the sets of each sector."""
-    n, (low, high) = len(mesh.points), (mesh.node_sets[f"cyclic_{side}"] for side in ("low", "high"))  # fmt: skip
+    n, (low, high) = len(mesh.points), (mesh.node_sets[f"cyclic_{side}"] for side in ("low", "high"))
     place = np.arange(SECTORS * n).reshape(SECTORS, n)
     for s in range(SECTORS):
         place[s, high] = place[(s + 1) % SECTORS, low]
@@ -101,29 +96,21 @@ def around(mesh: SolidMesh, names: tuple[str, ...]) -> SolidMesh:
 
 def contact(between: tuple[str, str], overlap: float, turn: float = 0.0) -> Contact:
     x, y, z = AXIS.rotation(turn) @ [0.3, 0.2, 1.0]
-    return Contact(between=between, law=LAW, pairing="node_to_segment", gap=-overlap, tangent=(x, y, z))  # fmt: skip
+    return Contact(between=between, law=LAW, pairing="node_to_segment", gap=-overlap, tangent=(x, y, z))
 
 
 def one_sector() -> Model:
     meshes = {"blade": blade(), "ring": ring(), "segment": segment()}
-    gas = {
-        f"order{m}": Load(on="blade.tip", newton=f, direction=GAS, engine_order=m)
-        for m, f in ORDERS.items()
-    }
+    gas = {f"order{m}": Load(on="blade.tip", newton=f, direction=GAS, engine_order=m) for m, f in ORDERS.items()}
     steady = Load(on="blade.tip", newton=300.0, direction=(0, 1, 1), harmonic=0, engine_order=0)
     return Model(
         parts={
-            name: solid_part(
-                mesh, STEEL, sectors=SECTORS, clamped=("root",) if name == "blade" else (), **OWN
-            )
+            name: solid_part(mesh, STEEL, sectors=SECTORS, clamped=("root",) if name == "blade" else (), **OWN)
             for name, mesh in meshes.items()
         },
         contacts={name: contact((a, b), overlap) for name, (a, b, overlap) in CONTACTS.items()},
         loads=gas | {"steady": steady},
-        outputs=(
-            Output(name="tip", on="blade.tip"),
-            Output(name="ring", on="ring", near=(0.206, 0.0, 0.018)),
-        ),
+        outputs=(Output(name="tip", on="blade.tip"), Output(name="ring", on="ring", near=(0.206, 0.0, 0.018))),
         speed=SPEED,
         coriolis=True,
     )
@@ -156,26 +143,25 @@ def all_sectors() -> Model:
             x, y, z = AXIS.rotation(PITCH * s) @ GAS
             loads[f"order{m}.{s}"] = Load(
                 on=f"blade.tip{s}", newton=force, direction=(x, y, z), harmonic=m, phase=m * s * PITCH
-            )  # fmt: skip
+            )
         x, y, z = AXIS.rotation(PITCH * s) @ [0, 1, 1]
-        loads[f"steady.{s}"] = Load(
-            on=f"blade.tip{s}", newton=300.0, direction=(x, y, z), harmonic=0
-        )
-    outputs = (
-        Output(name="tip", on="blade.tip0"),
-        Output(name="ring", on="ring", near=(0.206, 0.0, 0.018)),
-    )
-    return Model(
-        parts=parts, contacts=met, loads=loads, outputs=outputs, speed=SPEED, coriolis=True
-    )
+        loads[f"steady.{s}"] = Load(on=f"blade.tip{s}", newton=300.0, direction=(x, y, z), harmonic=0)
+    outputs = (Output(name="tip", on="blade.tip0"), Output(name="ring", on="ring", near=(0.206, 0.0, 0.018)))
+    return Model(parts=parts, contacts=met, loads=loads, outputs=outputs, speed=SPEED, coriolis=True)
 
 
 def answered(model: Model, hertz: float):
     found = assemble(model, H)
     omega = 2 * math.pi * hertz
     sweep = Sweep(
-        omega_range=(0.999 * omega, omega), at=(omega,), low=H, high=H, selection="always_low", peak_points=0, samples=128,
-    )  # fmt: skip
+        omega_range=(0.999 * omega, omega),
+        at=(omega,),
+        low=H,
+        high=H,
+        selection="always_low",
+        peak_points=0,
+        samples=128,
+    )
     problem = forced_problem(found.system, found.load, sweep)
     (point,) = accepted_points(list(forced_response(found.system, found.load, sweep)))
     assert point.converged
@@ -190,7 +176,7 @@ def test_modes_and_static_state_are_those_of_all_sectors() -> None:
     np.testing.assert_allclose(np.sort(np.concatenate(waves))[:12], whole, rtol=1e-8)
     found, all_of_it = assemble(one, H), assemble(every, H)
     force = found.static_force
-    assert np.abs(np.tile(force, (SECTORS, 1)) - all_of_it.static_force).max() < 1e-9 * np.abs(force).max()  # fmt: skip
+    assert np.abs(np.tile(force, (SECTORS, 1)) - all_of_it.static_force).max() < 1e-9 * np.abs(force).max()
     # all of the piece's own weight at this speed presses on the two shrouds; friction carries a part of it
     piece = one.parts["segment"]
     weight = SPEED**2 * np.linalg.norm(piece.solid.centrifugal.reshape(-1, 3).sum(axis=0))
@@ -198,9 +184,7 @@ def test_modes_and_static_state_are_those_of_all_sectors() -> None:
     for i, group in enumerate(table.groups):
         if group in ("behind", "ahead"):
             held += table.frame[i] @ force[i]
-    assert np.linalg.norm(held) == pytest.approx(
-        weight, rel=0.02
-    )  # its own displacement adds the rest
+    assert np.linalg.norm(held) == pytest.approx(weight, rel=0.02)  # its own displacement adds the rest
 
 
 def test_a_free_solid_at_speed_is_in_balance_with_its_inertia() -> None:
@@ -214,7 +198,7 @@ def test_a_free_solid_at_speed_is_in_balance_with_its_inertia() -> None:
     moved, carried = inertia_relief(whole)
     of_sector, nothing = inertia_relief(part.solid, tie)
     load = whole.centrifugal
-    assert np.abs(whole.structure.stiffness @ moved - load + carried).max() < 1e-9 * np.abs(load).max()  # fmt: skip
+    assert np.abs(whole.structure.stiffness @ moved - load + carried).max() < 1e-9 * np.abs(load).max()
     assert max(np.abs(carried).max(), np.abs(nothing).max()) < 1e-9 * np.abs(load).max()
     grown = np.linalg.norm(moved.reshape(-1, 3)[:, :2], axis=1)
     assert np.ptp(grown) < 0.2 * grown.max()
@@ -228,7 +212,7 @@ def test_a_free_solid_at_speed_is_in_balance_with_its_inertia() -> None:
     joined = Model(
         parts={"blade": held, "tip": solid_part(ring(), STEEL, clamped=(), sectors=SECTORS), "ring": part},
         joins={"welded": Join(between=("tip.inside", "blade.outside"))},
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(joined.steady["ring"].unit, of_sector, rtol=1e-12)
 
 
@@ -266,5 +250,5 @@ def test_a_deck_without_cyclic_faces_says_so_in_the_study(tmp_path: Path) -> Non
     force = assemble(model, 1).static_force
     assert np.all(force[:, 2].reshape(2, -1).sum(axis=1) < -100.0)  # pressed on both sides
     (tmp_path / "study.toml").write_text(text.replace("cyclic = 'none'\n", ""))
-    with pytest.raises(InputError, match='Of a part that only contacts connect say cyclic = "none"'):  # fmt: skip
+    with pytest.raises(InputError, match='Of a part that only contacts connect say cyclic = "none"'):
         read_study(tmp_path / "study.toml").model()

@@ -73,9 +73,7 @@ def whole(tmp_path_factory):
         ('method = "none"', 1e-12),
     ],
 )
-def test_each_reduction_gives_frequencies_and_response_of_the_whole_part(
-    tmp_path, whole, keys, tolerance
-):
+def test_each_reduction_gives_frequencies_and_response_of_the_whole_part(tmp_path, whole, keys, tolerance):
     found = model(tmp_path, f"{RAYLEIGH}[part.rod.reduction]\n{keys}\n")
     small, full = assemble(found, 3), assemble(whole, 3)
     assert (small.counts["reduced"] < full.counts["reduced"]) == ("none" not in keys)
@@ -84,7 +82,7 @@ def test_each_reduction_gives_frequencies_and_response_of_the_whole_part(
         np.testing.assert_allclose(mine, theirs, rtol=tolerance)
     one, other = answered(found), answered(whole)
     for mine, theirs in zip(one, other, strict=True):
-        assert np.abs(mine.outputs - theirs.outputs).max() <= 100 * tolerance * np.abs(theirs.outputs).max()  # fmt: skip
+        assert np.abs(mine.outputs - theirs.outputs).max() <= 100 * tolerance * np.abs(theirs.outputs).max()
 
 
 def test_a_number_above_that_of_the_modes_keeps_all():
@@ -126,9 +124,7 @@ def test_reductions_without_a_file_are_refused_alike():
         Reduction(FrequencyError(1e-3, 100.0), "rubin")
 
 
-@pytest.mark.parametrize(
-    "keys", ['method = "rubin"\nfree_interface_modes = 12', "up_to_hz = 2500.0"]
-)
+@pytest.mark.parametrize("keys", ['method = "rubin"\nfree_interface_modes = 12', "up_to_hz = 2500.0"])
 def test_waves_of_a_wheel_are_reduced_in_the_same_ways(tmp_path, keys):
     path = write_shrouded_sector(tmp_path)
     text = path.read_text()
@@ -153,7 +149,7 @@ def test_shapes_stand_for_joined_nodes():
         # the answer to static forces on what stays is exact however few there are
         np.testing.assert_allclose(small.static_gap, full.static_gap, atol=1e-12)
         for mine, theirs in zip(answered(model), answered(plain), strict=True):
-            assert np.abs(mine.outputs - theirs.outputs).max() <= 5 * tolerance * np.abs(theirs.outputs).max()  # fmt: skip
+            assert np.abs(mine.outputs - theirs.outputs).max() <= 5 * tolerance * np.abs(theirs.outputs).max()
 
 
 def ratios(structure) -> np.ndarray:
@@ -235,7 +231,10 @@ def test_wrong_dampings_are_named(given, message):
 
 
 def test_structural_damping_is_not_integrated_in_time(tmp_path):
-    text = BEAM.replace('"jenkins"', '"elastic_coulomb"').replace("slip_limit_n = 1.0", "friction_coefficient = 0.3\nnormal_stiffness_n_per_m = 1e5\naxial_stiffness_n_per_m = 5e3\npreload_n = 3.0")  # fmt: skip
+    text = BEAM.replace('"jenkins"', '"elastic_coulomb"').replace(
+        "slip_limit_n = 1.0",
+        "friction_coefficient = 0.3\nnormal_stiffness_n_per_m = 1e5\naxial_stiffness_n_per_m = 5e3\npreload_n = 3.0",
+    )
     (tmp_path / "study.toml").write_text(text.format(tables="[damping]\nloss_factor = 0.01\n"))
     said = refused("run", str(tmp_path / "study.toml"), "--verify")
     assert "damping.loss_factor" in said

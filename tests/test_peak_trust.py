@@ -34,20 +34,13 @@ RNG_PLACES = np.random.default_rng(7)
 def cantilever(newton, modes=3):
     """A steel strip, held at its root, with a slider that never slips at its tip."""
     mesh = box(20, (LENGTH, 0.01, THICKNESS), (8, 1, 1))
-    part = solid_part(
-        mesh,
-        Material(),
-        reduction=Reduction(modes),
-        damping=Damping(modal=0.002),
-    )
+    part = solid_part(mesh, Material(), reduction=Reduction(modes), damping=Damping(modal=0.002))
     tip = int(mesh.node_sets["tip"][0])
     return ss.Model(
         parts={"strip": part},
         contacts={
             "hold": ss.Contact(
-                between=(f"strip.node{tip}.y", "ground"),
-                law=ss.Jenkins(k_t=1.0, limit=1e9),
-                acts="tangential",
+                between=(f"strip.node{tip}.y", "ground"), law=ss.Jenkins(k_t=1.0, limit=1e9), acts="tangential"
             )
         },
         loads={"f": ss.Load(on=f"strip.node{tip}.z", newton=newton)},
@@ -63,10 +56,7 @@ def test_motions_beyond_linear_kinematics_are_doubted():
     model = cantilever(3.0)
     hz = first_hz(model)
     gentle = replace(model, loads={"f": replace(model.loads["f"], newton=0.01)})
-    small, large = (
-        m.forced_response(hz=(0.99 * hz, 1.01 * hz), points=6, peak_points=3)
-        for m in (gentle, model)
-    )
+    small, large = (m.forced_response(hz=(0.99 * hz, 1.01 * hz), points=6, peak_points=3) for m in (gentle, model))
     told = "\n".join(map(str, large.verdicts))
     assert "too large for linear kinematics" in told
     assert "a part turns by" in told
@@ -86,9 +76,7 @@ def chain(modes):
     return ss.Model(
         parts={"ch": ss.Part(structure=body, reduction=Reduction(modes))},
         contacts={
-            "brake": ss.Contact(
-                between=("ch.d", "ground"), law=ss.Jenkins(k_t=1e5, limit=0.3), acts="tangential"
-            )
+            "brake": ss.Contact(between=("ch.d", "ground"), law=ss.Jenkins(k_t=1e5, limit=0.3), acts="tangential")
         },
         loads={"f": ss.Load(on="ch.a", newton=1.0)},
         outputs=(ss.Output(name="l", on="ch.l"),),
@@ -114,14 +102,9 @@ def test_parts_that_keep_all_modes_have_no_richer_model():
 
 def test_half_the_points_of_a_contact_are_as_stiff_together():
     n = 10
-    laws = tuple(
-        ElasticCoulomb(k_t=k, k_w=k, k_n=2 * k, mu=0.3, preload=1.0)
-        for k in RNG_PLACES.uniform(1.0, 2.0, n)
-    )
+    laws = tuple(ElasticCoulomb(k_t=k, k_w=k, k_n=2 * k, mu=0.3, preload=1.0) for k in RNG_PLACES.uniform(1.0, 2.0, n))
     structure = Structure(np.eye(3 * n), 0 * np.eye(3 * n), np.eye(3 * n), numbered_dofs(3 * n))
-    system = System(
-        structure, Interface(tuple(map(str, range(n))), laws, np.eye(3 * n)), np.array([0])
-    )
+    system = System(structure, Interface(tuple(map(str, range(n))), laws, np.eye(3 * n)), np.array([0]))
     place = np.stack([np.arange(n), np.zeros(n), np.zeros(n)], axis=1)
     few, left = halved(system, ["a"] * n, place, np.ones(n))
     assert left == n // 2
@@ -130,9 +113,7 @@ def test_half_the_points_of_a_contact_are_as_stiff_together():
     assert after == pytest.approx(before, rel=1e-12)
     # each point lies between the two that it stands for: a body that turns meets the same moment
     turned = np.repeat(place[:, 0], 3)
-    forces = [
-        s.interface.stuck_stiffness() * (s.interface.gap_operator @ turned) for s in (system, few)
-    ]
+    forces = [s.interface.stuck_stiffness() * (s.interface.gap_operator @ turned) for s in (system, few)]
     assert forces[1].sum() == pytest.approx(forces[0].sum(), rel=1e-12)
     assert halved(system, ["a"] * n, place, np.full(n, np.nan)) is None
 
@@ -142,11 +123,7 @@ def test_another_motion_beside_the_response_is_named():
     body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), 4.0 * np.eye(1), names=("m",))
     model = ss.Model(
         parts={"one": ss.Part(structure=body)},
-        contacts={
-            "c": ss.Contact(
-                between=("one.m", "ground"), law=CubicSpring(cubic_t=1e8), acts="tangential"
-            )
-        },
+        contacts={"c": ss.Contact(between=("one.m", "ground"), law=CubicSpring(cubic_t=1e8), acts="tangential")},
         loads={"f": ss.Load(on="one.m", newton=100.0)},
         outputs=(ss.Output(name="m", on="one.m"),),
     )
@@ -165,9 +142,7 @@ def test_another_motion_beside_the_response_is_named():
 def stop_at(hz: list[float]) -> dict[float, tuple[int, int]]:
     """Return verdict and stability of a mass that meets a stop, by frequency."""
     body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), np.eye(1), names=("m",))
-    stop = ss.Contact(
-        between=("b.m", "ground"), law=ss.UnilateralSpring(k_n=5e3, initial_gap=1e-3), acts="normal"
-    )
+    stop = ss.Contact(between=("b.m", "ground"), law=ss.UnilateralSpring(k_n=5e3, initial_gap=1e-3), acts="normal")
     model = ss.Model(
         parts={"b": ss.Part(structure=body)},
         contacts={"stop": stop},
@@ -193,10 +168,7 @@ def duffing_points():
     system = System(structure, contact, np.array([0]))
     load = HarmonicLoad(np.zeros(1), {1: np.array([100.0 + 0j])})
     sweep = Sweep(omega_range=(50.0, 90.0), points=5, peak_points=0)
-    return (
-        forced_problem(system, load, sweep),
-        accepted_points(list(forced_response(system, load, sweep))),
-    )
+    return (forced_problem(system, load, sweep), accepted_points(list(forced_response(system, load, sweep))))
 
 
 def test_a_search_for_other_motions_marches_within_the_work_of_the_response(monkeypatch):
@@ -214,9 +186,7 @@ def test_a_search_for_other_motions_marches_within_the_work_of_the_response(monk
     each = replace(points[0], iterations=1)
     few = [each] * 40
     list(other_motions.other_motions(problem, points[:3], few, 0))
-    work = (1 + other_motions.JUDGED) * (
-        other_motions.NEWTON_FLOPS + other_motions.FLOPS_AN_UNKNOWN * each.unknowns
-    )
+    work = (1 + other_motions.JUDGED) * (other_motions.NEWTON_FLOPS + other_motions.FLOPS_AN_UNKNOWN * each.unknowns)
     period = other_motions.STEPS * other_motions.LONGER * step_work(1, 3)
     assert marched
     assert sum(marched) * period <= other_motions.MARCHED * 40 * work

@@ -32,11 +32,7 @@ def three_masses(limit=1e7, newton=1.0, damping=None, loss=None):
     return ss.Model(
         parts={"ch": ss.Part(structure=body, **own)},
         contacts={
-            "brake": ss.Contact(
-                between=("ch.b", "ground"),
-                law=ss.Jenkins(k_t=5e3, limit=limit),
-                acts="tangential",
-            )
+            "brake": ss.Contact(between=("ch.b", "ground"), law=ss.Jenkins(k_t=5e3, limit=limit), acts="tangential")
         },
         loads={"f": ss.Load(on="ch.a", newton=newton)},
         outputs=(ss.Output(name="a", on="ch.a"),),
@@ -94,11 +90,7 @@ def test_a_part_without_damping_beside_a_damped_one_is_found():
     body = ss.model.lumped(np.eye(2), 1e4 * np.eye(2), np.diag([1.0, 0.0]), names=("a", "b"))
     model = ss.Model(
         parts={"two": ss.Part(structure=body)},
-        contacts={
-            "c": ss.Contact(
-                between=("two.b", "ground"), law=ss.Jenkins(k_t=1.0, limit=1e3), acts="tangential"
-            )
-        },
+        contacts={"c": ss.Contact(between=("two.b", "ground"), law=ss.Jenkins(k_t=1.0, limit=1e3), acts="tangential")},
         loads={"f": ss.Load(on="two.b", newton=1.0), "g": ss.Load(on="two.a", newton=1.0)},
         outputs=(ss.Output(name="b", on="two.b"),),
     )
@@ -112,13 +104,7 @@ def test_the_bound_of_friction_is_four_over_pi_of_its_limit(newton, above):
     body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), names=("m",))
     model = ss.Model(
         parts={"one": ss.Part(structure=body)},
-        contacts={
-            "c": ss.Contact(
-                between=("one.m", "ground"),
-                law=ss.Jenkins(k_t=1e6, limit=10.0),
-                acts="tangential",
-            )
-        },
+        contacts={"c": ss.Contact(between=("one.m", "ground"), law=ss.Jenkins(k_t=1e6, limit=10.0), acts="tangential")},
         loads={"f": ss.Load(on="one.m", newton=newton * 4 / np.pi * 10.0)},
         outputs=(ss.Output(name="m", on="one.m"),),
     )
@@ -132,20 +118,14 @@ def test_a_slider_is_softer_and_damps_most_at_twice_the_amplitude_where_slip_beg
     # closed form of the first harmonic of an elastic, perfectly plastic loop at x = 2
     assert complex_stiffness(2.0) == pytest.approx(0.5 + 1j / np.pi, rel=1e-12)
     ratios = np.linspace(1.0, 6.0, 501)
-    assert ratios[np.argmax([complex_stiffness(x).imag for x in ratios])] == pytest.approx(
-        2.0, abs=0.01
-    )
+    assert ratios[np.argmax([complex_stiffness(x).imag for x in ratios])] == pytest.approx(2.0, abs=0.01)
 
 
 def test_what_friction_can_do_to_one_mass_is_its_describing_function():
     body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), np.eye(1) * 0.02, names=("m",))
     model = ss.Model(
         parts={"one": ss.Part(structure=body)},
-        contacts={
-            "c": ss.Contact(
-                between=("one.m", "ground"), law=ss.Jenkins(k_t=2e3, limit=1.0), acts="tangential"
-            )
-        },
+        contacts={"c": ss.Contact(between=("one.m", "ground"), law=ss.Jenkins(k_t=2e3, limit=1.0), acts="tangential")},
         loads={"f": ss.Load(on="one.m", newton=1.0)},
         outputs=(ss.Output(name="m", on="one.m"),),
     )
@@ -173,9 +153,7 @@ def test_stiffness_alone_bounds_an_undamped_hardening_oscillator():
     size = {}
     for damping in (0.0, 2e-5):
         body = ss.model.lumped(np.eye(1), np.eye(1), damping * np.eye(1), names=("x",))
-        spring = ss.Contact(
-            between=("p.x", "ground"), law=ss.CubicSpring(cubic_t=1.0), acts="tangential"
-        )
+        spring = ss.Contact(between=("p.x", "ground"), law=ss.CubicSpring(cubic_t=1.0), acts="tangential")
         model = ss.Model(
             parts={"p": ss.Part(structure=body)},
             contacts={"s": spring},
@@ -183,9 +161,7 @@ def test_stiffness_alone_bounds_an_undamped_hardening_oscillator():
             outputs=(ss.Output(name="o", on="p.x"),),
         )
         rad = 2 * np.pi
-        result = model.forced_response(
-            hz=(0.8 / rad, 1.6 / rad), points=20, high=7, stability="peak"
-        )
+        result = model.forced_response(hz=(0.8 / rad, 1.6 / rad), points=20, high=7, stability="peak")
         told = "\n".join(map(str, result.verdicts))
         assert "nothing damps" not in told.lower()
         assert "WRONG" not in told
@@ -199,10 +175,7 @@ def test_check_says_which_stuck_frequency_counts(tmp_path, caplog):
     """Four masses: an open contact stuck as well would give 16.09 Hz; two modes in the range: the larger resonance first."""
     caplog.set_level("INFO", logger=LOG.name)
     text = (EXAMPLES / "four_masses" / "study.toml").read_text()
-    for name, own in (
-        ("one", text),
-        ("two", re.sub(r"(frequency_hz = \[[^,]*, )[^\]]*", r"\g<1>50.0", text)),
-    ):
+    for name, own in (("one", text), ("two", re.sub(r"(frequency_hz = \[[^,]*, )[^\]]*", r"\g<1>50.0", text))):
         (tmp_path / f"{name}.toml").write_text(own)
         caplog.clear()
         ss.Study.from_file(tmp_path / f"{name}.toml").check()
@@ -225,10 +198,7 @@ def test_the_driven_mode_is_that_of_the_largest_resonance():
 def test_check_says_before_any_response_that_nothing_damps_a_mode(tmp_path):
     text = (EXAMPLES / "four_masses" / "study.toml").read_text()
     told = {}
-    for name, own in (
-        ("damped", text),
-        ("undamped", re.sub(r"^dashpots.*\n", "", text, flags=re.MULTILINE)),
-    ):
+    for name, own in (("damped", text), ("undamped", re.sub(r"^dashpots.*\n", "", text, flags=re.MULTILINE))):
         (tmp_path / f"{name}.toml").write_text(own)
         told[name] = "\n".join(ss.Study.from_file(tmp_path / f"{name}.toml").check())
     assert "nothing damps the mode at 14.09 Hz" in told["undamped"]

@@ -67,9 +67,7 @@ def test_shakedown(evaluator):
 @pytest.mark.parametrize("evaluator", EVALUATORS)
 @pytest.mark.parametrize("mean", [0.0, 1.0])
 def test_a_limit_of_zero(evaluator, mean):
-    period = tangential(
-        ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=1.0, preload=0.0), mean, 1.0, evaluator
-    )
+    period = tangential(ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=1.0, preload=0.0), mean, 1.0, evaluator)
     assert np.all(period.coefficients[:, 0] == 0.0)
     assert np.all(period.blocks[0][TT] == 0.0)
     assert not np.any(period.state[0, 0] == STICK)
@@ -165,15 +163,10 @@ def test_frequency_stepping_ends_at_a_fold(parametrisation, through):
     weights[:1] = 0.0
     control = StepControl(scale=0.15, largest=0.25, max_points=300)
     following = Following(
-        newton=Newton(max_iterations=10),
-        control=control,
-        weights=weights,
-        parametrisation=parametrisation,
+        newton=Newton(max_iterations=10), control=control, weights=weights, parametrisation=parametrisation
     )
     # downward from above the peak, which bends to lower frequencies
-    start = start_point(
-        balance, balance.unknowns(bonded(system, load, 1.0, balance)), 1.0, following
-    )
+    start = start_point(balance, balance.unknowns(bonded(system, load, 1.0, balance)), 1.0, following)
     assert start.solution.status.converged
     last = list(trace(balance, start, 1.6, following))[-1]
     assert (last.p == 1.6 and last.solution.status.converged) is through
@@ -189,9 +182,9 @@ def rubbing(retention):
     gap[0] = [1.0, -1.0]
     law = ElasticCoulomb(k_t=1.0, k_w=0.0, k_n=0.0, mu=1.0, preload=1e-4)
     structure = Structure(mass, np.diag([0.02, 0.0]), stiffness, table(("x", "xD")))
-    system = System(
-        structure, Interface(("d",), (law,), gap), np.array([0]), free=np.array([1])
-    ).with_retention(retention)
+    system = System(structure, Interface(("d",), (law,), gap), np.array([0]), free=np.array([1])).with_retention(
+        retention
+    )
     return system, HarmonicLoad(np.zeros(2), {1: np.array([0.1, 0.0], dtype=complex)})
 
 
@@ -208,9 +201,7 @@ def test_free_damper():
         q[1, 0] = 0.1 / (1.0 - omega**2 + 0.02j * omega)
         q = q if system.retained.size == 2 else q[:, -1:]
         solution = newton(
-            lambda v, b=balance, w=omega: b.linearise(v, w),
-            balance.unknowns(q),
-            Newton(max_iterations=60),
+            lambda v, b=balance, w=omega: b.linearise(v, w), balance.unknowns(q), Newton(max_iterations=60)
         )
         point = forced_point(balance, solution, "low", 0, omega, 0.0)
         found[retention] = solution.status, drift(problem, point)
@@ -224,16 +215,10 @@ def test_free_damper():
 def test_free_damper_by_products(retention):
     # the same question asked of the products: thousands of contacts leave no room for the array
     system, load = rubbing(retention)
-    balance = forced_problem(
-        system, load, Sweep(omega_range=(0.8, 1.2), selection="always_high", high=3)
-    ).low
+    balance = forced_problem(system, load, Sweep(omega_range=(0.8, 1.2), selection="always_high", high=3)).low
     q = np.zeros((4, system.retained.size), dtype=complex)
     q[1, 0] = 0.1 / (1.0 - 0.9**2 + 0.02j * 0.9)
-    jac = (
-        replace(balance, jacobian="structured")
-        .linearise(balance.unknowns(q[:, -balance.linear.n :]), 0.9)
-        .jac
-    )
+    jac = replace(balance, jacobian="structured").linearise(balance.unknowns(q[:, -balance.linear.n :]), 0.9).jac
     ratio, vector = as_array(jac.dense())
     found = by_products(jac)
     if retention == 0.0:

@@ -17,9 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def evaluate(coefficients, *laws, samples=0, weights=None):
-    return contact_forces(
-        coefficients, compile_contacts(laws, weights, "events"), samples, history=samples > 0
-    )
+    return contact_forces(coefficients, compile_contacts(laws, weights, "events"), samples, history=samples > 0)
 
 
 def draw(seed):
@@ -52,7 +50,7 @@ def test_a_circle(row):
     period = evaluate(gaps, ss.CoupledCoulomb(k_t=1.0, k_n=0.0, mu=1.0, preload=1.0))
     for tangent, phase in ((0, 1.0), (1, 1j)):
         c = period.coefficients[:, tangent]
-        assert phase * (c[1] - 1j * c[2]) / ratio == pytest.approx(exact_stiffness(ratio), abs=1e-12)  # fmt: skip
+        assert phase * (c[1] - 1j * c[2]) / ratio == pytest.approx(exact_stiffness(ratio), abs=1e-12)
         assert np.max(np.abs(np.delete(c, [1, 2]))) <= 1e-9
     assert period.unsettled == 0
 
@@ -90,9 +88,7 @@ def test_no_motion_keeps_what_the_first_period_left():
     gaps[0, 0], gaps[0, 1], gaps[1, 2] = 3.0, 4.0, 1.0
     law = ss.CoupledCoulomb(k_t=1.0, k_n=1.0, mu=0.5, preload=3.0)
     period = evaluate(gaps, law, samples=16)
-    assert period.coefficients[0, :2] == pytest.approx(
-        [0.6, 0.8], abs=1e-9
-    )  # mu (3 - 1), along the stretch
+    assert period.coefficients[0, :2] == pytest.approx([0.6, 0.8], abs=1e-9)  # mu (3 - 1), along the stretch
     assert np.max(np.abs(period.coefficients[1:, :2])) <= 1e-9
     # the least limit moves with the gap where it is least, and the force turns with the stretch
     blocks = period.blocks[0]
@@ -234,7 +230,7 @@ def test_forces_scale(seed, factor):
     f = 10.0**factor
     many = ss.CoupledCoulomb(k_t=f * law.k_t, k_n=f * law.k_n, mu=law.mu, preload=f * law.preload)
     a, b = evaluate(gaps, law), evaluate(gaps, many)
-    assert np.allclose(f * a.coefficients, b.coefficients, rtol=0, atol=1e-9 * f * size_of(gaps, law))  # fmt: skip
+    assert np.allclose(f * a.coefficients, b.coefficients, rtol=0, atol=1e-9 * f * size_of(gaps, law))
 
 
 @settings(max_examples=60, deadline=None)
@@ -281,15 +277,18 @@ def test_mixed_interfaces(evaluator):
         rows = min(m, len(own))
         gaps[:rows, 3 * c : 3 * c + 3] = own[:rows]
     gaps[:, 9:] = gaps[:, :3]
-    laws = [drawn[0][1], ss.ElasticCoulomb(k_t=1.0, k_w=2.0, k_n=1.0, mu=0.3, preload=2.0), drawn[2][1], ss.CubicSpring(cubic_t=0.1)]  # fmt: skip
+    laws = [
+        drawn[0][1],
+        ss.ElasticCoulomb(k_t=1.0, k_w=2.0, k_n=1.0, mu=0.3, preload=2.0),
+        drawn[2][1],
+        ss.CubicSpring(cubic_t=0.1),
+    ]
     weights = np.array([1.0, 2.0, 0.5, 3.0])
     whole = contact_forces(gaps, compile_contacts(laws, weights, evaluator), 64)
     for c, law in enumerate(laws):
-        alone = contact_forces(gaps[:, 3 * c : 3 * c + 3], compile_contacts([law], None, evaluator), 64)  # fmt: skip
+        alone = contact_forces(gaps[:, 3 * c : 3 * c + 3], compile_contacts([law], None, evaluator), 64)
         pairs = alone.blocks.shape[1]
-        assert np.allclose(
-            whole.coefficients[:, 3 * c : 3 * c + 3], weights[c] * alone.coefficients
-        )
+        assert np.allclose(whole.coefficients[:, 3 * c : 3 * c + 3], weights[c] * alone.coefficients)
         assert np.allclose(whole.blocks[c, :pairs], weights[c] * alone.blocks[0])
         assert np.array_equal(whole.state[c], alone.state[0])
 

@@ -10,7 +10,7 @@ from evidence.judges.planar_contact import Contact, judged
 
 def drawn_gaps(seed, lift=0.8):
     rng = np.random.default_rng(seed)
-    return rng.standard_normal((7, 3)) * [1.0, 1.0, lift] / np.array([[1], [1], [1], [2], [2], [3], [3]])  # fmt: skip
+    return rng.standard_normal((7, 3)) * [1.0, 1.0, lift] / np.array([[1], [1], [1], [2], [2], [3], [3]])
 
 
 @pytest.mark.parametrize("ratio", [0.9, 1.5, 2.0, 5.0])
@@ -31,9 +31,7 @@ def test_one_tangent_alone_loses_the_work_of_a_jenkins_spring():
     found = judged(gaps, Contact(k_t=9.0, k_w=2.0, k_n=0.0, mu=0.5, preload=4.0)).coefficients
     limit, k, amplitude = 2.0, 2.0, 3.0
     # work over a period = -π A S_1 of the force, and 4 F (A - F/k)
-    assert -np.pi * amplitude * found[2, 1] == pytest.approx(
-        4 * limit * (amplitude - limit / k), rel=1e-11
-    )
+    assert -np.pi * amplitude * found[2, 1] == pytest.approx(4 * limit * (amplitude - limit / k), rel=1e-11)
     assert np.all(np.abs(found[:, 0]) < 1e-14)
 
 
@@ -45,7 +43,7 @@ def marched(gaps, contact, samples, periods):
     basis[:, 1::2], basis[:, 2::2] = np.cos(np.outer(tau, h)), np.sin(np.outer(tau, h))
     kt, kw = contact.springs
     normal = np.maximum(0.0, contact.preload - contact.k_n * (basis @ gaps[:, 2]))
-    limits, x, y = (contact.mu * normal).tolist(), (basis @ gaps[:, 0]).tolist(), (basis @ gaps[:, 1]).tolist()  # fmt: skip
+    limits, x, y = (contact.mu * normal).tolist(), (basis @ gaps[:, 0]).tolist(), (basis @ gaps[:, 1]).tolist()
     out = np.empty((samples, 2))
     sx = sy = 0.0
     for _ in range(periods):

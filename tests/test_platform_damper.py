@@ -54,8 +54,7 @@ def plate() -> Part:
         surfaces[name] = BodyPoints(names, points, np.tile(frame.astype(float), (4, 1, 1)))
     tensor = np.array([[3.0, 0.5, 0.4], [0.5, 2.5, -0.3], [0.4, -0.3, 4.0]]) * 1e-6
     return placed_body(
-        rigid_part(body_of_tensor(0.02, tensor, np.array([0.189, 0.0, 0.001])), surfaces),
-        place_of(turn=PITCH / 2),
+        rigid_part(body_of_tensor(0.02, tensor, np.array([0.189, 0.0, 0.001])), surfaces), place_of(turn=PITCH / 2)
     )
 
 
@@ -73,8 +72,9 @@ def one_sector() -> Model:
         contacts=contacts("", "blade.shroud_high", "next.blade.shroud_low"),
         loads={"gas": Load(on="blade.tip", newton=4000.0, direction=(0.2, 1, 0.3), engine_order=ORDER)},
         outputs=(Output(name="tip", on="blade.tip"), Output(name="damper", on="damper")),
-        speed=SPEED, retention=1e5,
-    )  # fmt: skip
+        speed=SPEED,
+        retention=1e5,
+    )
 
 
 def all_sectors() -> Model:
@@ -89,13 +89,9 @@ def all_sectors() -> Model:
         parts[f"damper{s}"] = placed_body(plate(), place_of(turn=s * PITCH))
         met |= contacts(str(s), f"wheel.shroud_high{s}", f"wheel.shroud_low{(s + 1) % SECTORS}")
         x, y, z = AXIS.rotation(s * PITCH) @ [0.2, 1, 0.3]
-        loads[f"gas{s}"] = Load(
-            on=f"wheel.tip{s}", newton=4000.0, direction=(x, y, z), phase=ORDER * s * PITCH
-        )
+        loads[f"gas{s}"] = Load(on=f"wheel.tip{s}", newton=4000.0, direction=(x, y, z), phase=ORDER * s * PITCH)
     outputs = (Output(name="tip", on="wheel.tip0"), Output(name="damper", on="damper0"))
-    return Model(
-        parts=parts, contacts=met, loads=loads, outputs=outputs, speed=SPEED, retention=1e5
-    )
+    return Model(parts=parts, contacts=met, loads=loads, outputs=outputs, speed=SPEED, retention=1e5)
 
 
 @pytest.mark.kernel
@@ -108,9 +104,7 @@ def test_a_damper_between_sectors_answers_on_one_sector_as_on_all() -> None:
     found, all_of_it = assemble(one, H), assemble(every, H)
     assert found.system.retained.size == 8 * 3 + 6  # the motion of points, not of nodes
     np.testing.assert_allclose(
-        np.tile(found.static_force, (SECTORS, 1)),
-        all_of_it.static_force,
-        atol=1e-9 * np.abs(found.static_force).max(),
+        np.tile(found.static_force, (SECTORS, 1)), all_of_it.static_force, atol=1e-9 * np.abs(found.static_force).max()
     )
     hertz = (2000.0, 2050.0)
     mine, theirs = (answered(a.system, a.load, hertz) for a in (found, all_of_it))
@@ -120,9 +114,7 @@ def test_a_damper_between_sectors_answers_on_one_sector_as_on_all() -> None:
 
 
 @pytest.mark.kernel
-def test_the_motion_of_points_stands_for_that_of_the_nodes_around_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_motion_of_points_stands_for_that_of_the_nodes_around_them(monkeypatch: pytest.MonkeyPatch) -> None:
     few = assemble(one_sector(), H)
 
     def refuse(*_: object) -> None:
@@ -143,11 +135,7 @@ def test_single_dofs_of_the_next_sector_count_along_the_axes_of_this_one() -> No
     pairs = Model(parts=one.parts, contacts={"link": link}).pairs
     own = one.places.own("damper")
     moved = np.zeros(one.places.n)
-    moved[own[:3]] = AXIS.rotation(-PITCH) @ [
-        1.0,
-        0.0,
-        0.0,
-    ]  # in the axes of the next sector, along x of this one
+    moved[own[:3]] = AXIS.rotation(-PITCH) @ [1.0, 0.0, 0.0]  # in the axes of the next sector, along x of this one
     np.testing.assert_allclose((pairs.following @ moved)[0], 1.0)
     moved[own[:3]] = AXIS.rotation(-PITCH) @ [0.0, 1.0, 0.0]
     np.testing.assert_allclose(pairs.following @ moved, 0.0, atol=1e-15)
@@ -160,9 +148,7 @@ def write(folder: Path, changes: dict[str, str]) -> Path:
     return path
 
 
-def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(
-    tmp_path: Path,
-) -> None:
+def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(tmp_path: Path) -> None:
     keys = {"points": "6", "peak_points": "4", "stability": '"off"'}
     path = write(tmp_path, {f"forced_response.{key}": value for key, value in keys.items()})
     done("run", str(path), "--no-report", "--only", "forced_response")
@@ -175,17 +161,8 @@ def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(
     total = np.einsum("pij,pj->i", frame, force)
     speed = 6000 * RPM
     depth = 0.002 * math.tan(37.5 * math.pi / 180) + 0.006 / 2  # about the middle of the section
-    pull = (
-        7850
-        * 0.03
-        * 0.006
-        * (0.004 + 0.006 / math.tan(37.5 * math.pi / 180))
-        * speed**2
-        * (0.18483 - depth)
-    )
-    np.testing.assert_allclose(
-        total, -pull * AXIS.rotation(math.pi / 24) @ [1, 0, 0], atol=0.05 * pull
-    )
+    pull = 7850 * 0.03 * 0.006 * (0.004 + 0.006 / math.tan(37.5 * math.pi / 180)) * speed**2 * (0.18483 - depth)
+    np.testing.assert_allclose(total, -pull * AXIS.rotation(math.pi / 24) @ [1, 0, 0], atol=0.05 * pull)
 
 
 @pytest.mark.parametrize(
@@ -196,26 +173,13 @@ def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(
         ({"part.damper.placed": '{ axes = ["y", "z"] }'}, "part.damper.placed"),
         ({"part.damper.placed": '{ axes = ["y", "x", "z"] }'}, "makes a right hand a left one"),
         ({"part.damper.placed": '{ axes = ["y", "y", "z"] }'}, "must name x, y and z once each"),
-        (
-            {"part.damper.left_distances_m": "[0.05]"},
-            "part.damper.left_distances_m: must grow and lie on the side",
-        ),
+        ({"part.damper.left_distances_m": "[0.05]"}, "part.damper.left_distances_m: must grow and lie on the side"),
         ({"part.damper.placed": '[{ axes = ["y", "z", "-x"] }]'}, "makes a right hand a left one"),
-        (
-            {"part.damper.placed": '[{ axes = ["y", "-z", "-x"], move_m = [0.18, 0, 0] }]'},
-            "do not face each other",
-        ),
-        (
-            {
-                "part.damper.placed": '[{ axes = ["y", "z", "x"], move_m = [0.5, 0, 0] }, { turn_deg = 7.5 }]'
-            },
-            "none near",
-        ),
+        ({"part.damper.placed": '[{ axes = ["y", "-z", "-x"], move_m = [0.18, 0, 0] }]'}, "do not face each other"),
+        ({"part.damper.placed": '[{ axes = ["y", "z", "x"], move_m = [0.5, 0, 0] }, { turn_deg = 7.5 }]'}, "none near"),
     ],
 )
-def test_a_wedge_that_cannot_be_there_is_refused(
-    tmp_path: Path, changes: dict[str, str], told: str
-) -> None:
+def test_a_wedge_that_cannot_be_there_is_refused(tmp_path: Path, changes: dict[str, str], told: str) -> None:
     assert told in refused("check", str(write(tmp_path, changes)))
 
 
@@ -242,9 +206,7 @@ placed = { turn_deg = 90.0 }
     first, third = (np.array(parts[name].body.centre) for name in ("first", "third"))
     np.testing.assert_allclose(third, first * [-1, -1, 1], atol=1e-15)
     np.testing.assert_allclose(
-        parts["second"].body.tensor,
-        np.diag(np.diag(parts["first"].body.tensor)[[1, 0, 2]]),
-        atol=1e-18,
+        parts["second"].body.tensor, np.diag(np.diag(parts["first"].body.tensor)[[1, 0, 2]]), atol=1e-18
     )
     path.write_text(
         text
@@ -252,15 +214,12 @@ placed = { turn_deg = 90.0 }
             "\nradius_m = 0.004\nlength_m = 0.03\nleft_angle_deg = 40.0\nmass_kg = 0.01", ""
         )
     )
-    assert (
-        "part.first.of: first is a copy of third is a copy of second is a copy of first"
-        in refused("check", str(path))
+    assert "part.first.of: first is a copy of third is a copy of second is a copy of first" in refused(
+        "check", str(path)
     )
 
 
-def test_the_undersides_of_prismatic_blades_take_a_body_without_nodes_of_their_own(
-    tmp_path: Path,
-) -> None:
+def test_the_undersides_of_prismatic_blades_take_a_body_without_nodes_of_their_own(tmp_path: Path) -> None:
     apart = {
         "part.blades.nodes_at": "[]",
         "part.damper.apex_m": "[0.028, 0.1065]",

@@ -31,9 +31,7 @@ def groove(k_t, mu, dofs=("x", "z"), k_w=0.0):
             gap[3 * contact + 1, dofs.index("y")] = -1.0
     law = ElasticCoulomb(k_t=k_t, k_w=k_w, k_n=K_N, mu=mu)
     structure = Structure(0.1 * np.eye(n), np.zeros((n, n)), np.zeros((n, n)), table(dofs))
-    return System(
-        structure, Interface(("left", "right"), (law, law), gap), np.array([0]), free=np.arange(n)
-    )
+    return System(structure, Interface(("left", "right"), (law, law), gap), np.array([0]), free=np.arange(n))
 
 
 def test_block_that_sticks():
@@ -133,9 +131,7 @@ def test_a_rotation_that_two_points_do_not_hold_is_named(seed):
 
 def test_unheld_coordinate_is_named():
     system = groove(1e6, 0.3, dofs=("x", "y", "z"))
-    with pytest.raises(
-        SingularError, match=r"coordinate node1\.y is held by nothing even with all contacts stuck"
-    ):
+    with pytest.raises(SingularError, match=r"coordinate node1\.y is held by nothing even with all contacts stuck"):
         preload(system, np.array([0.0, 0.0, LOAD]))
     # a retention spring or a tangential stiffness holds it
     assert preload(system.with_retention(10.0), np.array([0.0, 0.0, LOAD]))[1] == 0.0

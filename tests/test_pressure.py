@@ -26,9 +26,7 @@ WIDE, HIGH = 0.05, 0.03
 
 def plate(cells=(4, 3), triangles=False):
     """A rectangle in the plane z = 0.01, outward along +z, and the operator of its free nodes."""
-    x, y = np.meshgrid(
-        np.linspace(0, WIDE, cells[0] + 1), np.linspace(0, HIGH, cells[1] + 1), indexing="ij"
-    )
+    x, y = np.meshgrid(np.linspace(0, WIDE, cells[0] + 1), np.linspace(0, HIGH, cells[1] + 1), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.01)])
     number = np.arange(x.size).reshape(x.shape)
     corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
@@ -118,9 +116,7 @@ def blade():
     sets = {"root": root, "skin": np.setdiff1d(np.arange(len(points)), root)}
     sets["upper"] = sets["skin"][points[sets["skin"], 1] > 0]
     mesh = ss.model.SolidMesh(points, cells, sets)
-    part = ss.model.solid_part(
-        mesh, Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0)
-    )
+    part = ss.model.solid_part(mesh, Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0))
     return Places({"w": part})
 
 
@@ -138,9 +134,7 @@ def both_sides(n=9):
 
 @pytest.mark.parametrize("normals", [1.0, -1.0, None])
 @pytest.mark.parametrize("shift", [0.0, 0.2])
-def test_both_sides_of_a_thin_blade_keep_their_own_pressure(
-    normals: float | None, shift: float
-) -> None:
+def test_both_sides_of_a_thin_blade_keep_their_own_pressure(normals: float | None, shift: float) -> None:
     """In place, and off by a fifth of the thickness: the force is that of the field, the clamped row of facets included."""
     points, pressure, area, force = both_sides()
     places, given = blade(), None if normals is None else normals * area
@@ -194,12 +188,10 @@ def test_a_model_tells_of_clamped_nodes_normals_and_doubts() -> None:
         return ss.Model(parts=blade().parts, loads={"gas": gas})
 
     (line,) = pressure_lines(model(points, -area), {"gas": 0})
-    assert re.search(r"up to 0 mm off it, their normals point into the body; .* N act on clamped nodes", line)  # fmt: skip
+    assert re.search(r"up to 0 mm off it, their normals point into the body; .* N act on clamped nodes", line)
     assert not model(points, -area).warnings
     off = np.array([0, 0.6 * THIN, 0])
-    assert any(
-        text.startswith("load.gas: the points") for text in model(points + off, area).warnings
-    )
+    assert any(text.startswith("load.gas: the points") for text in model(points + off, area).warnings)
 
 
 def flank_field(mesh):
@@ -214,12 +206,8 @@ def test_a_pressure_drives_a_wheel_as_its_nodal_forces_do() -> None:
     """Projected on waves, or its nodes kept: the same load on the coordinates, and the same answer of the whole wheel."""
     mesh = shrouded_sector()
     model = sector_model(mesh)
-    gas = ss.Load(
-        on="blade.flank_low", newton=1.0, phase=0.3, engine_order=ORDER, field=flank_field(mesh)
-    )
-    more = ss.Load(
-        on="blade.flank_low", newton=0.5, harmonic=2, engine_order=ORDER, field=flank_field(mesh)
-    )
+    gas = ss.Load(on="blade.flank_low", newton=1.0, phase=0.3, engine_order=ORDER, field=flank_field(mesh))
+    more = ss.Load(on="blade.flank_low", newton=0.5, harmonic=2, engine_order=ORDER, field=flank_field(mesh))
     model = replace(model, loads={"lean": model.loads["lean"], "gas": gas, "more": more})
     assert model.spread == ("gas", "more")
     found = assemble(model, H)
@@ -241,22 +229,16 @@ def test_a_pressure_drives_a_wheel_as_its_nodal_forces_do() -> None:
     angle = wave(ORDER, SECTORS).phase_angle
     for s in range(SECTORS):
         mine = whole.load.harmonics[1][s * n : (s + 1) * n]
-        np.testing.assert_allclose(
-            mine, np.exp(1j * s * angle) * whole.load.harmonics[1][:n], rtol=1e-9
-        )
+        np.testing.assert_allclose(mine, np.exp(1j * s * angle) * whole.load.harmonics[1][:n], rtol=1e-9)
 
 
 def write_fields(folder: Path, mesh_points, quads, pressure):
     """The same field as VTK surface and as CSV of its nodes, in mm."""
     data = {"real_pa": pressure.real, "imag_pa": pressure.imag}
-    meshio.write(
-        folder / "field.vtu", meshio.Mesh(1e3 * mesh_points, [("quad", quads)], point_data=data)
-    )
+    meshio.write(folder / "field.vtu", meshio.Mesh(1e3 * mesh_points, [("quad", quads)], point_data=data))
     rows = ["x_mm,y_mm,z_mm,amplitude_kpa,phase_deg"]
     for (x, y, z), p in zip(1e3 * mesh_points, pressure, strict=True):
-        rows.append(
-            f"{x:.15g},{y:.15g},{z:.15g},{abs(p) / 1e3:.15g},{math.degrees(np.angle(p)):.15g}"
-        )
+        rows.append(f"{x:.15g},{y:.15g},{z:.15g},{abs(p) / 1e3:.15g},{math.degrees(np.angle(p)):.15g}")
     (folder / "field.csv").write_text("\n".join(rows))
 
 
@@ -279,18 +261,29 @@ WHOLE = [("real_pa", "imag_pa"), ("amplitude_pa", "phase_deg")]
 @pytest.mark.parametrize("on", ["points", "cells"])
 @pytest.mark.parametrize("static", [False, True])
 @pytest.mark.parametrize(
-    "names", [("real_pa", "imag_pa"), ("amplitude_pa", "phase_deg"), ("pressure_pa",), ("real_pa", "phase_deg"), ("REAL_PA", "Imag_Pa")]
-)  # fmt: skip
-def test_vtk_holds_a_field_in_each_way(
-    names: tuple[str, ...], static: bool, on: str, tmp_path: Path
-) -> None:
+    "names",
+    [
+        ("real_pa", "imag_pa"),
+        ("amplitude_pa", "phase_deg"),
+        ("pressure_pa",),
+        ("real_pa", "phase_deg"),
+        ("REAL_PA", "Imag_Pa"),
+    ],
+)
+def test_vtk_holds_a_field_in_each_way(names: tuple[str, ...], static: bool, on: str, tmp_path: Path) -> None:
     """A constant pressure is the same at points and cells, as parts and as amplitude and phase; what is not whole is refused."""
     surface = plate((3, 2))
-    value = {"real_pa": 300.0, "imag_pa": -400.0, "amplitude_pa": 500.0, "phase_deg": np.degrees(np.arctan2(-4, 3)), "pressure_pa": 250.0}  # fmt: skip
+    value = {
+        "real_pa": 300.0,
+        "imag_pa": -400.0,
+        "amplitude_pa": 500.0,
+        "phase_deg": np.degrees(np.arctan2(-4, 3)),
+        "pressure_pa": 250.0,
+    }
     count = len(surface.points) if on == "points" else len(surface.facets)
     data = {name: np.full(count, value[name.lower()]) for name in names}
-    own = {"point_data": data} if on == "points" else {"cell_data": {k: [v] for k, v in data.items()}}  # fmt: skip
-    meshio.write(tmp_path / "field.vtu", meshio.Mesh(surface.points, [("quad", surface.facets)], **own))  # fmt: skip
+    own = {"point_data": data} if on == "points" else {"cell_data": {k: [v] for k, v in data.items()}}
+    meshio.write(tmp_path / "field.vtu", meshio.Mesh(surface.points, [("quad", surface.facets)], **own))
     known = tuple(name.lower() for name in names)
     if known not in ([("pressure_pa",)] if static else WHOLE):
         needed = "pressure_pa" if static else "real_pa and imag_pa, or amplitude_pa and phase_deg"
@@ -313,7 +306,7 @@ def test_vtk_holds_a_field_in_each_way(
         ("n,x_m,y_m,z_m,real_pa,imag_pa\n1,0,0,0,1,1", "'n', which is not known. The columns are x_m, y_m, z_m, then"),
         ("x_m,y_m,z_m,real_pa,imag_pa,area_m2,normal_x,normal_y,normal_z\n0,0,0,1,1,1,1,1,0", "length 1"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_in_a_field_is_told(rows: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "field.csv").write_text(rows)
     with pytest.raises(ss.InputError, match=words):
@@ -349,16 +342,12 @@ frequency_hz = [300.0, 310.0]
 )
 
 
-def test_a_study_tells_force_and_modal_forces_of_its_pressure(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_study_tells_force_and_modal_forces_of_its_pressure(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     from stickslip.study.check import check_study
     from stickslip.study.models.study import read_study
 
     (tmp_path / "study.toml").write_text(STUDY)
-    (tmp_path / "gas.csv").write_text(
-        "x_m,y_m,z_m,real_pa,imag_pa\n0,0,0,1,1\n0,1,0,1,1\n1,0,0,1,1"
-    )
+    (tmp_path / "gas.csv").write_text("x_m,y_m,z_m,real_pa,imag_pa\n0,0,0,1,1\n0,1,0,1,1\n1,0,0,1,1")
     study = read_study(tmp_path / "study.toml")
     places = study.model().places.spot("blade.tip", "x").surface.points
     rows = "\n".join(f"{x},{y},{z},0,1000" for x, y, z in places)
@@ -367,8 +356,7 @@ def test_a_study_tells_force_and_modal_forces_of_its_pressure(
     with caplog.at_level("INFO"):
         check_study(study)
     told = re.search(
-        r"load\.gas: modal forces .* on (ND \d \w+), .*: ([\d.]+) Hz: ([\d.e-]+) at (-?[\d.]+) deg",
-        caplog.text,
+        r"load\.gas: modal forces .* on (ND \d \w+), .*: ([\d.]+) Hz: ([\d.e-]+) at (-?[\d.]+) deg", caplog.text
     )
     assert told is not None, caplog.text
     assert told[1] == "ND 3 backward"

@@ -18,13 +18,7 @@ from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, off_by, two_tones, with_enough
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
-from stickslip.response.quasi_periodic.tone import (
-    beginnings,
-    forced_motion,
-    over_amplitude,
-    second_tone,
-    solve_free,
-)
+from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone, solve_free
 from stickslip.response.stability import stability
 from stickslip.response.time.marcher import step_work
 from stickslip.response.time.start import rest, start_from_harmonics
@@ -115,7 +109,7 @@ def test_functions_are_orthogonal_on_a_closed_path(ratio: float) -> None:
     indices = half_plane(5)
     path = closed_path(ratio, 5)
     assert path.slip(ratio) < 0.01
-    product = sum(torus_basis(path, indices, w).T @ torus_basis(path, indices, w) for w in range(path.ways))  # fmt: skip
+    product = sum(torus_basis(path, indices, w).T @ torus_basis(path, indices, w) for w in range(path.ways))
     size = path.ways * path.samples / 2
     wanted = np.diag([2.0, *np.ones(2 * len(indices) - 2)])
     assert np.abs(product / size - wanted).max() < 1e-10
@@ -131,8 +125,8 @@ def test_a_slow_beat_is_one_characteristic(ratio: float) -> None:
     structure = lumped(np.eye(1), np.array([[1e4]]), np.array([[6.0]]))
     operator = np.zeros((3, 1))
     operator[0] = 1.0
-    system = ss.System(structure, ss.Interface(("joint",), (ss.Jenkins(k_t=SPRING, limit=LIMIT),), operator), BOTH[:1])  # fmt: skip
-    loads = [ss.HarmonicLoad(np.array([s]), {1: np.array([f + 0j])}) for s, f in ((3.0, 6.0), (0.0, 5.5))]  # fmt: skip
+    system = ss.System(structure, ss.Interface(("joint",), (ss.Jenkins(k_t=SPRING, limit=LIMIT),), operator), BOTH[:1])
+    loads = [ss.HarmonicLoad(np.array([s]), {1: np.array([f + 0j])}) for s, f in ((3.0, 6.0), (0.0, 5.5))]
     if ratio < 1.1:
         motion = two_tones(system, *loads, 5).solve((110.0, 110.0 * ratio))
         # in time the mean is that of the spring alone: slip in the strong part of the beat takes the traction away
@@ -145,7 +139,7 @@ def test_a_cubic_spring_has_the_harmonics_of_the_closed_form(ratio: float) -> No
     cubic, share, a, b = 2e8, 0.7, 2e-3, 3e-3
     operator = np.zeros((3, 1))
     operator[0] = 1.0
-    interface = ss.Interface(("joint",), (ss.CubicSpring(cubic_t=cubic),), operator, np.array([share]))  # fmt: skip
+    interface = ss.Interface(("joint",), (ss.CubicSpring(cubic_t=cubic),), operator, np.array([share]))
     system = ss.System(lumped(np.eye(1), np.array([[1e4]]), np.array([[6.0]])), interface, BOTH[:1])
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
     balance = two_tones(system, load, load, 1).balance
@@ -159,7 +153,7 @@ def test_a_cubic_spring_has_the_harmonics_of_the_closed_form(ratio: float) -> No
     own = [0.75 * a**3 + 1.5 * a * b**2, 0.75 * b**3 + 1.5 * a**2 * b]
     far = [a**3 / 4, 0.75 * a**2 * b, 0.75 * a * b**2, b**3 / 4]
     size = k * (a + b) ** 3
-    np.testing.assert_allclose(found.coefficients[:, 0], k * np.array([0, own[0], 0, own[1], 0]), atol=1e-12 * size)  # fmt: skip
+    np.testing.assert_allclose(found.coefficients[:, 0], k * np.array([0, own[0], 0, own[1], 0]), atol=1e-12 * size)
     cosines = found.beyond[1::2, 0]
     np.testing.assert_allclose(cosines, k * np.array(far), atol=1e-12 * size)
     assert np.abs(found.beyond[[0, 2, 4, 6, 8], 0]).max() < 1e-12 * size
@@ -197,10 +191,7 @@ def test_derivatives_are_those_of_the_residual() -> None:
     omegas = 140.0, 180.0
     operator = np.zeros((6, 2))
     operator[0], operator[3] = (1.0, -1.0), (0.0, 1.0)
-    laws = (
-        ss.CubicSpring(k_t=1e3, cubic_t=1e10),
-        ss.RegularisedCoulomb(mu=0.3, preload=10.0, transition_velocity=0.1),
-    )
+    laws = (ss.CubicSpring(k_t=1e3, cubic_t=1e10), ss.RegularisedCoulomb(mu=0.3, preload=10.0, transition_velocity=0.1))
     structure = replace(lumped(MASS, STIFFNESS), damping=DAMPING)
     system = ss.System(structure, ss.Interface(("cubic", "rub"), laws, operator), BOTH)
     problem = two_tones(system, tone(10.0, 0.0), tone(0.0, 8.0), 3)
@@ -223,7 +214,7 @@ def test_derivatives_are_those_of_the_residual() -> None:
 def three_in_a_row() -> ss.System:
     """Three masses; a friction spring holds the first to the ground, and the others are condensed."""
     stiffness = np.array([[3e4, -1e4, 0.0], [-1e4, 4e4, -2e4], [0.0, -2e4, 2.5e4]])
-    structure = replace(lumped(np.diag([1.0, 2.0, 0.5]), stiffness), damping=1e-4 * stiffness + 2.0 * np.eye(3))  # fmt: skip
+    structure = replace(lumped(np.diag([1.0, 2.0, 0.5]), stiffness), damping=1e-4 * stiffness + 2.0 * np.eye(3))
     operator = np.zeros((3, 3))
     operator[0, 0] = 1.0
     law = ss.Jenkins(k_t=SPRING, limit=1e9)  # it never slips
@@ -244,7 +235,14 @@ def test_loads_on_condensed_coordinates_act_at_their_own_frequencies() -> None:
     structure = system.structure
     held = structure.stiffness + np.diag([SPRING, 0.0, 0.0])
     mass, damping = np.diag([1.0, 2.0, 0.5]), structure.damping
-    for index, force in (((0, 0), static), ((1, 0), forces[0]), ((2, 0), forces[1]), ((0, 1), forces[3]), ((0, 2), 0 * static), ((1, 1), 0 * static)):  # fmt: skip
+    for index, force in (
+        ((0, 0), static),
+        ((1, 0), forces[0]),
+        ((2, 0), forces[1]),
+        ((0, 1), forces[3]),
+        ((0, 2), 0 * static),
+        ((1, 1), 0 * static),
+    ):
         omega = index[0] * omegas[0] + index[1] * omegas[1]
         exact = np.linalg.solve(held - omega**2 * mass + 1j * omega * damping, force)
         own = motion.coefficients[motion.indices.index(index)]
@@ -256,7 +254,7 @@ def test_loads_on_condensed_coordinates_act_at_their_own_frequencies() -> None:
         (by_second, [side.load(indices, (omegas[0], omegas[1] + s))[0] for s in (step, -step)]),
     ):
         assert np.abs(found).max() > 0.0
-        assert found == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6 * np.abs(found).max())  # fmt: skip
+        assert found == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6 * np.abs(found).max())
 
 
 def test_how_far_off_few_frequencies_are_is_a_newton_step_with_more() -> None:
@@ -268,14 +266,14 @@ def test_how_far_off_few_frequencies_are_is_a_newton_step_with_more() -> None:
         problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), second, 2)
         motion = problem.solve(omegas)
         moved = np.where([k == 1 for _, k in motion.indices], 1e-4, 0.0)[:, None]
-        motion = replace(motion, x=problem.balance.unknowns(problem.balance.coefficients(motion.x) + moved))  # fmt: skip
+        motion = replace(motion, x=problem.balance.unknowns(problem.balance.coefficients(motion.x) + moved))
         wider = problem.balance.with_indices((*motion.indices, *more))
         x = wider.from_other(problem.balance, motion.x)
         at = wider.linearise(x, omegas, path)
         jac, right, n = np.asarray(at.jac), at.residual, x.size
         if second is NONE:
             own = wider.coefficients(x)
-            along = wider.unknowns(np.array([1j * k * row for (_, k), row in zip(wider.indices, own, strict=True)]))  # fmt: skip
+            along = wider.unknowns(np.array([1j * k * row for (_, k), row in zip(wider.indices, own, strict=True)]))
             jac = np.block([[jac, at.by_second[:, None]], [along[None, :], np.zeros((1, 1))]])
             right = np.append(right, 0.0)
         step = wider.coefficients(np.linalg.solve(jac, right)[:n])[1:]
@@ -298,9 +296,7 @@ def test_the_jacobian_by_its_parts_is_the_array() -> None:
     assert parts.rmatvec(v) == pytest.approx(v @ whole, abs=1e-13 * size)
     krylov = Krylov(tolerance=1e-10)
     found = krylov.solve(parts, v)
-    assert found == pytest.approx(
-        np.linalg.solve(whole, v), rel=1e-7, abs=1e-8 * np.abs(found).max()
-    )
+    assert found == pytest.approx(np.linalg.solve(whole, v), rel=1e-7, abs=1e-8 * np.abs(found).max())
     assert krylov.counts.products < 40
 
 
@@ -344,9 +340,9 @@ def test_frequencies_in_a_ratio_of_small_numbers_are_no_exception() -> None:
     problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
     exact, near = (problem.solve((130.0, 130.0 * r)) for r in (1.5, 1.5 + 1e-9))
     assert exact.slip == 0.0
-    assert exact.coefficients == pytest.approx(near.coefficients, abs=1e-4 * np.abs(exact.coefficients).max())  # fmt: skip
+    assert exact.coefficients == pytest.approx(near.coefficients, abs=1e-4 * np.abs(exact.coefficients).max())
     one = ss.HarmonicLoad(np.zeros(2), {2: np.array([10.0, 0.0j]), 3: np.array([0.0j, 8.0])})
-    sweep = ss.Sweep(omega_range=(65.0, 65.0001), low=21, high=21, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    sweep = ss.Sweep(omega_range=(65.0, 65.0001), low=21, high=21, selection="always_low", frequencies=2, peak_points=0)
     system = rubbing_pair(DAMPING)
     point = ss.response.accepted_points(list(ss.forced_response(system, one, sweep)))[0]
     times = np.arange(512) * 2 * np.pi / 65.0 / 512
@@ -381,8 +377,12 @@ def test_flutter_beside_a_forced_vibration_is_what_a_march_by_hand_comes_to() ->
     assert motion.omegas[1] < np.sqrt(squares[1])
     # the same from time integration alone: envelope, root mean square, and the second frequency among the lines of the spectrum
     system, load = problem.system, tone(6.0, 0.0)
-    start = start_from_harmonics(np.zeros((2, 2), dtype=complex), 135.0, system.interface.gap_operator, system.interface.laws)  # fmt: skip
-    found = statistics(course(system.structure, system.interface, load, 135.0, BOTH, start, steps=128, least=256, most=256))  # fmt: skip
+    start = start_from_harmonics(
+        np.zeros((2, 2), dtype=complex), 135.0, system.interface.gap_operator, system.interface.laws
+    )
+    found = statistics(
+        course(system.structure, system.interface, load, 135.0, BOTH, start, steps=128, least=256, most=256)
+    )
     assert found.settled
     shown = envelope(motion, BOTH)
     assert found.largest == pytest.approx(shown.largest, rel=0.02)
@@ -403,9 +403,11 @@ def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> 
     structure = replace(lumped(mass, stiffness), damping=damping)
     system = ss.System(structure, ss.Interface(("own", "absorber"), laws, operator), BOTH)
     omega = 1.1532
-    sweep = ss.Sweep(omega_range=(omega, 1.00001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    sweep = ss.Sweep(
+        omega_range=(omega, 1.00001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0
+    )
     forced = ss.response.forced_problem(system, tone(force, 0.0), sweep)
-    point = ss.response.accepted_points(list(ss.forced_response(system, tone(force, 0.0), sweep)))[0]  # fmt: skip
+    point = ss.response.accepted_points(list(ss.forced_response(system, tone(force, 0.0), sweep)))[0]
     found = stability(forced, point)
     assert found.verdict == "unstable"
     guesses = distinct(tones_of_multipliers(found.floquet.multipliers, point.omega, 3), point.omega)
@@ -435,7 +437,7 @@ def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> 
 
     period, turns, last = 2 * np.pi / point.omega, 240, 100
     times = np.arange((turns - last) * 32, turns * 32) * period / 32
-    judge = solve_ivp(rates, (0.0, turns * period), np.zeros(4), rtol=1e-6, atol=1e-8, t_eval=times).y[:2].T  # fmt: skip
+    judge = solve_ivp(rates, (0.0, turns * period), np.zeros(4), rtol=1e-6, atol=1e-8, t_eval=times).y[:2].T
     amplitude = 0.5 * np.ptp(judge.reshape(last, 32, 2), axis=1)
     shown = envelope(motion, BOTH)
     assert shown.largest == pytest.approx(amplitude.max(axis=0), rel=0.015)

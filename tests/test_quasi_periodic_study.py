@@ -23,7 +23,7 @@ TWO_TONES = (EXAMPLES / "two_tones" / "study.toml").read_text(encoding="utf-8")
 
 
 def test_two_loads_from_a_study_are_what_time_integration_comes_to(tmp_path: Path) -> None:
-    few = changed(TWO_TONES, {"quasi_periodic.frequency_hz": "[24.0, 25.0]", "quasi_periodic.points": "2"})  # fmt: skip
+    few = changed(TWO_TONES, {"quasi_periodic.frequency_hz": "[24.0, 25.0]", "quasi_periodic.points": "2"})
     outcome = answered(few, tmp_path)
     data = outcome.tree["quasi_periodic"].to_dataset()
     assert list(data["kind"].values[0]) == ["two loads"] * 2
@@ -33,7 +33,7 @@ def test_two_loads_from_a_study_are_what_time_integration_comes_to(tmp_path: Pat
     assert np.all(data["left_out"].values < 0.01)
     assert np.all(data["least"].values < 0.9 * data["largest"].values)
     assert {v.level for v in outcome.verdicts} == {"trusted"}
-    assert {"two_frequencies", "two_frequencies_phase", "two_frequencies_lines"} <= set(plots(outcome.tree))  # fmt: skip
+    assert {"two_frequencies", "two_frequencies_phase", "two_frequencies_lines"} <= set(plots(outcome.tree))
     again = answered(few, tmp_path)  # nothing is solved twice
     assert again.tree["quasi_periodic"].to_dataset().identical(data)
 
@@ -41,15 +41,11 @@ def test_two_loads_from_a_study_are_what_time_integration_comes_to(tmp_path: Pat
 def rubbing(fed: float) -> ss.Model:
     """Two masses that rub; a dashpot of so many N s/m feeds the second one."""
     damping = np.diag([4.0, -fed])
-    pair = ss.model.lumped(np.eye(2), np.array([[3e4, -1e4], [-1e4, 4e4]]), damping, names=("m1", "m2"))  # fmt: skip
+    pair = ss.model.lumped(np.eye(2), np.array([[3e4, -1e4], [-1e4, 4e4]]), damping, names=("m1", "m2"))
     return ss.Model(
         parts={"pair": ss.Part(structure=pair)},
         contacts={
-            "joint": ss.Contact(
-                between=("pair.m1", "pair.m2"),
-                acts="tangential",
-                law=ss.Jenkins(k_t=1e4, limit=5.0),
-            )
+            "joint": ss.Contact(between=("pair.m1", "pair.m2"), acts="tangential", law=ss.Jenkins(k_t=1e4, limit=5.0))
         },
         loads={"wake": ss.Load(on="pair.m1", newton=6.0)},
         outputs=(ss.Output(name="second", on="pair.m2"),),
@@ -59,11 +55,11 @@ def rubbing(fed: float) -> ss.Model:
 def test_a_motion_that_is_weakly_unstable_is_not_told_as_another_one() -> None:
     shapes = np.linalg.eigh(np.array([[4e4, -2e4], [-2e4, 5e4]]))[1]
     damping = shapes @ np.diag([3.0, -0.3]) @ shapes.T  # a multiplier of 1.007
-    pair = ss.model.lumped(np.eye(2), np.array([[3e4, -1e4], [-1e4, 4e4]]), damping, names=("m1", "m2"))  # fmt: skip
+    pair = ss.model.lumped(np.eye(2), np.array([[3e4, -1e4], [-1e4, 4e4]]), damping, names=("m1", "m2"))
     model = replace(rubbing(3.0), parts={"pair": ss.Part(structure=pair)})
     hz = [21.4, 21.5]
-    short, long = (model.forced_response(hz, not_periodic_s=s)["forced_response"] for s in (0.05, 30.0))  # fmt: skip
-    assert "has not left the motion that it started on" in str(short["not_periodic_sentence"].values.flat[0])  # fmt: skip
+    short, long = (model.forced_response(hz, not_periodic_s=s)["forced_response"] for s in (0.05, 30.0))
+    assert "has not left the motion that it started on" in str(short["not_periodic_sentence"].values.flat[0])
     assert not short["not_periodic_settled"].values.any()
     assert not short["not_periodic_repeats"].values.any()
     assert long["not_periodic_settled"].values.any()
@@ -71,7 +67,7 @@ def test_a_motion_that_is_weakly_unstable_is_not_told_as_another_one() -> None:
 
 
 def test_a_tone_that_nothing_drives_from_python() -> None:
-    data = rubbing(3.0).quasi_periodic(frequencies_hz=[21.5], in_time=True)["quasi_periodic"]  # fmt: skip
+    data = rubbing(3.0).quasi_periodic(frequencies_hz=[21.5], in_time=True)["quasi_periodic"]
     assert data["kind"].values.item() == "second tone"
     assert 35.0 < data["second_hz"].values.item() < 41.0
     assert data["time_largest"].values == pytest.approx(data["largest"].values, rel=0.02)
@@ -136,7 +132,7 @@ def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time(tmp_
     start = start_from_harmonics(still, omega, whole.contacts.gap_operator, whole.contacts.laws)
     start = replace(start, displacement=place.real.ravel(), velocity=speed.real.ravel())
     tips = question.model.system.outputs[0] + own * np.arange(5)
-    history = wave_history(march_periods(whole.structure, whole.contacts, whole.load, omega, tips, start, 320, 256))  # fmt: skip
+    history = wave_history(march_periods(whole.structure, whole.contacts, whole.load, omega, tips, start, 320, 256))
     assert history.amplitude[-1, [1, 4]] == pytest.approx(waves, rel=3e-3)
     assert np.delete(history.amplitude[-1], [1, 4]).max() < 0.03 * min(waves)
 
@@ -154,9 +150,7 @@ def test_what_cannot_be_answered_is_refused(tmp_path: Path) -> None:
         replace(model, loads={"own": second}).quasi_periodic(frequencies_hz=[21.0])
     with pytest.raises(InputError, match=r"Load\.omega"):
         ss.Load(on="pair.m1", newton=1.0, omega=1.0, omega_ratio=2.0)
-    same = replace(
-        model, loads={**model.loads, "own": replace(second, omega=None, omega_ratio=1.0)}
-    )
+    same = replace(model, loads={**model.loads, "own": replace(second, omega=None, omega_ratio=1.0)})
     with pytest.raises(InputError, match=r"load\.own\.frequency_ratio.*is the first frequency"):
         same.quasi_periodic(frequencies_hz=[21.0])
     far = replace(model, loads={**model.loads, "own": replace(second, omega=1e8)})
@@ -165,9 +159,7 @@ def test_what_cannot_be_answered_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"second_hz.*of a tone that nothing drives"):
         both.quasi_periodic(frequencies_hz=[21.0], second_hz=30.0)
     wrong = changed(TWO_TONES, {"load.other_rotor.frequency_hz": "30.0"})
-    with pytest.raises(
-        InputError, match=r"load\.other_rotor\.frequency_ratio.*cannot stand beside"
-    ):
+    with pytest.raises(InputError, match=r"load\.other_rotor\.frequency_ratio.*cannot stand beside"):
         answered(wrong, tmp_path)
 
 
@@ -177,10 +169,7 @@ def test_an_accuracy_that_is_missed_is_doubtful() -> None:
     wake = ss.Load(on="pair.m1", newton=10.0)
     model = replace(rubbing(-3.0), loads={"wake": wake, "own": second})
     hz = [140.0 / (2 * np.pi)]
-    rough, fine = (
-        model.quasi_periodic(frequencies_hz=hz, accuracy_percent=a, in_time=True)
-        for a in (1.0, 0.01)
-    )
+    rough, fine = (model.quasi_periodic(frequencies_hz=hz, accuracy_percent=a, in_time=True) for a in (1.0, 0.01))
     assert {v.level for v in rough.verdicts} == {"trusted"}
     data = fine["quasi_periodic"]
     assert data["accuracy"].values.item() == pytest.approx(1e-4)

@@ -33,9 +33,7 @@ from stickslip.model.readers.units import Units
 
 INCH = Units.inch_lbf_s()
 # of the models in file.full and file.rst, which store them: psi and lbf s²/in⁴
-TITANIUM = Material(
-    young_modulus=16.9e6 * INCH.stress, poisson_ratio=0.31, density=4.1408e-4 * INCH.density
-)
+TITANIUM = Material(young_modulus=16.9e6 * INCH.stress, poisson_ratio=0.31, density=4.1408e-4 * INCH.density)
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +44,7 @@ def samples():
     except ModuleNotFoundError:
         found = None
     if found is None:
-        message = (
-            "ansys-mapdl-reader, which has the files of ANSYS, is not installed: make optional"
-        )
+        message = "ansys-mapdl-reader, which has the files of ANSYS, is not installed: make optional"
         if os.environ.get("STICKSLIP_OPTIONAL") == "required":
             pytest.fail(message)
         pytest.skip(message)
@@ -80,9 +76,7 @@ def test_matrices_are_those_of_the_other_reader(samples, theirs):
         warnings.simplefilter("ignore")
         table, k, m = theirs.read_binary(str(samples / "file.full")).load_km(sort=True)
     key = {(int(node), "xyz"[c]): row for row, (node, c) in enumerate(table)}
-    rows = [
-        key[node, c] for node, c in zip(structure.dofs.node, structure.dofs.component, strict=True)
-    ]
+    rows = [key[node, c] for node, c in zip(structure.dofs.node, structure.dofs.component, strict=True)]
     for ours, half in ((structure.stiffness, k), (structure.mass, m)):
         full = (half + half.T - scipy.sparse.diags(half.diagonal())).tocsr()[rows][:, rows]
         assert abs(ours - full).max() == 0.0
@@ -94,9 +88,7 @@ def test_our_elements_assemble_the_stiffness_of_ansys(samples):
     ours = assemble_solid(mesh, TITANIUM, clamped=(), quadrature=Quadrature(stiffness=3, mass=5))
     rows = same_rows(ours, theirs)
     difference = abs(ours.stiffness[rows][:, rows] - theirs.stiffness).max()
-    assert (
-        difference < 1e-12 * abs(theirs.stiffness).max()
-    )  # 2.5e-13 measured: rounding of the file
+    assert difference < 1e-12 * abs(theirs.stiffness).max()  # 2.5e-13 measured: rounding of the file
     np.testing.assert_allclose(ours.dofs.position[rows], theirs.dofs.position, atol=1e-15)
 
 
@@ -144,9 +136,7 @@ def test_modes_are_those_of_the_other_reader(samples, theirs):
         np.testing.assert_array_equal(results.dofs.position[::3], judge.mesh.nodes)
 
 
-@pytest.mark.parametrize(
-    ("name", "width", "cells"), [("HexBeam.cdb", 20, 40), ("TetBeam.cdb", 4, 3913)]
-)
+@pytest.mark.parametrize(("name", "width", "cells"), [("HexBeam.cdb", 20, 40), ("TetBeam.cdb", 4, 3913)])
 def test_meshes_are_those_of_the_other_reader(samples, theirs, name, width, cells):
     mesh = read_ansys_archive(samples / name)
     with warnings.catch_warnings():
@@ -195,12 +185,8 @@ def same_rows(ours: Structure, theirs: Structure):
 
 def same_rows_of(ours, theirs):
     """Return the rows of the table `ours` that stand for those of `theirs`."""
-    key = {
-        pair: row for row, pair in enumerate(zip(ours.node.tolist(), ours.component, strict=True))
-    }
-    return np.array(
-        [key[pair] for pair in zip(theirs.node.tolist(), theirs.component, strict=True)]
-    )
+    key = {pair: row for row, pair in enumerate(zip(ours.node.tolist(), ours.component, strict=True))}
+    return np.array([key[pair] for pair in zip(theirs.node.tolist(), theirs.component, strict=True)])
 
 
 def hexahedron_mass(mesh, density):
@@ -223,26 +209,8 @@ def hexahedron_mass(mesh, density):
 
 BRICK = np.array(
     [
-        *[
-            (-1, -1, -1),
-            (1, -1, -1),
-            (1, 1, -1),
-            (-1, 1, -1),
-            (-1, -1, 1),
-            (1, -1, 1),
-            (1, 1, 1),
-            (-1, 1, 1),
-        ],
-        *[
-            (0, -1, -1),
-            (1, 0, -1),
-            (0, 1, -1),
-            (-1, 0, -1),
-            (0, -1, 1),
-            (1, 0, 1),
-            (0, 1, 1),
-            (-1, 0, 1),
-        ],
+        *[(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
+        *[(0, -1, -1), (1, 0, -1), (0, 1, -1), (-1, 0, -1), (0, -1, 1), (1, 0, 1), (0, 1, 1), (-1, 0, 1)],
         *[(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
     ]
 )
@@ -289,9 +257,7 @@ def test_full_file_written_here(tmp_path, packed):
     mass, stiffness = small_model()
     damping = 0.01 * stiffness
     path, nodes = tmp_path / "file.full", tmp_path / "nodes.cdb"
-    path.write_bytes(
-        full_file(mass, stiffness, [7, 2, 5], held=[3, 4, 5], damping=damping, packed=packed)
-    )
+    path.write_bytes(full_file(mass, stiffness, [7, 2, 5], held=[3, 4, 5], damping=damping, packed=packed))
     nodes.write_text(ARCHIVE)
     units = Units.mm_t_s()
     structure = read_ansys_full(path, nodes=nodes, units=units, plausible=False)
@@ -324,9 +290,7 @@ def test_rotations_are_turned_and_converted_too(tmp_path):
     at = mixed.index(record(np.array([6, 6])))
     mixed = mixed[:at] + record(np.array([5, 7])) + mixed[at + len(record(np.array([6, 6]))) :]
     path.write_bytes(mixed)
-    with pytest.raises(
-        InputError, match="coordinates of each node: 2 node numbers, 2 counts that sum to 12"
-    ):
+    with pytest.raises(InputError, match="coordinates of each node: 2 node numbers, 2 counts that sum to 12"):
         read_ansys_full(path)
 
 
@@ -373,9 +337,7 @@ def test_cyclic_results_have_signed_indices_and_turned_shapes(tmp_path):
     shapes = np.arange(24.0).reshape(4, 2, 3)
     angles = np.array([[90.0, 0, 0], [0, 0, 0]])
     path = tmp_path / "file.rst"
-    path.write_bytes(
-        result_file(frequencies, shapes, nodes, angles=angles, harmonic=[0, 1, 1, 3], sectors=6)
-    )
+    path.write_bytes(result_file(frequencies, shapes, nodes, angles=angles, harmonic=[0, 1, 1, 3], sectors=6))
     results = read_ansys_results(path, units=Units.mm_t_s())
     assert results.sectors == 6
     assert results.harmonic_indices.tolist() == [0, 1, -1, 3]
@@ -384,9 +346,7 @@ def test_cyclic_results_have_signed_indices_and_turned_shapes(tmp_path):
     np.testing.assert_allclose(results.frequencies_hz, frequencies)
     unit = np.sqrt(1e3)  # of the square root of a tonne
     np.testing.assert_allclose(results.shapes[:3, 1] * unit, shapes[1, 1])
-    np.testing.assert_allclose(
-        results.shapes[3:, 1] * unit, [-shapes[1, 0, 1], shapes[1, 0, 0], shapes[1, 0, 2]]
-    )
+    np.testing.assert_allclose(results.shapes[3:, 1] * unit, [-shapes[1, 0, 1], shapes[1, 0, 0], shapes[1, 0, 2]])
 
 
 @given(
@@ -505,9 +465,7 @@ def test_files_of_another_kind_are_named(tmp_path):
         read_ansys_full(tmp_path / "bb.full")
 
 
-@pytest.mark.parametrize(
-    ("flag", "message"), [(ZLIB, "packed with zlib"), (HALF, "numbers, at most")]
-)
+@pytest.mark.parametrize(("flag", "message"), [(ZLIB, "packed with zlib"), (HALF, "numbers, at most")])
 def test_records_packed_otherwise(flag, message):
     words = np.frombuffer(record(np.arange(8)), "<u4").copy()
     words[1] |= flag
@@ -533,16 +491,7 @@ MPDATA,R5.0, 1,EX  ,       4, 1, 2.1E+05,
 
 
 def cube(cell=(10, 20, 30, 40, 50, 60, 70, 80)):
-    corners = [
-        (0, 0, 0),
-        (1, 0, 0),
-        (1, 1, 0),
-        (0, 1, 0),
-        (0, 0, 1),
-        (1, 0, 1),
-        (1, 1, 1),
-        (0, 1, 1),
-    ]
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     nodes = "".join(
         f"{10 * (i + 1):9d}{0:9d}{0:9d}" + "".join(f"{c * 10.0:21.13E}" for c in corner) + "\n"
         for i, corner in enumerate(corners)
@@ -575,11 +524,7 @@ def test_archive_written_here(tmp_path):
         ("ET,1,185", "ET,1,1O5", r"line 1: '1O5' is no whole number"),
         ("NBLOCK", "NBLOK", "no block of nodes"),
         ("(3i9,6e21.13e3)", "(3i9 6e21)", r"line 3: '\(3i9 6e21\)' is no format"),
-        (
-            "         8,         8\n(3i9",
-            "         8,         9\n(3i9",
-            "block of nodes ends after 8 of 9",
-        ),
+        ("         8,         8\n(3i9", "         8,         9\n(3i9", "block of nodes ends after 8 of 9"),
         ("0.0000000000000E+00", "0.00000o0000000E+00", r"line 4: .* something else than numbers"),
         ("EBLOCK,19,SOLID", "EBLOCK,19,", "without the word SOLID"),
         ("       80\n", "\n", "an element has 7 of its 8 nodes"),
@@ -626,7 +571,7 @@ def test_component_with_a_wild_range_is_refused(tmp_path):
         ("ET,1,185,,2", r"KEYOPT\(2\) = 2 of SOLID185"),
         ("KEYOPT,1,15,1", r"KEYOPT\(15\) = 1 of SOLID185: what is not read"),
     ],
-)  # fmt: skip
+)
 def test_options_that_make_a_brick_another_are_refused(tmp_path, line, message):
     (tmp_path / "cube.cdb").write_text(f"{cube()}\n{line}\n")
     with pytest.raises(InputError, match=message):

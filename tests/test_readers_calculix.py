@@ -54,13 +54,7 @@ def copied(folder: Path, *names: str) -> Path:
 
 @pytest.fixture
 def brick_folder(tmp_path):
-    return copied(
-        tmp_path,
-        "brick_matrix.sti.gz",
-        "brick_matrix.mas.gz",
-        "brick_matrix.dof",
-        "brick_matrix.inp",
-    )
+    return copied(tmp_path, "brick_matrix.sti.gz", "brick_matrix.mas.gz", "brick_matrix.dof", "brick_matrix.inp")
 
 
 # ---- matrices
@@ -74,9 +68,7 @@ def test_matrices_give_the_frequencies_of_the_results_file():
     np.testing.assert_allclose(found, printed, rtol=1e-10, atol=PRINTED)
     assert structure.n == 72
     assert set(structure.sets) == {"NALL", "TIP"}  # ROOT is clamped
-    assert set(structure.dofs.node[structure.sets["TIP"]]) == set(range(210, 250, 10)) | {
-        260, 290, 310, 320,
-    }  # fmt: skip
+    assert set(structure.dofs.node[structure.sets["TIP"]]) == set(range(210, 250, 10)) | {260, 290, 310, 320}
 
 
 def test_modes_of_the_results_file_are_those_of_the_matrices():
@@ -117,9 +109,7 @@ def test_a_results_file_is_converted_once_in_every_unit_of_time():
 def test_wrong_units_are_named():
     with pytest.raises(InputError, match=r"in SI its mass .* that looks like mm-t-s\."):
         read_calculix_matrices(DATA / "brick_matrix")
-    with pytest.raises(
-        InputError, match=r"SOLID SECTION: in SI the density .* looks like mm-t-s\."
-    ):
+    with pytest.raises(InputError, match=r"SOLID SECTION: in SI the density .* looks like mm-t-s\."):
         read_deck(DATA / "brick_matrix.inp")
 
 
@@ -137,8 +127,10 @@ def test_positions_from_elsewhere(brick_folder, source):
     else:
         mesh = brick_folder / "nodes.csv"
         table = mesh_nodes(deck.mesh)
-        rows = [f"{n},{x},{y},{z}," + ("TIP" if n == 240 else "")
-                for n, (x, y, z) in zip(table.numbers, table.points / MM.length, strict=True)]  # fmt: skip
+        rows = [
+            f"{n},{x},{y},{z}," + ("TIP" if n == 240 else "")
+            for n, (x, y, z) in zip(table.numbers, table.points / MM.length, strict=True)
+        ]
         mesh.write_text("\n".join(["node,x,y,z,set", *rows]))
     found = read_calculix_matrices(brick_folder / "brick_matrix", units=MM, mesh=mesh)
     np.testing.assert_allclose(found.dofs.position, expected.dofs.position, atol=1e-15)
@@ -157,17 +149,11 @@ def test_a_cyclic_export_is_complex_hermitian_in_our_convention():
     assert apart(tied.mass, stored.mass) < 1e-12
 
 
-def tied_by_hand(
-    sector: Structure, stored: Structure, sectors: int, wave: int, faces: tuple[str, str]
-) -> Structure:
+def tied_by_hand(sector: Structure, stored: Structure, sectors: int, wave: int, faces: tuple[str, str]) -> Structure:
     """Put ``u_high = e^{iθ} R u_low`` into the sector, keeping the dofs of `stored`: no code of reduction/."""
     pitch, phase = 2 * np.pi / sectors, 2 * np.pi * wave / sectors
-    turn = np.array(
-        [[np.cos(pitch), -np.sin(pitch), 0], [np.sin(pitch), np.cos(pitch), 0], [0, 0, 1]]
-    )
-    place = {
-        key: i for i, key in enumerate(zip(stored.dofs.node, stored.dofs.component, strict=True))
-    }
+    turn = np.array([[np.cos(pitch), -np.sin(pitch), 0], [np.sin(pitch), np.cos(pitch), 0], [0, 0, 1]])
+    place = {key: i for i, key in enumerate(zip(stored.dofs.node, stored.dofs.component, strict=True))}
     P = np.zeros((sector.n, stored.n), dtype=complex)
     for i, key in enumerate(zip(sector.dofs.node, sector.dofs.component, strict=True)):
         if key in place:
@@ -185,9 +171,7 @@ def tied_by_hand(
 # ---- decks
 
 
-@pytest.mark.parametrize(
-    "stem", ["brick_matrix", "one_c3d4", "one_c3d10", "one_c3d8", "one_c3d20r"]
-)
+@pytest.mark.parametrize("stem", ["brick_matrix", "one_c3d4", "one_c3d10", "one_c3d8", "one_c3d20r"])
 def test_decks_assemble_to_the_stored_matrices(stem):
     """Every plain kind of element, distorted, integrated as the solver does."""
     deck = read_deck(DATA / f"{stem}.inp", units=MM)
@@ -218,13 +202,9 @@ def test_cyclic_faces_of_element_faces(tmp_path):
     copied(tmp_path, "ring2.inp", "ring_nodes.inc")
     expected = read_deck(tmp_path / "ring2.inp", units=MM)
     text = (tmp_path / "ring2.inp").read_text()
-    for name, nodes, faces in (
-        ("S_LO", "CYC_LO", "1, S3\n3, S3"),
-        ("S_HI", "CYC_HI", "2, S5\n4, S5"),
-    ):
+    for name, nodes, faces in (("S_LO", "CYC_LO", "1, S3\n3, S3"), ("S_HI", "CYC_HI", "2, S5\n4, S5")):
         text = text.replace(
-            f"*SURFACE, NAME={name}, TYPE=NODE\n{nodes}\n",
-            f"*SURFACE, NAME={name}, TYPE=ELEMENT\n{faces}\n",
+            f"*SURFACE, NAME={name}, TYPE=NODE\n{nodes}\n", f"*SURFACE, NAME={name}, TYPE=ELEMENT\n{faces}\n"
         )
     (tmp_path / "faces.inp").write_text(text)
     found = read_deck(tmp_path / "faces.inp", units=MM)
@@ -305,9 +285,7 @@ def printed_frequencies(case: str, diameter: int | None) -> list[float]:
     with (REFERENCE / "n24_coarse_frequencies.csv").open() as file:
         rows = list(csv.DictReader(file))
     wanted = "" if diameter is None else str(diameter)
-    return [
-        float(r["frequency_hz"]) for r in rows if (r["case"], r["nodal_diameter"]) == (case, wanted)
-    ]
+    return [float(r["frequency_hz"]) for r in rows if (r["case"], r["nodal_diameter"]) == (case, wanted)]
 
 
 # ---- results
@@ -337,7 +315,7 @@ def test_static_results():
 def test_a_bricks_nodes_stand_in_vtk_order():
     """CalculiX writes upright edges before top ones; ours are checked by where mid-side nodes lie."""
     mesh = read_frd(DATA / "brick.frd.gz", units=MM).mesh
-    corners = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]  # fmt: skip
+    corners = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
     at = mesh.points[mesh.cells]
     for middle, (a, b) in enumerate(corners, 8):
         np.testing.assert_allclose(at[:, middle], (at[:, a] + at[:, b]) / 2, atol=1e-12)
@@ -452,12 +430,15 @@ def test_a_pair_that_is_none_is_named(tmp_path):
         (" -3\n    3C", "    3C", r"line \d+: a block does not end with -3"),
         ("    2C                            32", "    2C                            99", "header says 99"),
         ("    2C                            32", "    2C                    1000000000", "header says"),
-        (" 1.00000E+01 0.00000E+00 0.00000E+00\n", " 1.0000xE+01 0.00000E+00 0.00000E+00\n",
-         r"' 1\.0000xE\+01' is no finite number"),
+        (
+            " 1.00000E+01 0.00000E+00 0.00000E+00\n",
+            " 1.0000xE+01 0.00000E+00 0.00000E+00\n",
+            r"' 1\.0000xE\+01' is no finite number",
+        ),
         (" -2        10        20", " -2        10        2x", "is no whole number"),
         ("    32                                     1\n", "    32                                     2\n", "binary"),
     ],
-)  # fmt: skip
+)
 def test_damaged_results_are_named(tmp_path, old, new, message):
     copied(tmp_path, "brick.frd.gz")
     spoil(tmp_path / "brick.frd", old, new)
@@ -471,19 +452,19 @@ def test_files_that_were_cut_never_pass(tmp_path_factory, data):
     """A cut file is named; without its end it cannot be right."""
     folder = copied(
         tmp_path_factory.mktemp("cut"),
-        "brick_matrix.sti.gz", "brick_matrix.mas.gz", "brick_matrix.dof", "brick_matrix.inp", "brick.frd.gz",
-    )  # fmt: skip
-    name = data.draw(
-        st.sampled_from(["brick_matrix.sti", "brick_matrix.mas", "brick_matrix.dof", "brick.frd"])
+        "brick_matrix.sti.gz",
+        "brick_matrix.mas.gz",
+        "brick_matrix.dof",
+        "brick_matrix.inp",
+        "brick.frd.gz",
     )
+    name = data.draw(st.sampled_from(["brick_matrix.sti", "brick_matrix.mas", "brick_matrix.dof", "brick.frd"]))
     content = (folder / name).read_bytes()
     # the last line of an .frd file says no more than that it is whole
     kept = data.draw(st.integers(0, len(content) - (8 if name.endswith("frd") else 1)))
     (folder / name).write_bytes(content[:kept])
     with pytest.raises(InputError):
-        read_frd(folder / name) if name.endswith("frd") else read_calculix_matrices(
-            folder / "brick_matrix", units=MM
-        )
+        read_frd(folder / name) if name.endswith("frd") else read_calculix_matrices(folder / "brick_matrix", units=MM)
 
 
 @settings(max_examples=40)
@@ -492,8 +473,12 @@ def test_garbled_files_are_named_or_read(tmp_path_factory, data):
     """A changed byte is found, or gives another number: never another error."""
     folder = copied(
         tmp_path_factory.mktemp("garble"),
-        "brick_matrix.sti.gz", "brick_matrix.mas.gz", "brick_matrix.dof", "brick_matrix.inp", "brick.frd.gz",
-    )  # fmt: skip
+        "brick_matrix.sti.gz",
+        "brick_matrix.mas.gz",
+        "brick_matrix.dof",
+        "brick_matrix.inp",
+        "brick.frd.gz",
+    )
     name = data.draw(st.sampled_from(sorted(p.name for p in folder.iterdir())))
     content = bytearray((folder / name).read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
@@ -519,13 +504,9 @@ def other_mesh(deck):
 def test_positions_of_another_mesh_are_refused():
     """A rigid rotation about them strains the model; 30 % of the terms remain with another mesh of the sector of 24 blades."""
     deck = read_deck(DATA / "brick_matrix.inp", units=MM)
-    with pytest.raises(
-        InputError, match="do not fit the stiffness of brick_matrix: a rigid rotation"
-    ):
+    with pytest.raises(InputError, match="do not fit the stiffness of brick_matrix: a rigid rotation"):
         read_calculix_matrices(DATA / "brick_matrix", units=MM, mesh=other_mesh(deck))
-    taken = read_calculix_matrices(
-        DATA / "brick_matrix", units=MM, mesh=other_mesh(deck), plausible=False
-    )
+    taken = read_calculix_matrices(DATA / "brick_matrix", units=MM, mesh=other_mesh(deck), plausible=False)
     remarks = model_summary(taken, n_modes=0).remarks
     assert any("probably those of another mesh" in text for text in remarks)
 
@@ -537,7 +518,5 @@ def test_preload_is_no_doubt_about_positions():
         REFERENCE / "n24_coarse_matrix_pre.sti.gz", mass=REFERENCE / "n24_coarse_matrix_free.mas.gz"
     )
     assert doubt_about_positions(structure) is None
-    turned = replace(
-        structure, dofs=replace(structure.dofs, position=structure.dofs.position[:, [1, 2, 0]])
-    )
+    turned = replace(structure, dofs=replace(structure.dofs, position=structure.dofs.position[:, [1, 2, 0]]))
     assert doubt_about_positions(turned) is not None

@@ -86,12 +86,10 @@ def test_supports_of_single_directions(tmp_path):
 
 def test_two_materials_are_assembled_each_with_its_own(tmp_path):
     """Two cubes on top of each other, the upper one of half density: mass is the sum, cell by cell."""
-    upper = "\n".join(
-        f"{n + 4}, {x}, {y}, 2." for n, x, y in ((5, 0, 0), (6, 1, 0), (7, 1, 1), (8, 0, 1))
-    )
+    upper = "\n".join(f"{n + 4}, {x}, {y}, 2." for n, x, y in ((5, 0, 0), (6, 1, 0), (7, 1, 1), (8, 0, 1)))
     text = CUBE.replace("99, 5., 5., 5.\n", upper + "\n").replace(
         "*NSET, NSET=BOTTOM", "*ELEMENT, TYPE=C3D8, ELSET=UP\n2, 5, 6, 7, 8, 9, 10, 11, 12\n*NSET, NSET=BOTTOM", 1
-    )  # fmt: skip
+    )
     text = text.split("*BOUNDARY")[0]
     text += "*MATERIAL, NAME=LIGHT\n*DENSITY\n3925.\n*ELASTIC\n1e11, 0.2\n*SOLID SECTION, ELSET=UP, MATERIAL=LIGHT\n"
     deck = deck_of(tmp_path, text)
@@ -142,7 +140,7 @@ def test_elements_that_are_not_read_can_be_left_out(tmp_path):
         ("C3D10HS", "elements of type C3D10HS are not read"),
         ("C3D20RT", "elements of type C3D20RT are not read"),
     ],
-)  # fmt: skip
+)
 def test_bricks_of_another_kind_are_not_taken_as_plain_ones(tmp_path, kind, remedy):
     """A clamped plate of C3D8I has 168.9 Hz, of C3D8R 151.5 Hz (CalculiX 2.20); plain bricks gave 272.3 Hz for both."""
     with pytest.raises(InputError, match=rf"line 15, \*ELEMENT: .*{remedy}"):
@@ -150,9 +148,7 @@ def test_bricks_of_another_kind_are_not_taken_as_plain_ones(tmp_path, kind, reme
 
 
 def test_what_makes_an_element_another_is_told(tmp_path):
-    ten = CUBE.replace(
-        "99, 5., 5., 5.\n", "".join(f"{n}, {n / 10}, .5, .5\n" for n in range(9, 12))
-    )
+    ten = CUBE.replace("99, 5., 5., 5.\n", "".join(f"{n}, {n / 10}, .5, .5\n" for n in range(9, 12)))
     ten = ten.replace("1, 1, 2, 3, 4,\n5, 6, 7, 8\n", "1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10\n")
     (told,) = [t for t in deck_of(tmp_path, ten.replace("C3D8", "C3D10M")).ignored if "C3D10M" in t]
     assert told == "what makes C3D10M another element than its plain kind"
@@ -167,7 +163,9 @@ def test_node_sets_of_elements(tmp_path):
 
 
 def test_rotation_and_axis(tmp_path):
-    load = "*STEP\n*STATIC\n*DLOAD\nEall, CENTRIF, 1.E4, 0.1, 0., 0., 1., 0., 0.\nEALL, GRAV, 9.81, 0.,0.,-1.\n*END STEP\n"
+    load = (
+        "*STEP\n*STATIC\n*DLOAD\nEall, CENTRIF, 1.E4, 0.1, 0., 0., 1., 0., 0.\nEALL, GRAV, 9.81, 0.,0.,-1.\n*END STEP\n"
+    )
     deck = deck_of(tmp_path, CUBE + load, units=Units(1.0, 1.0, 0.5))
     assert deck.speed == pytest.approx(200.0)  # 100 rad each half second
     assert deck.axis.unit.tolist() == [1.0, 0.0, 0.0]
@@ -192,9 +190,7 @@ def test_included_files_stay_in_the_folder(tmp_path):
 
 def test_keywords_that_change_the_model_are_refused(tmp_path):
     text = CUBE + "*EQUATION\n2\n7,1,1.,8,1,-1.\n"
-    with pytest.raises(
-        InputError, match=r"deck\.inp: line 33, \*EQUATION: \*EQUATION changes the model"
-    ):
+    with pytest.raises(InputError, match=r"deck\.inp: line 33, \*EQUATION: \*EQUATION changes the model"):
         deck_of(tmp_path, text)
     deck = deck_of(tmp_path, text, ignore=("*Equation",))
     assert "*EQUATION (deck.inp: line 33), as asked" in deck.ignored
@@ -208,16 +204,17 @@ def test_loads_and_what_is_beyond_small_vibration_are_told(tmp_path):
         "*CLOAD (deck.inp: line 35)",
         "*INITIAL CONDITIONS, TYPE=TEMPERATURE (deck.inp: line 37)",
     )
-    deck = deck_of(
-        tmp_path, CUBE + "*DLOAD, AMPLITUDE=RAMP\nEALL, CENTRIF, 1.E4, 0.,0.,0., 0.,0.,1.\n"
-    )
+    deck = deck_of(tmp_path, CUBE + "*DLOAD, AMPLITUDE=RAMP\nEALL, CENTRIF, 1.E4, 0.,0.,0., 0.,0.,1.\n")
     assert deck.ignored[0].startswith("AMPLITUDE of *DLOAD")
 
 
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ("*DENSTY\n7850.\n", r"line 33, \*DENSTY: \*DENSTY is not known, and may change the model\. Did you mean 'DENSITY'"),
+        (
+            "*DENSTY\n7850.\n",
+            r"line 33, \*DENSTY: \*DENSTY is not known, and may change the model\. Did you mean 'DENSITY'",
+        ),
         ("*FIXED MASS SCALING, FACTOR=4.\n", r"line 33.*\*FIXED MASS SCALING is not known"),
         ("*MASS, ELSET=E\n3.\n", r"line 33, \*MASS: \*MASS changes the model"),
         ("*DAMPING, BETA=1e-5\n", r"line 33, \*DAMPING: damping is not read from decks\. State it in the study"),
@@ -228,14 +225,17 @@ def test_loads_and_what_is_beyond_small_vibration_are_told(tmp_path):
         ("*BOUNDARY, SUBMODEL, STEP=1\n7, 1, 1\n", r"line 33, \*BOUNDARY: the parameter SUBMODEL is not read"),
         ("*DLOAD\nHALF, CENTRIF, 1., 0.,0.,0., 0.,0.,1.\n", "rotates 'HALF', which is not the set of all elements"),
         ("*CYCLIC SYMMETRY MODEL, N=4, ELSET=HALF\n0.,0.,0.,0.,0.,1.\n", "repeats 'HALF', which is not the set"),
-        ("*NSET, NSET=A, GEN\n1, 4\n", r"line 33, \*NSET: the parameter GEN is not read.*Known: ELSET, GENERATE, INPUT"),
+        (
+            "*NSET, NSET=A, GEN\n1, 4\n",
+            r"line 33, \*NSET: the parameter GEN is not read.*Known: ELSET, GENERATE, INPUT",
+        ),
         ("*SURFACE, NAME=A, COMBINE=UNION\nB, C\n", "the parameter COMBINE is not read"),
         ("*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL, COMPOSITE\n", "the parameter COMPOSITE is not read"),
         ("*ELEMENT, TYPE=C3D8, ELSET=B, OFFSET=9\n", "the parameter OFFSET is not read"),
         ("*MATERIAL, NAME=A\n*DENSITY, DEPENDENCIES=1\n7., , 1.\n", "the parameter DEPENDENCIES is not read"),
         ("*STEP, NLGEO\n", "the parameter NLGEO is not read.*Did you mean 'NLGEOM'"),
     ],
-)  # fmt: skip
+)
 def test_what_may_change_the_model_is_refused_by_line(tmp_path, more, message):
     with pytest.raises(InputError, match=message):
         deck_of(tmp_path, CUBE + more)
@@ -302,9 +302,7 @@ def moved_into_files(folder, text):
     (folder / "data").mkdir()
     for number, rows in data.items():
         if rows:
-            (folder / "data" / f"{number}.txt").write_text(
-                "** a comment\n" + "\n".join(rows) + "\n"
-            )
+            (folder / "data" / f"{number}.txt").write_text("** a comment\n" + "\n".join(rows) + "\n")
     return "\n".join(lines) + "\n"
 
 
@@ -325,14 +323,10 @@ def test_data_in_files_of_their_own_are_read_for_every_keyword(tmp_path):
 
 
 def test_half_a_mesh_in_a_file_is_half_the_mass(tmp_path):
-    upper = "\n".join(
-        f"{n + 4}, {x}, {y}, 2." for n, x, y in ((5, 0, 0), (6, 1, 0), (7, 1, 1), (8, 0, 1))
-    )
+    upper = "\n".join(f"{n + 4}, {x}, {y}, 2." for n, x, y in ((5, 0, 0), (6, 1, 0), (7, 1, 1), (8, 0, 1)))
     (tmp_path / "nodes.txt").write_text(upper + "\n")
     (tmp_path / "cells.txt").write_text("2, 5, 6, 7, 8, 9, 10, 11, 12\n")
-    more = (
-        "*NODE, INPUT=nodes.txt\n*ELEMENT, TYPE=C3D8, ELSET=Eall, INPUT=cells.txt\n*NSET, NSET=TOP"
-    )
+    more = "*NODE, INPUT=nodes.txt\n*ELEMENT, TYPE=C3D8, ELSET=Eall, INPUT=cells.txt\n*NSET, NSET=TOP"
     text = CUBE.replace("99, 5., 5., 5.\n", "").replace("*NSET, NSET=TOP", more, 1)
     structure = assemble_deck(deck_of(tmp_path, text.split("*BOUNDARY")[0]))
     along = (np.array(structure.dofs.component) == "x").astype(float)
@@ -341,16 +335,12 @@ def test_half_a_mesh_in_a_file_is_half_the_mass(tmp_path):
 
 def test_files_of_data_obey_the_rules_of_include(tmp_path):
     (tmp_path.parent / "outside.txt").write_text("1, 0., 0., 0.\n")
-    with pytest.raises(
-        InputError, match=r"\*NODE: the included file '\.\./outside\.txt' lies outside"
-    ):
+    with pytest.raises(InputError, match=r"\*NODE: the included file '\.\./outside\.txt' lies outside"):
         deck_of(tmp_path, CUBE + "*NODE, INPUT=../outside.txt\n")
     with pytest.raises(InputError, match=r"none\.txt: there is no such file"):
         deck_of(tmp_path, CUBE + "*ELSET, ELSET=A, INPUT=none.txt\n")
     (tmp_path / "keyword.txt").write_text("*NODE\n1, 0., 0., 0.\n")
-    with pytest.raises(
-        InputError, match=r"keyword\.txt: line 1, \*NODE: is a keyword in a file of data"
-    ):
+    with pytest.raises(InputError, match=r"keyword\.txt: line 1, \*NODE: is a keyword in a file of data"):
         deck_of(tmp_path, CUBE + "*NODE, INPUT=keyword.txt\n")
     (tmp_path / "short.txt").write_text("1, 0.\n")
     with pytest.raises(InputError, match=r"short\.txt: line 1: needs 4 numbers"):
@@ -385,7 +375,7 @@ def test_files_of_data_obey_the_rules_of_include(tmp_path):
         ("*ELEMENT, TYPE=C3D8, ELSET=Eall", "*ELEMENT, ELSET=Eall", "lacks the parameter TYPE"),
         ("\n1, 4\n*NSET", "\n1, 4, 0\n*NSET", "first, last, step"),
     ],
-)  # fmt: skip
+)
 def test_damaged_decks_are_named(tmp_path, old, new, message):
     assert old in CUBE
     with pytest.raises(InputError, match=message):
@@ -447,24 +437,15 @@ def test_units_by_name():
         Units(1.0, 0.0, 1.0)
 
 
-@given(
-    st.sampled_from(["x", "rx", "mode"]),
-    st.floats(1e-3, 1e3),
-    st.floats(1e-3, 1e3),
-    st.floats(1e-3, 1e3),
-)
+@given(st.sampled_from(["x", "rx", "mode"]), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_a_vibration_is_the_same_in_all_units(kind, length, mass, time):
     """Frequencies are per unit of time; kinetic energy of a unit velocity has the units of its coordinates."""
     raw = chain(3, 2.0, 5.0, 1e-3)
     dofs = Dofs(np.arange(3), ("x", kind, "x"), np.zeros((3, 3)))
     raw = Structure(raw.mass, raw.damping, raw.stiffness, dofs)
     structure = in_si(raw, Units(length, mass, time))
-    np.testing.assert_allclose(
-        time * natural_frequencies(structure, 3), natural_frequencies(raw, 3), rtol=1e-9
-    )
-    scale = np.array(
-        [length, length if kind == "x" else 1.0, length]
-    )  # one unit of each coordinate
+    np.testing.assert_allclose(time * natural_frequencies(structure, 3), natural_frequencies(raw, 3), rtol=1e-9)
+    scale = np.array([length, length if kind == "x" else 1.0, length])  # one unit of each coordinate
     velocity = np.array([0.3, -0.2, 0.1])
     energy = mass * length**2 / time**2
     np.testing.assert_allclose(

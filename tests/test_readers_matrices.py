@@ -36,9 +36,7 @@ def brick() -> Structure:
 
 def in_mm(structure: Structure) -> tuple[scipy.sparse.coo_array, scipy.sparse.coo_array]:
     """Mass in t, stiffness in N/mm."""
-    return scipy.sparse.coo_array(structure.mass / 1e3), scipy.sparse.coo_array(
-        structure.stiffness / 1e3
-    )
+    return scipy.sparse.coo_array(structure.mass / 1e3), scipy.sparse.coo_array(structure.stiffness / 1e3)
 
 
 # ---- Abaqus: no file of the real solver was at hand; these are written as its manual describes
@@ -64,7 +62,7 @@ def test_abaqus_matrices(tmp_path, triangle):
     write_abaqus(tmp_path / "job_MASS1.mtx", mass, structure.dofs, "lower")
     found = read_abaqus_matrices(
         tmp_path / "job_STIF1.mtx", tmp_path / "job_MASS1.mtx", nodes=DATA / "brick_matrix.inp", units=MM
-    )  # fmt: skip
+    )
     np.testing.assert_array_equal(found.dofs.node, structure.dofs.node)
     np.testing.assert_allclose(found.stiffness.toarray(), structure.stiffness.toarray(), rtol=1e-13)
     np.testing.assert_allclose(found.mass.toarray(), structure.mass.toarray(), rtol=1e-13)
@@ -80,9 +78,7 @@ def small_abaqus(tmp_path, stiffness, mass="1,1,1,1,1.0\n1,2,1,2,1.0\n7,1,7,1,2.
     (tmp_path / "K.mtx").write_text(stiffness)
     (tmp_path / "M.mtx").write_text(mass)
     (tmp_path / "nodes.csv").write_text("node,x,y,z\n7,1,0,0\n1,0,0,0\n")
-    return read_abaqus_matrices(
-        tmp_path / "K.mtx", tmp_path / "M.mtx", nodes=tmp_path / "nodes.csv", plausible=False
-    )
+    return read_abaqus_matrices(tmp_path / "K.mtx", tmp_path / "M.mtx", nodes=tmp_path / "nodes.csv", plausible=False)
 
 
 STIFF = "1,1,1,1,3.0\n1,2,1,2,1.0\n7,1,1,1,-2.0\n7,1,7,1,2.0\n"
@@ -92,9 +88,7 @@ def test_abaqus_by_hand(tmp_path):
     """``[[3, 0, -2], [0, 1, 0], [-2, 0, 2]]`` and ``diag(1, 1, 2)``, written from paper."""
     structure = small_abaqus(tmp_path, STIFF)
     assert structure.dofs.labels == ("node1.x", "node1.y", "node7.x")
-    np.testing.assert_array_equal(
-        structure.stiffness.toarray(), [[3, 0, -2], [0, 1, 0], [-2, 0, 2]]
-    )
+    np.testing.assert_array_equal(structure.stiffness.toarray(), [[3, 0, -2], [0, 1, 0], [-2, 0, 2]])
     np.testing.assert_array_equal(structure.mass.toarray(), np.diag([1, 1, 2]))
     held = small_abaqus(tmp_path, STIFF.replace("1,2,1,2,1.0", "1,2,1,2,1.0e+36"))
     assert held.dofs.labels == ("node1.x", "node7.x")
@@ -150,11 +144,7 @@ def write_table(path, structure, units=MM):
 def write_matrix(path, matrix, name):
     kind = "".join(path.suffixes)
     if kind.startswith(".mtx"):
-        scipy.io.mmwrite(
-            str(path.with_suffix("")) if kind.endswith("gz") else str(path),
-            matrix,
-            symmetry="symmetric",
-        )
+        scipy.io.mmwrite(str(path.with_suffix("")) if kind.endswith("gz") else str(path), matrix, symmetry="symmetric")
         if kind.endswith("gz"):
             plain = path.with_suffix("")
             path.write_bytes(gzip.compress(plain.read_bytes()))
@@ -180,12 +170,8 @@ def test_neutral_files(tmp_path, kind):
     K = write_matrix(tmp_path / f"K.{kind}", stiffness, "stiffness")
     M = write_matrix(tmp_path / f"M.{kind}", mass, "mass")
     found = read_matrix_files(K, M, nodes=table, units=MM)
-    np.testing.assert_allclose(
-        found.stiffness.toarray(), structure.stiffness.toarray(), rtol=1e-14, atol=1e-3
-    )
-    np.testing.assert_allclose(
-        found.mass.toarray(), structure.mass.toarray(), rtol=1e-14, atol=1e-18
-    )
+    np.testing.assert_allclose(found.stiffness.toarray(), structure.stiffness.toarray(), rtol=1e-14, atol=1e-3)
+    np.testing.assert_allclose(found.mass.toarray(), structure.mass.toarray(), rtol=1e-14, atol=1e-18)
     np.testing.assert_allclose(found.dofs.position, structure.dofs.position, atol=1e-15)
     assert found.dofs.labels == structure.dofs.labels
     np.testing.assert_array_equal(found.sets["TIP"], np.sort(structure.sets["TIP"]))
@@ -203,9 +189,7 @@ def test_all_in_one_hdf5_file_and_dense(tmp_path):
         file["damping"] = 1e-5 * stiffness.toarray()
     path = tmp_path / "model.h5"
     found = read_matrix_files(path, path, damping=path, nodes=table, units=MM)
-    np.testing.assert_allclose(
-        found.damping, 1e-5 * structure.stiffness.toarray(), rtol=1e-12, atol=1e-3
-    )
+    np.testing.assert_allclose(found.damping, 1e-5 * structure.stiffness.toarray(), rtol=1e-12, atol=1e-3)
     assert isinstance(read_model(path, nodes=table, units=MM), Structure)
     with h5py.File(path, "a") as file:
         del file["mass"]
@@ -223,18 +207,14 @@ TABLE = "node,component,x,y,z\n1,x,0,0,0\n1,ry,0,0,0\n-1,mode,,,\n"
 
 
 def two_by_two(
-    tmp_path,
-    text="%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n3 3 1.0\n",
-    table=TABLE,
+    tmp_path, text="%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n3 3 1.0\n", table=TABLE
 ):
     (tmp_path / "M.mtx").write_text(
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n3 3 1.0\n"
     )
     (tmp_path / "K.mtx").write_text(text)
     (tmp_path / "dofs.csv").write_text(table)
-    return read_matrix_files(
-        tmp_path / "K.mtx", tmp_path / "M.mtx", nodes=tmp_path / "dofs.csv", plausible=False
-    )
+    return read_matrix_files(tmp_path / "K.mtx", tmp_path / "M.mtx", nodes=tmp_path / "dofs.csv", plausible=False)
 
 
 def test_modal_dofs_need_no_position(tmp_path):
@@ -247,12 +227,18 @@ def test_modal_dofs_need_no_position(tmp_path):
     ("text", "message"),
     [
         ("3 3 3\n", "line 1: is no Matrix Market"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n", "has 2 entries, its header says 3"),
+        (
+            "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n",
+            "has 2 entries, its header says 3",
+        ),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1000000000000\n1 1 1.0\n", "header says 1000000000000"),
         ("%%MatrixMarket matrix coordinate real symmetric\n900000000 900000000 1\n1 1 1.0\n", "900000000 x 900000000"),
         ("%%MatrixMarket matrix coordinate real symmetric\n%\n\n3 3 1\n1 1 a\n", r"line 5: 'a' is no finite number"),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n4 1 1.0\n", "row 4, column 1 is outside"),
-        ("%%MatrixMarket matrix coordinate real general\n3 3 2\n1 1 1.0\n1 2 1.0\n", "is not symmetric: row 1, column 2"),
+        (
+            "%%MatrixMarket matrix coordinate real general\n3 3 2\n1 1 1.0\n1 2 1.0\n",
+            "is not symmetric: row 1, column 2",
+        ),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 1 1.0\n1 1 1.0\n", "more than once"),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 2 1.0\n2 1 1.0\n", "both sides of the diagonal"),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 nan\n", "'nan' is no finite number"),
@@ -268,7 +254,7 @@ def test_modal_dofs_need_no_position(tmp_path):
         ("%%MatrixMarket matrix array real general\n3 3 9\n", r"line 2: needs 2 counts, got '3 3 9'"),
         ("%%MatrixMarket matrix array real general\n3\n", r"line 2: needs 2 counts, got '3'"),
     ],
-)  # fmt: skip
+)
 def test_damaged_matrix_market_files_are_named(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         two_by_two(tmp_path, text)
@@ -280,9 +266,9 @@ def test_damaged_matrix_market_files_are_named(tmp_path, text, message):
 def test_matrix_market_as_scipy_writes_it(tmp_path, symmetry, sparse, dtype):
     rng = np.random.default_rng(5)
     A = rng.integers(-9, 9, (4, 4)) * (1 + (0.5j if dtype is complex else 0))
-    A = {
-        "general": A, "symmetric": A + A.T, "hermitian": A + A.conj().T, "skew-symmetric": A - A.T,
-    }[symmetry].astype(dtype)  # fmt: skip
+    A = {"general": A, "symmetric": A + A.T, "hermitian": A + A.conj().T, "skew-symmetric": A - A.T}[symmetry].astype(
+        dtype
+    )
     A[abs(A) < 2] = 0
     path = tmp_path / "A.mtx"
     stored = "symmetric" if symmetry == "hermitian" and dtype is not complex else symmetry
@@ -314,24 +300,54 @@ def test_npz_with_odd_arrays(tmp_path):
     K = tmp_path / "K.npz"
 
     def read():
-        return read_matrix_files(
-            K, tmp_path / "M.mtx", nodes=tmp_path / "dofs.csv", plausible=False
-        )
+        return read_matrix_files(K, tmp_path / "M.mtx", nodes=tmp_path / "dofs.csv", plausible=False)
 
     np.savez(K, np.eye(3))
     assert read().n == 3
     for arrays, message in (
         ({"a": np.eye(3), "b": np.eye(3)}, "holds no stiffness, but a, b"),
         ({"stiffness": np.array(["a"])}, "no matrix of numbers"),
-        ({"format": "csr", "data": np.ones(1), "indices": np.zeros(1, int), "indptr": np.array([0, 1, 1, 9]),
-          "shape": np.array([3, 3])}, "do not fit together"),
-        ({"format": "coo", "data": np.ones(1), "row": np.array([7]), "col": np.array([0]),
-          "shape": np.array([3, 3])}, "do not fit together"),
-        ({"format": "coo", "data": np.ones(1), "row": np.array([0]), "col": np.array([0]),
-          "shape": np.array([3, 10**12])}, "is of 3 x 1000000000000"),
-        ({"format": "coo", "data": np.ones(1), "row": np.array([0.5]), "col": np.array([0]),
-          "shape": np.array([3, 3])}, "no integers"),
-    ):  # fmt: skip
+        (
+            {
+                "format": "csr",
+                "data": np.ones(1),
+                "indices": np.zeros(1, int),
+                "indptr": np.array([0, 1, 1, 9]),
+                "shape": np.array([3, 3]),
+            },
+            "do not fit together",
+        ),
+        (
+            {
+                "format": "coo",
+                "data": np.ones(1),
+                "row": np.array([7]),
+                "col": np.array([0]),
+                "shape": np.array([3, 3]),
+            },
+            "do not fit together",
+        ),
+        (
+            {
+                "format": "coo",
+                "data": np.ones(1),
+                "row": np.array([0]),
+                "col": np.array([0]),
+                "shape": np.array([3, 10**12]),
+            },
+            "is of 3 x 1000000000000",
+        ),
+        (
+            {
+                "format": "coo",
+                "data": np.ones(1),
+                "row": np.array([0.5]),
+                "col": np.array([0]),
+                "shape": np.array([3, 3]),
+            },
+            "no integers",
+        ),
+    ):
         np.savez(K, **arrays)
         with pytest.raises(InputError, match=message):
             read()
@@ -394,16 +410,16 @@ def test_summary_of_a_free_body(tmp_path):
 def volume_and_moment(corners):
     """Integrate 1 and x over a trilinear hexahedron with 3 Gauss points a direction."""
     nodes, weights = np.polynomial.legendre.leggauss(3)
-    signs = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])  # fmt: skip
+    signs = np.array(
+        [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
+    )
     volume, moment = 0.0, np.zeros(3)
     for i, a in enumerate(nodes):
         for j, b in enumerate(nodes):
             for k, c in enumerate(nodes):
                 one = 1 + signs * np.array([a, b, c])
                 shape = one.prod(axis=1) / 8
-                slope = np.column_stack(
-                    [signs[:, m] * np.delete(one, m, axis=1).prod(axis=1) / 8 for m in range(3)]
-                )
+                slope = np.column_stack([signs[:, m] * np.delete(one, m, axis=1).prod(axis=1) / 8 for m in range(3)])
                 weight = weights[i] * weights[j] * weights[k] * np.linalg.det(corners.T @ slope)
                 volume += weight
                 moment += weight * (shape @ corners)
@@ -463,9 +479,7 @@ def test_what_cannot_be_opened_is_asked_for(tmp_path, name, message):
 
 def test_the_dofs_of_nodes_are_wide_whatever_a_file_has():
     """Readers of binary files have numbers of 32 bits and positions in whole millimetres."""
-    table = NodeTable(
-        np.array([3, 7], dtype=np.int32), np.array([[1, 2, 3], [4, 5, 6]]), {}, "a.inp"
-    )
+    table = NodeTable(np.array([3, 7], dtype=np.int32), np.array([[1, 2, 3], [4, 5, 6]]), {}, "a.inp")
     dofs = table.dofs(np.array([7, 7, 3], dtype=np.int32), ("x", "y", "x"))
     assert (dofs.node.dtype, dofs.position.dtype) == (np.int64, np.float64)
     np.testing.assert_array_equal(dofs.position, [[4, 5, 6], [4, 5, 6], [1, 2, 3]])

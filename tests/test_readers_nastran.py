@@ -51,9 +51,7 @@ def test_matrices_of_the_a_set_have_the_eigenvalues_that_nastran_found(samples, 
         dof_set="a",
         plausible=False,
     )
-    squares = scipy.linalg.eigh(
-        structure.stiffness.toarray(), structure.mass.toarray(), eigvals_only=True
-    )
+    squares = scipy.linalg.eigh(structure.stiffness.toarray(), structure.mass.toarray(), eigvals_only=True)
     expected = library["op2"].rdnas2cam(str(folder / "nas2cam"))["lambda"][0]  # six rigid motions
     np.testing.assert_allclose(squares[6:], expected[6:], rtol=2e-7)  # single precision
     assert abs(squares[:6]).max() < 1e-9 * squares[6]
@@ -139,17 +137,13 @@ def test_output_coordinate_systems_are_those_of_the_library(samples, library, tm
     np.testing.assert_allclose(turned, rigid_motions(known.table(rows)), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "options", [{"endian": "<"}, {"endian": ">"}, {"binary": False, "digits": 16}]
-)
+@pytest.mark.parametrize("options", [{"endian": "<"}, {"endian": ">"}, {"binary": False, "digits": 16}])
 @pytest.mark.parametrize("sparse", ["dense", "bigmat", "nonbigmat"])
 def test_round_trip_through_the_writer_of_the_library(library, tmp_path, options, sparse):
     rng = np.random.default_rng(1)
     half = rng.standard_normal((12, 12)) * (rng.random((12, 12)) < 0.3)
     stiffness, mass = half @ half.T + 5 * np.eye(12), np.diag(rng.uniform(1, 2, 12))
-    library["op4"].write(
-        str(tmp_path / "m.op4"), {"mgg": mass, "kgg": stiffness}, sparse=sparse, **options
-    )
+    library["op4"].write(str(tmp_path / "m.op4"), {"mgg": mass, "kgg": stiffness}, sparse=sparse, **options)
     (tmp_path / "m.bdf").write_text("GRID,7,,1.,2.,3.\nGRID,3,,4.,5.,6.\n")
     structure = read_nastran_op4(
         tmp_path / "m.op4",
@@ -165,9 +159,7 @@ def test_round_trip_through_the_writer_of_the_library(library, tmp_path, options
     np.testing.assert_allclose(
         structure.stiffness.toarray(), energy * stiffness / np.outer(lengths, lengths), rtol=1e-14
     )
-    np.testing.assert_allclose(
-        structure.mass.toarray(), energy * mass / np.outer(lengths, lengths), rtol=1e-14
-    )
+    np.testing.assert_allclose(structure.mass.toarray(), energy * mass / np.outer(lengths, lengths), rtol=1e-14)
     assert structure.dofs.node.tolist() == [3] * 6 + [7] * 6
     np.testing.assert_allclose(structure.dofs.position[6], [1e-3, 2e-3, 3e-3])
 
@@ -191,11 +183,7 @@ def test_sizes_are_refused_before_anything_is_allocated(samples):
     path = samples / "nastran_op4_data" / "nas_large_dim_dense_binary.op4"
     with pytest.raises(InputError, match=r"matd22a: is 10000001 x 10000001, the g-set"):
         read_nastran_op4(
-            path,
-            mass="matd22a",
-            stiffness="matd22a",
-            geometry=samples / "nas2cam_extseout" / "full.op2",
-            dof_set="g",
+            path, mass="matd22a", stiffness="matd22a", geometry=samples / "nas2cam_extseout" / "full.op2", dof_set="g"
         )
 
 
@@ -217,9 +205,7 @@ def test_cards_written_by_the_library(library, tmp_path):
     stiffness = half @ half.T
     keys = [(node, component) for node in (4, 15, 1000001) for component in (1, 2, 3)]
     index = pandas.MultiIndex.from_tuples(keys, names=["id", "dof"])
-    frames = {
-        n: pandas.DataFrame(m, index, index) for n, m in (("kk", stiffness), ("mm", np.eye(9)))
-    }
+    frames = {n: pandas.DataFrame(m, index, index) for n, m in (("kk", stiffness), ("mm", np.eye(9)))}
     library["bulk"].wtdmig(str(tmp_path / "a.pch"), frames)
     structure = read_nastran_dmig(tmp_path / "a.pch", mass="mm", stiffness="kk")
     np.testing.assert_allclose(structure.stiffness.toarray(), stiffness, rtol=1e-8)  # its digits
@@ -232,9 +218,7 @@ def test_cards_written_by_the_library(library, tmp_path):
         ("nas2cam_extseout/full.op2", read_nastran_op2),
         (
             "nas2cam_extseout/inboard.op4",
-            lambda path: read_nastran_op4(
-                path, mass="mxx", stiffness="kxx", geometry=path, dof_set="a"
-            ),
+            lambda path: read_nastran_op4(path, mass="mxx", stiffness="kxx", geometry=path, dof_set="a"),
         ),
     ],
 )
@@ -298,9 +282,7 @@ def read_cards(tmp_path, text, **options):
 
 
 def test_small_large_and_free_fields(tmp_path):
-    text = SMALL + LARGE.replace(
-        "DMIG*   MAAX                           0               6\n", HEAD.format(name="MAAX")
-    )
+    text = SMALL + LARGE.replace("DMIG*   MAAX                           0               6\n", HEAD.format(name="MAAX"))
     structure = read_cards(tmp_path, text)
     np.testing.assert_array_equal(structure.stiffness.toarray(), [[2e3, -1e3], [-1e3, 1.5e3]])
     np.testing.assert_array_equal(structure.mass.toarray(), np.diag([2.0, 3.0]))
@@ -319,18 +301,10 @@ def test_scalar_points_are_modal_coordinates(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "DMIG    MAAX           0",
-            "DMIG    MASS           0",
-            r"DMIG MAAX has a column before its",
-        ),
+        ("DMIG    MAAX           0", "DMIG    MASS           0", r"DMIG MAAX has a column before its"),
         ("1.5D+3", "1.5Q+3", r"line 5: '1.5Q\+3' is no number"),
         ("       1       2   -1.+3", "       1       9   -1.+3", "'9' is no component 0 to 6"),
-        (
-            "       1       2   -1.+3",
-            "     1.5       2   -1.+3",
-            r"line 3|line 2: '1.5' is no whole",
-        ),
+        ("       1       2   -1.+3", "     1.5       2   -1.+3", r"line 3|line 2: '1.5' is no whole"),
         ("       1       2   -1.+3", "       1       1   -1.+3", "gives an entry twice"),
         ("       6       2", "       1       2", "KAAX: is not symmetric"),
         ("1.5D+3", "1.D999", "not finite"),
@@ -372,7 +346,7 @@ WHOLE = SMALL + HEAD.format(name="MAAX") + "DMIG,MAAX,1,1,,1,1,2.\n"
         ("GRID\t1\t\t0.", "has a tab"),
         ("=,*(1),=,*(1.)==\n=(5)", r"line 8: repeats cards \(=\), which is not read"),
     ],
-)  # fmt: skip
+)
 def test_cards_that_would_be_passed_over_are_refused_by_line(tmp_path, card, message):
     with pytest.raises(InputError, match=message):
         read_cards(tmp_path, f"{WHOLE}{card}\n")
@@ -412,7 +386,7 @@ def test_a_matrix_of_moduli_and_phases_is_refused_where_it_is_asked_for(tmp_path
         ("BEGIN BULK\nGRID,1,,0.,0.,0.\nBEGIN SUPER=2\nGRID,2", "line 3: begins the bulk data of another"),
         ("BEGIN BULK\nGRID,1,,0.,0.,0.\n,,,\n,,\nGRID", "line 5"),
     ],
-)  # fmt: skip
+)
 def test_geometry_that_would_be_misread_is_refused_by_line(tmp_path, cards, message):
     (tmp_path / "m.bdf").write_text(cards + "\n")
     with pytest.raises(InputError, match=message):
@@ -421,19 +395,13 @@ def test_geometry_that_would_be_misread_is_refused_by_line(tmp_path, cards, mess
 
 @pytest.mark.parametrize(
     "cards", ["SPC1,1,123456,7", "RBE2,9,3,123456,7", "MPC,1,3,1,1.,7,1,-1.", "GRID,8,,1.,1.,1.,,123"]
-)  # fmt: skip
+)
 def test_constraints_that_matrices_of_the_g_set_do_not_show_are_refused(library, tmp_path, cards):
     matrix = np.eye(18 if cards.startswith("GRID") else 12)
     library["op4"].write(str(tmp_path / "m.op4"), {"mgg": matrix, "kgg": matrix})
     (tmp_path / "m.bdf").write_text(f"GRID,7,,1.,2.,3.\nGRID,3,,4.,5.,6.\n{cards}\n")
     with pytest.raises(InputError, match=r"m\.bdf: line 3: \w+: holds degrees of freedom or ties"):
-        read_nastran_op4(
-            tmp_path / "m.op4",
-            mass="mgg",
-            stiffness="kgg",
-            geometry=tmp_path / "m.bdf",
-            dof_set="g",
-        )
+        read_nastran_op4(tmp_path / "m.op4", mass="mgg", stiffness="kgg", geometry=tmp_path / "m.bdf", dof_set="g")
 
 
 def test_places_go_through_with_all_their_digits(library, tmp_path):
@@ -452,9 +420,7 @@ def test_places_go_through_with_all_their_digits(library, tmp_path):
 
 
 def chain(*lengths):
-    return b"".join(
-        np.array([n], "<i4").tobytes() + bytes(n) + np.array([n], "<i4").tobytes() for n in lengths
-    )
+    return b"".join(np.array([n], "<i4").tobytes() + bytes(n) + np.array([n], "<i4").tobytes() for n in lengths)
 
 
 def test_chain_of_records_is_followed_to_the_end(tmp_path):
@@ -520,6 +486,4 @@ def test_missing_package_is_named(tmp_path, monkeypatch):
     (tmp_path / "a.op4").write_text("       1       1       6       2M\n")
     (tmp_path / "a.bdf").write_text("GRID,1,,0.,0.,0.\n")
     with pytest.raises(StickslipError, match=r"pyyeti: not installed.*stickslip\[readers\]"):
-        read_nastran_op4(
-            tmp_path / "a.op4", mass="m", stiffness="m", geometry=tmp_path / "a.bdf", dof_set="g"
-        )
+        read_nastran_op4(tmp_path / "a.op4", mass="m", stiffness="m", geometry=tmp_path / "a.bdf", dof_set="g")

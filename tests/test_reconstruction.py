@@ -6,15 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evidence.reconstruction.candidates import (
-    CHOSEN,
-    FLAT_ANGLE,
-    FRICTION,
-    LIFTING,
-    TITANIUM,
-    Candidate,
-    candidates,
-)
+from evidence.reconstruction.candidates import CHOSEN, FLAT_ANGLE, FRICTION, LIFTING, TITANIUM, Candidate, candidates
 from stickslip.study.models.study import read_study
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_blades" / "study.toml"

@@ -134,9 +134,8 @@ def test_plane_faces_know_their_normal():
     sets["left"], sets["right"] = sets.pop("cyclic_low"), sets.pop("cyclic_high")
     copies = {f"sector{n}.{name}": sets[name] for n in range(sectors) for name in ("left", "right")}
     interface = neighbour_interface(
-        replace(structure, sets=copies), sectors, Bonded(k_t=1.0, k_w=1.0, k_n=1.0),
-        low="left", high="right",
-    )  # fmt: skip
+        replace(structure, sets=copies), sectors, Bonded(k_t=1.0, k_w=1.0, k_n=1.0), low="left", high="right"
+    )
     half = math.pi / sectors
     row = interface.gap_operator.toarray()[2, sets["right"][:3]]
     assert -row == pytest.approx([-math.sin(half), math.cos(half), 0.0], abs=1e-12)

@@ -39,14 +39,16 @@ def two_flexible_bodies(n_contacts=3, seed=0, sparse=False):
     names = tuple(f"c{i}" for i in range(n_contacts))
     laws = (ElasticCoulomb(k_t=2e5, k_w=1e5, k_n=3e5, mu=0.3, preload=20.0),) * n_contacts
     structure = Structure(
-        mass, 1e-4 * stiffness, stiffness, table(tuple(f"d{i}" for i in range(n))),
+        mass,
+        1e-4 * stiffness,
+        stiffness,
+        table(tuple(f"d{i}" for i in range(n))),
         {"tips": np.array([own - 1, n - 1]), "contact": np.arange(3)},
-    )  # fmt: skip
+    )
     if sparse:
         structure = replace(
-            structure,
-            **{k: scipy.sparse.csr_array(getattr(structure, k)) for k in ("mass", "damping", "stiffness")},
-        )  # fmt: skip
+            structure, **{k: scipy.sparse.csr_array(getattr(structure, k)) for k in ("mass", "damping", "stiffness")}
+        )
     static = np.zeros(n)
     normals = gap[2::3]
     static -= 20.0 * normals.sum(axis=0)
@@ -57,9 +59,7 @@ def two_flexible_bodies(n_contacts=3, seed=0, sparse=False):
 
 
 def relative(system, load):
-    structure, gap = in_relative_coordinates(
-        system.structure, system.interface.gap_operator, system.interface.names
-    )
+    structure, gap = in_relative_coordinates(system.structure, system.interface.gap_operator, system.interface.names)
     basis = structure.basis
     load = HarmonicLoad(basis.T @ load.static, {h: basis.T @ f for h, f in load.harmonics.items()})
     interface = replace(system.interface, gap_operator=gap)
@@ -84,9 +84,7 @@ def test_both_coordinates_give_the_same_response_and_relative_ones_halve_the_unk
 def test_transform_inverts_the_gap_operator_and_keeps_untouched_dofs():
     system, _ = two_flexible_bodies()
     structure, gap = in_relative_coordinates(system.structure, system.interface.gap_operator)
-    np.testing.assert_allclose(
-        system.interface.gap_operator @ structure.basis, gap, atol=1e-14
-    )  # B L = [I 0]
+    np.testing.assert_allclose(system.interface.gap_operator @ structure.basis, gap, atol=1e-14)  # B L = [I 0]
     assert np.linalg.cond(structure.basis) < 3.0  # invertible, and well
     assert np.array_equal(np.flatnonzero(gap.any(axis=0)), structure.sets["gaps"])
     tips = structure.sets["tips"]
@@ -103,9 +101,7 @@ def test_local_blocks_are_the_pseudo_inverse_of_the_whole():
     structure, _ = in_relative_coordinates(system.structure, system.interface.gap_operator)
     gaps = structure.sets["gaps"]
     np.testing.assert_allclose(
-        structure.basis[:, gaps],
-        np.linalg.pinv(system.interface.gap_operator.toarray()),
-        atol=1e-13,
+        structure.basis[:, gaps], np.linalg.pinv(system.interface.gap_operator.toarray()), atol=1e-13
     )
 
 
@@ -143,9 +139,7 @@ def test_dependent_gaps_are_refused_by_name():
     system, _ = two_flexible_bodies()
     gap = system.interface.gap_operator.toarray()
     gap[6:9] = gap[3:6]  # the third contact lies on the second
-    with pytest.raises(
-        InputError, match=r"gaps of contacts c1, c2 depend on each other.*6 gaps of which 3"
-    ):
+    with pytest.raises(InputError, match=r"gaps of contacts c1, c2 depend on each other.*6 gaps of which 3"):
         in_relative_coordinates(system.structure, gap, system.interface.names)
 
 

@@ -29,7 +29,7 @@ def from_period_to_period(periods: int) -> float:
     """Return how far a mass that rests on a stop is from where it was a period before, of its size: steps end where it lands or lifts."""
 
     def moves(t: float, y: np.ndarray, shut: float) -> list[float]:
-        return [y[1], FORCE * np.cos(OMEGA * t) - SPRING * y[0] - DASHPOT * y[1] - shut * STIFF * y[0]]  # fmt: skip
+        return [y[1], FORCE * np.cos(OMEGA * t) - SPRING * y[0] - DASHPOT * y[1] - shut * STIFF * y[0]]
 
     def meets(_: float, y: np.ndarray, __: float) -> float:
         return float(y[0])
@@ -41,7 +41,7 @@ def from_period_to_period(periods: int) -> float:
         while t < end - 1e-12:
             shut = float((y[0] if abs(y[0]) > 1e-10 else y[1]) > 0.0)
             meets.direction = -1.0 if shut else 1.0  # type: ignore[attr-defined]
-            part = solve_ivp(moves, (t, end), y, "DOP853", rtol=1e-9, atol=1e-12, events=meets, args=(shut,))  # fmt: skip
+            part = solve_ivp(moves, (t, end), y, "DOP853", rtol=1e-9, atol=1e-12, events=meets, args=(shut,))
             t, y = part.t[-1], part.y[:, -1]
         ends.append(y)
     return float(np.abs(ends[-1] - ends[-2]).max() / np.abs(ends).max())

@@ -28,27 +28,27 @@ from stickslip.report.forced.tables import peaks
 from stickslip.report.inputs import Varied, as_run, told
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
-from stickslip.report.quantities import (
-    amplitude,
-    column,
-    number,
-    percent,
-    quantity,
-    runs,
-    scale_for,
-)
+from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges, skin_picture
 from stickslip.report.tiles import patches, triangulated
 from stickslip.study.analyses.verdict import Verdict, to_json
 
-needs_browser = pytest.mark.skipif(
-    CHROMIUM is None, reason="no chromium on the path: the page is not opened"
-)
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: the page is not opened")
 FIGURES = (
-    "response", "low_order", "harmonics", "errors", "error_scatter", "optimisation", "loops_t", "loops_w", "states",
-    "motion_damper", "energy", "mesh",
-)  # fmt: skip
+    "response",
+    "low_order",
+    "harmonics",
+    "errors",
+    "error_scatter",
+    "optimisation",
+    "loops_t",
+    "loops_w",
+    "states",
+    "motion_damper",
+    "energy",
+    "mesh",
+)
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,7 @@ class Opened:
         return found[0]
 
 
-def open_page(
-    browser: Browser, html: Path, folder: Path, probe: str = "", wait: str = "true"
-) -> Opened:
+def open_page(browser: Browser, html: Path, folder: Path, probe: str = "", wait: str = "true") -> Opened:
     """Open a page with a probe at its end until something is true, and record what goes wrong in it."""
     text = html.read_text(encoding="utf-8")
     watched, end = folder / "watched.html", text.rindex("</body>")
@@ -167,9 +165,7 @@ class Tried:
 
 
 @pytest.fixture(scope="module")
-def opened(
-    browser: Browser, page: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Opened, Tried]:
+def opened(browser: Browser, page: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Opened, Tried]:
     drawn = "document.body.dataset.colours"
     seen = open_page(browser, page, tmp_path_factory.mktemp("browser"), PROBE, drawn)
     contrasts = {}
@@ -183,7 +179,9 @@ def opened(
         wider = "document.documentElement.scrollWidth - innerWidth"
         browser.until(f"{wider} <= 0")
         sideways[width] = browser.run(wider)
-    browser.run("addEventListener('beforeprint', () => { window.folded = document.querySelectorAll('details:not([open])').length; })")  # fmt: skip
+    browser.run(
+        "addEventListener('beforeprint', () => { window.folded = document.querySelectorAll('details:not([open])').length; })"
+    )
     sheets = len(re.findall(rb"/Type\s*/Page\b", browser.pdf()))
     tried = Tried(sideways, contrasts, sheets, browser.run("window.folded ?? -1"))
     dom = browser.run("document.documentElement.outerHTML")
@@ -206,9 +204,7 @@ def test_page_opens_without_console_error(opened: tuple[Opened, Tried]) -> None:
 
 
 @needs_browser
-def test_the_page_fits_narrow_and_wide_windows_light_and_dark_and_paper(
-    opened: tuple[Opened, Tried],
-) -> None:
+def test_the_page_fits_narrow_and_wide_windows_light_and_dark_and_paper(opened: tuple[Opened, Tried]) -> None:
     tried = opened[1]
     assert max(tried.sideways.values()) <= 0, tried.sideways
     assert min(tried.contrasts.values()) >= 4.5, tried.contrasts  # of WCAG AA
@@ -271,25 +267,16 @@ def test_text_of_the_dataset_is_escaped() -> None:
     data = small_result()
     n = data.sizes["case"]
     data.attrs |= {
-        "verdicts": to_json(
-            [Verdict("wrong", evil, 1.0, evil, evil), Verdict("trusted", evil, None, evil)]
-        ),
+        "verdicts": to_json([Verdict("wrong", evil, 1.0, evil, evil), Verdict("trusted", evil, None, evil)]),
         "alert_explanation": evil,
         "report_output": evil,
         "error_over": evil,
     }
-    data = data.assign_coords(
-        contact=[evil + str(k) for k in range(9)], output=[evil, "b", "c"], vary=[evil]
-    )
+    data = data.assign_coords(contact=[evil + str(k) for k in range(9)], output=[evil, "b", "c"], vary=[evil])
     data["contact_group"], data["contact_law"] = ("contact", [evil] * 9), ("contact", [evil] * 9)
     data["case_label"] = "case", [f"{evil} = {k}" for k in range(n)]
     data["retained"] = [str(v).replace("damper", evil) for v in data["retained"].values]
-    root = {
-        "title": evil,
-        "study_toml": evil,
-        "created": evil,
-        "versions": json.dumps({evil: evil}),
-    }
+    root = {"title": evil, "study_toml": evil, "created": evil, "versions": json.dumps({evil: evil})}
     html = html_of(data, **root)
     assert "<script>document.title" not in html
     assert "&lt;script&gt;document.title" in html
@@ -347,10 +334,7 @@ def test_the_figure_of_errors_says_what_became_of_what_lies_above_the_threshold(
     caption = errors(Response(data)).caption
     assert "Above it: 3 points, 2 of them solved again" in caption
     assert "1 of them is doubtful or wrong." in caption
-    assert (
-        "None lies above it."
-        in errors(Response(data.assign(own_error_percent=("point", np.full(n, 0.5))))).caption
-    )
+    assert "None lies above it." in errors(Response(data.assign(own_error_percent=("point", np.full(n, 0.5))))).caption
 
 
 def test_errors_of_rounding_alone_are_not_drawn() -> None:
@@ -418,10 +402,16 @@ def test_the_tile_counts_the_doubtful_points_of_trusted_cases() -> None:
 def test_checks_name_their_case_and_what_decided() -> None:
     data = synthetic_result(ratios=(20, 5), n=10)
     rows = {
-        "case": [0, 1], "frequency_hz": [180.0, 181.0], "verdict": ["stable", "undecided"], "multiplier": [1.05, 0.9],
+        "case": [0, 1],
+        "frequency_hz": [180.0, 181.0],
+        "verdict": ["stable", "undecided"],
+        "multiplier": [1.05, 0.9],
         "multiplier_error": [0.2, 0.0],
-        "sentence": ["180.000 Hz: stable, the motion in time being attained; by the multipliers undecided: x", "181.000 Hz: undecided: y"],
-    }  # fmt: skip
+        "sentence": [
+            "180.000 Hz: stable, the motion in time being attained; by the multipliers undecided: x",
+            "181.000 Hz: undecided: y",
+        ],
+    }
     for name, own in rows.items():
         data[f"stability_{name}"] = "examined", own
     (table,) = stability(Response(data))
@@ -440,10 +430,7 @@ def test_the_smallest_peak_is_one_of_resonance() -> None:
     assert all(map(view.resonates, view.cases))
     least = int(np.argmin(peaks))
     data["highest_hz"] = "case", [np.nan] * 3
-    data["lowest_hz"] = (
-        "case",
-        [view.peak_hz(c) if c.index == least else np.nan for c in view.cases],
-    )
+    data["lowest_hz"] = ("case", [view.peak_hz(c) if c.index == least else np.nan for c in view.cases])
     card = cards(Response(data))[0]
     assert view.cases[least].where not in card.note
     assert card.label == "smallest peak of 2 cases"
@@ -540,7 +527,7 @@ PARTIAL = {
     "no damper": (_without("retained"), {"the damper"}),
     "no reduction": (_without("frequency_full", "frequency_stuck"), {"the reduction"}),
     "bare": (_bare, set(SAID) - {"the response"}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", PARTIAL)
@@ -584,12 +571,8 @@ def test_without_excitation_amplitudes_are_not_divided() -> None:
 
 def test_optimisation_follows_the_first_varied_number_one_curve_for_each_other_value() -> None:
     data = synthetic_result(ratios=(20, 10, 5, 3.5, 3, 2))
-    values = np.array(
-        [[law, k] for law in ("stiff", "soft") for k in ("0.2", "0.4", "0.6")], dtype=object
-    )
-    labels = [
-        f"contact.flat.law = {law}, contact.flat.friction_coefficient = {k}" for law, k in values
-    ]
+    values = np.array([[law, k] for law in ("stiff", "soft") for k in ("0.2", "0.4", "0.6")], dtype=object)
+    labels = [f"contact.flat.law = {law}, contact.flat.friction_coefficient = {k}" for law, k in values]
     data = data.drop_vars(["vary", "vary_value"]).assign(
         vary_value=(("case", "vary"), values), case_label=("case", labels)
     )
@@ -604,9 +587,7 @@ def test_optimisation_follows_the_first_varied_number_one_curve_for_each_other_v
 
 @needs_browser
 @pytest.mark.parametrize("name", ["bare", "nothing converged", "one harmonic"])
-def test_partial_pages_open_without_console_error(
-    browser: Browser, name: str, tmp_path: Path
-) -> None:
+def test_partial_pages_open_without_console_error(browser: Browser, name: str, tmp_path: Path) -> None:
     data = _without("surface")(PARTIAL[name][0](small_result()))
     seen = open_page(browser, report(data, tmp_path), tmp_path)
     assert seen.errors == []
@@ -634,20 +615,13 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
     text.write_text("not a dataset", encoding="utf-8")
     with pytest.raises(InputError, match=r"text\.nc: is no netCDF-4 file, or a damaged one"):
         report_file(text)
-    other = write_result(
-        tree_of(forced_response=small_result().drop_vars("status")), tmp_path / "other.nc"
-    )
+    other = write_result(tree_of(forced_response=small_result().drop_vars("status")), tmp_path / "other.nc")
     with pytest.raises(
-        InputError,
-        match=r"other\.nc: holds none of forced_response, .*limit_cycle, .*modes, campbell, flutter, safe",
+        InputError, match=r"other\.nc: holds none of forced_response, .*limit_cycle, .*modes, campbell, flutter, safe"
     ):
         report_file(other)
-    good = write_result(
-        tree_of(forced_response=synthetic_result(ratios=(5,))), tmp_path / "good.nc"
-    )
-    with pytest.raises(
-        InputError, match=r"report\.html: cannot be written \(No such file or directory\)"
-    ):
+    good = write_result(tree_of(forced_response=synthetic_result(ratios=(5,))), tmp_path / "good.nc")
+    with pytest.raises(InputError, match=r"report\.html: cannot be written \(No such file or directory\)"):
         report_file(good, tmp_path / "missing" / "report.html")
 
 
@@ -663,17 +637,11 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     def figure(node: Node) -> Plot:
         return Plot("toy", "A toy", "Its answer.", go.Figure([go.Scatter(y=node.floats("answer"))]))
 
-    toy = Section(
-        "toy",
-        ("answer",),
-        Node,
-        (Block("toy", "The toy", (figure, lambda _: Words(("**42** < 43",)))),),
-    )
+    toy = Section("toy", ("answer",), Node, (Block("toy", "The toy", (figure, lambda _: Words(("**42** < 43",)))),))
     monkeypatch.setattr(module, "SECTIONS", (*module.SECTIONS, toy))
     tree = tree_of(
         toy=xr.Dataset(
-            {"answer": (("case", "n"), [[1.0, 2.0]])},
-            attrs={"verdicts": to_json([Verdict("doubtful", why="so so")])},
+            {"answer": (("case", "n"), [[1.0, 2.0]])}, attrs={"verdicts": to_json([Verdict("doubtful", why="so so")])}
         )
     )
     html = report_html(tree)
@@ -734,10 +702,7 @@ def test_motion_of_a_body_is_the_fourier_series() -> None:
     data = synthetic_result(ratios=(5,), n=6)
     values = data["retained_displacement"]
     values[:] = 0.0
-    at = {
-        "point": int(data["peak_point"][0]),
-        "retained": list(data["retained"].values).index("damper.rx"),
-    }
+    at = {"point": int(data["peak_point"][0]), "retained": list(data["retained"].values).index("damper.rx")}
     values[{**at, "harmonic": 0, "part": 0}] = 7.0
     values[{**at, "harmonic": 2, "part": 0}] = 3.0
     values[{**at, "harmonic": 3, "part": 1}] = -2.0
@@ -772,10 +737,16 @@ def test_edges_of_a_cube() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"), (1234567.0, "1\u202f230\u202f000"), (187.6543, "188"), (0.05, "0.05"), (-21.94, "−21.9"),
-        (9.996, "10"), (1e-7, "1.00·10⁻⁷"), (float("nan"), "–"),
+        (0.0, "0"),
+        (1234567.0, "1\u202f230\u202f000"),
+        (187.6543, "188"),
+        (0.05, "0.05"),
+        (-21.94, "−21.9"),
+        (9.996, "10"),
+        (1e-7, "1.00·10⁻⁷"),
+        (float("nan"), "–"),
     ],
-)  # fmt: skip
+)
 def test_numbers_have_three_digits(value: float, text: str) -> None:
     assert number(value) == text
 
@@ -829,8 +800,7 @@ def test_two_values_are_too_few_for_an_optimisation_curve_and_the_page_says_so()
     needed = "need 3 values or more"
     text = page_text(html_of(synthetic_result(ratios=(20, 5))))
     assert (
-        f"Curves over load.shaker.ratio, and where friction works, {needed}; there are 2. Add values to [vary]."
-        in text
+        f"Curves over load.shaker.ratio, and where friction works, {needed}; there are 2. Add values to [vary]." in text
     )
     for ratios in ((20,), (20, 10, 5)):
         assert needed not in page_text(html_of(synthetic_result(ratios=ratios)))
@@ -908,7 +878,7 @@ def test_patches_fill_a_flat_face_and_show_what_its_points_do() -> None:
     dots = skin_picture(Response(data))
     data["contact_area"] = "contact", np.full(data.sizes["contact"], 4e-6)
     filled = skin_picture(Response(data))
-    kinds = [{t.name: t.type for t in p.figure.data if t.legend == "legend2" and t.showlegend} for p in (dots, filled)]  # fmt: skip
+    kinds = [{t.name: t.type for t in p.figure.data if t.legend == "legend2" and t.showlegend} for p in (dots, filled)]
     assert set(kinds[0]) == set(kinds[1])
     assert set(kinds[0].values()) == {"scatter3d"}
     assert set(kinds[1].values()) == {"mesh3d"}

@@ -7,25 +7,12 @@ import pytest
 
 from evidence.models.lumped import blades_and_damper, lumped, system
 from evidence.validation.case_b8_residual_traction import TABLE, y2
-from stickslip import (
-    CoupledCoulomb,
-    CubicSpring,
-    Interface,
-    Iwan,
-    Jenkins,
-    RigidCoulomb,
-    UnilateralSpring,
-)
+from stickslip import CoupledCoulomb, CubicSpring, Interface, Iwan, Jenkins, RigidCoulomb, UnilateralSpring
 from stickslip.contact.element import element, element_step
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import Discretisation
-from stickslip.response.residual_tractions import (
-    TractionSearch,
-    confirmed,
-    resonance_bounds,
-    traction_bounds,
-)
+from stickslip.response.residual_tractions import TractionSearch, confirmed, resonance_bounds, traction_bounds
 from stickslip.response.residual_tractions.bounds import _at, _setup
 from stickslip.response.residual_tractions.branches import may_be_several
 from stickslip.response.residual_tractions.search import sliders_at
@@ -79,7 +66,7 @@ def test_gradient_agrees_with_differences():
     sides = [setup.problem.solved(state.sliders + k * step, state.omega, (state,)) for k in (1, -1)]
     change = np.log(sides[0].amplitude / sides[1].amplitude) / (2 * step.sum())
     assert by_slider[sticks][0] == pytest.approx(change, rel=1e-4)
-    sides = [setup.problem.solved(state.sliders, state.omega * (1 + k), (state,)) for k in (1e-5, -1e-5)]  # fmt: skip
+    sides = [setup.problem.solved(state.sliders, state.omega * (1 + k), (state,)) for k in (1e-5, -1e-5)]
     change = np.log(sides[0].amplitude / sides[1].amplitude) / 2e-5
     assert by_log_omega == pytest.approx(change, rel=1e-3)
 
@@ -100,9 +87,7 @@ def test_resonance_of_contacts_that_slip_is_unique():
     made, load = blades_and_damper()
     omegas = HZ * np.linspace(162.0, 164.0, 5)
     known = list(traction_bounds(made, load, list(omegas), 0, EVENTS, TractionSearch(starts=0)))
-    least, most = (
-        getattr(resonance_bounds(made, load, known, end, 0, EVENTS), end) for end in ("least", "most")
-    )  # fmt: skip
+    least, most = (getattr(resonance_bounds(made, load, known, end, 0, EVENTS), end) for end in ("least", "most"))
     assert least.amplitude == pytest.approx(most.amplitude, rel=1e-7)
     assert least.amplitude == pytest.approx(2.2739e-4, rel=1e-3)  # benchmark B6, on samples
     assert most.stuck == 0
@@ -205,8 +190,12 @@ def test_bounds_hold_the_motions_of_other_branches():
 
 
 def test_friction_under_a_constant_normal_load_is_not_swept():
-    alone = [Jenkins(k_t=1e4, limit=6.0), Iwan(k_t=1e4, limit=6.0), CoupledCoulomb(k_t=1e4, k_n=0.0, mu=0.5, preload=12.0)]  # fmt: skip
-    others = [UnilateralSpring(k_n=5e4, preload=2.0), CoupledCoulomb(k_t=1e4, k_n=1e4, mu=0.5, preload=12.0)]  # fmt: skip
+    alone = [
+        Jenkins(k_t=1e4, limit=6.0),
+        Iwan(k_t=1e4, limit=6.0),
+        CoupledCoulomb(k_t=1e4, k_n=0.0, mu=0.5, preload=12.0),
+    ]
+    others = [UnilateralSpring(k_n=5e4, preload=2.0), CoupledCoulomb(k_t=1e4, k_n=1e4, mu=0.5, preload=12.0)]
     for law in (*alone, *others):
         interface = Interface(("one",), (law,), np.eye(3))
         assert may_be_several(interface) == (law in others)
@@ -237,7 +226,7 @@ def test_a_law_of_ones_own_that_is_marched():
     found = []
     for law in (Own(k_t=1e4, limit=6.0), Jenkins(k_t=1e4, limit=6.0)):
         made, load = stopped(law)
-        (bounds,) = traction_bounds(made, load, [130.0], 0, Discretisation(order=3), TractionSearch(starts=0))  # fmt: skip
+        (bounds,) = traction_bounds(made, load, [130.0], 0, Discretisation(order=3), TractionSearch(starts=0))
         found.append([end.amplitude for end in (bounds.least, bounds.reference, bounds.most)])
     assert found[0] == pytest.approx(found[1], rel=1e-3)  # one on 256 samples, the other at events
     assert found[1][2] > 1.02 * found[1][0]
@@ -258,7 +247,7 @@ class Sticky:
 
 @pytest.mark.parametrize(
     ("law", "why"), [(RigidCoulomb(mu=0.3), "is rigid"), (Sticky(), "does not say where its springs start")]
-)  # fmt: skip
+)
 def test_what_is_not_supported_is_said(law, why):
     made, load = stopped(Jenkins(k_t=1e4, limit=6.0))
     interface = made.interface

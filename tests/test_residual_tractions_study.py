@@ -37,7 +37,11 @@ starts = 0
 
 def written(folder: Path, table: str = TABLE) -> Path:
     text = (EXAMPLES / "four_masses" / "study.toml").read_text(encoding="utf-8")
-    text = text.replace("gap_m = 1e-3", "gap_m = 1e-4").replace("[output]", table + "\n[output]").replace("[forced_response]", "[harmonics]\n[forced_response]")  # fmt: skip
+    text = (
+        text.replace("gap_m = 1e-3", "gap_m = 1e-4")
+        .replace("[output]", table + "\n[output]")
+        .replace("[forced_response]", "[harmonics]\n[forced_response]")
+    )
     path = folder / "study.toml"
     path.write_text(changed(text, KEYS), encoding="utf-8")
     return path
@@ -49,9 +53,7 @@ def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
     least, own, most = (data[f"{n}_amplitude"].values for n in ("least", "reference", "most"))
     solved = np.isfinite(own)
     assert np.all((least <= own)[solved] & (own <= most)[solved])
-    assert np.all(
-        np.nanmax(most / least, axis=1) > 1.003
-    )  # the band is open somewhere in each case
+    assert np.all(np.nanmax(most / least, axis=1) > 1.003)  # the band is open somewhere in each case
     # 3 N: the resonance itself; its ends are motions in time, too
     case = one_case(data, 1)
     low, high = case["resonance_amplitude"].values[1:]
@@ -71,19 +73,15 @@ def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
     bands = [t for t in figures["optimisation"].data if t.fill]
     assert bands[0].x == pytest.approx([2.0, 3.0, 5.0])
     assert "residual_tractions" in figures
-    assert [t.title for t in outcome.summaries["residual_tractions"]] == ["Resonance over all residual tractions"]  # fmt: skip
+    assert [t.title for t in outcome.summaries["residual_tractions"]] == ["Resonance over all residual tractions"]
 
 
 def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path) -> None:
     table = TABLE.replace("points = 4", "points = 3")
     case = read_study(written(tmp_path, table)).cases()[1]
     model = case.build()
-    front = ss.Model(
-        **{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs", "peak_output")}
-    )
-    result = front.residual_tractions(
-        frequency_hz=(11.0, 15.0), points=3, harmonics=3, starts=0, in_time=False
-    )
+    front = ss.Model(**{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs", "peak_output")})
+    result = front.residual_tractions(frequency_hz=(11.0, 15.0), points=3, harmonics=3, starts=0, in_time=False)
     own = one_case(result.data["residual_tractions"].to_dataset(), 0)
     at = np.searchsorted(own["frequency_hz"].values, np.linspace(11.0, 15.0, 3) - 1e-9)
     question = RESIDUAL_TRACTIONS.inputs(case, model)
@@ -91,7 +89,7 @@ def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path)
         records = list(RESIDUAL_TRACTIONS.solve(question, (), journal))
         assert [r.stage for r in records] == ["point"] * 3 + ["least", "most"]
         later = list(RESIDUAL_TRACTIONS.solve(question, records[:2], journal))
-        assert [r.amplitude for r in later] == [pytest.approx(r.amplitude, rel=1e-6) for r in records[2:]]  # fmt: skip
+        assert [r.amplitude for r in later] == [pytest.approx(r.amplitude, rel=1e-6) for r in records[2:]]
         assert list(RESIDUAL_TRACTIONS.solve(question, records, journal)) == []
     found = np.array([r.amplitude[2] for r in records[:3]])
     assert found == pytest.approx(own["most_amplitude"].values[at], rel=1e-9)

@@ -38,7 +38,7 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
     own = outcome.tree["resonance"].to_dataset().isel(case=0).variables
     (trusted,) = case_verdicts("", own, {}, [0.2, 0.12, 0.09])
-    assert trusted.why.endswith("followed from the first value, not held against sweeps at the others")  # fmt: skip
+    assert trusted.why.endswith("followed from the first value, not held against sweeps at the others")
 
 
 @pytest.mark.parametrize(("key", "slow"), [("contact.damper.slip_limit_n", 1), ("limit", 0)])
@@ -97,7 +97,7 @@ def test_two_peaks_that_become_one_are_one_from_there_on(tmp_path: Path) -> None
 
 
 def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: Path) -> None:
-    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
+    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")
     few = text[: text.index("values = ")] + "values = [70, 60, 40, 25, 24]\npeaks = 2\n"
     outcome = answered(few, tmp_path)
     data = outcome.tree["resonance"].to_dataset()
@@ -111,8 +111,8 @@ def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: 
     sweep = few[: few.index("[resonance]")].replace("slip_limit_n = 100.0", "slip_limit_n = 40.0")
     sweep += '[forced_response]\nfrequency_hz = [20.0, 60.0]\npoints = 60\nstability = "off"\n[harmonics]\nhigh = 5\nlow = 5\nselection = "always_low"\n'
     node = answered(sweep, tmp_path / "sweep").tree["forced_response"].to_dataset()
-    amplitude = np.sort(node["amplitude"].values.ravel()[np.isfinite(node["amplitude"].values.ravel())])  # fmt: skip
-    assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 2])), rel=1e-5)  # fmt: skip
+    amplitude = np.sort(node["amplitude"].values.ravel()[np.isfinite(node["amplitude"].values.ravel())])
+    assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 2])), rel=1e-5)
     view = Peaks(case)
     assert "Overtaken: peak 1 by peak 2 at 67" in amplitudes(view).caption
     assert "mm" in str(peak_table(view))
@@ -125,7 +125,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     whole = list(RESONANCE.solve(inputs, [], Kept()))
     rest = list(RESONANCE.solve(inputs, whole[:2], Kept()))
     assert [p.value for p in rest] == [p.value for p in whole[2:]]
-    assert [p.amplitude for p in rest] == pytest.approx([p.amplitude for p in whole[2:]], rel=1e-10)  # fmt: skip
+    assert [p.amplitude for p in rest] == pytest.approx([p.amplitude for p in whole[2:]], rel=1e-10)
 
 
 class Kept(dict[str, Any]):
@@ -137,7 +137,9 @@ class Kept(dict[str, Any]):
 
 def test_a_curve_by_arc_length_goes_round_its_fold(tmp_path: Path) -> None:
     # softening: in quadrature, with one harmonic, force = 2 ζ a √(1 - ¾ c a²), largest at a² = 2/(3 c)
-    text = B3[: B3.index("[contact.damper]")] + """
+    text = (
+        B3[: B3.index("[contact.damper]")]
+        + """
 [contact.softening]
 between = ["blade.m1", "ground"]
 law = "cubic_spring"
@@ -152,7 +154,8 @@ span = [0.5, 2.0]
 points = 12
 harmonics = 1
 by = "phase_quadrature"
-"""  # fmt: skip
+"""
+    )
     outcome = answered(text, tmp_path)
     case = one_case(outcome.tree["resonance"].to_dataset(), 0)
     level, amplitude = case["value"].values[0], case["amplitude"].values[0]
@@ -168,20 +171,33 @@ by = "phase_quadrature"
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("damper.slip_limit_n\"", "damper.slip_limt_n\""), "parameter: contact.damper.slip_limt_n = 0.2 is refused: there is no key 'slip_limt_n'. Did you mean"),
-        (('"contact.damper.slip_limit_n"', '"resonance.peaks"'), "resonance.parameter: is resonance.peaks, which is no key of the model"),
+        (
+            ('damper.slip_limit_n"', 'damper.slip_limt_n"'),
+            "parameter: contact.damper.slip_limt_n = 0.2 is refused: there is no key 'slip_limt_n'. Did you mean",
+        ),
+        (
+            ('"contact.damper.slip_limit_n"', '"resonance.peaks"'),
+            "resonance.parameter: is resonance.peaks, which is no key of the model",
+        ),
         (("[0.2, 0.12", "[-0.3, 0.12"), "slip_limit_n = -0.3 is refused: must be greater than or equal to 0"),
         (("0.12, 0.09]", "-0.12, 0.09]"), "slip_limit_n = -0.12 is refused: must be greater than or equal to 0"),
-        (('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"limit"\nvalues = [0.2, -0.12'), "resonance: parameter: limit = -0.12 is refused"),
-        (('"contact.damper.slip_limit_n"', '"static_load"'), "resonance.parameter: is static_load, but no static load acts"),
+        (
+            ('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"limit"\nvalues = [0.2, -0.12'),
+            "resonance: parameter: limit = -0.12 is refused",
+        ),
+        (
+            ('"contact.damper.slip_limit_n"', '"static_load"'),
+            "resonance.parameter: is static_load, but no static load acts",
+        ),
         (("values = [0.2, 0.12, 0.09]", ""), "resonance.values: values and span are both missing"),
         (("harmonics = 1", "harmonics = 1\nharmonic = 3"), "resonance.harmonic: is 3, above harmonics = 1"),
-        (('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"excitation"\nvalues = [1.0, -1.0'), r"study\.toml: resonance\.values: holds -1, and excitation is a factor .* Give factors above zero"),
+        (
+            ('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"excitation"\nvalues = [1.0, -1.0'),
+            r"study\.toml: resonance\.values: holds -1, and excitation is a factor .* Give factors above zero",
+        ),
     ],
-)  # fmt: skip
-def test_what_cannot_be_followed_is_refused_by_its_key(
-    change: tuple[str, str], message: str, tmp_path: Path
-) -> None:
+)
+def test_what_cannot_be_followed_is_refused_by_its_key(change: tuple[str, str], message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=message):
         answered(B3.replace(*change), tmp_path)
 
@@ -200,7 +216,7 @@ def test_python_asks_the_same(tmp_path: Path) -> None:
 
     def of(limit: float) -> Assembly:
         contact = model.contacts["damper"]
-        return replace(model, contacts={"damper": replace(contact, law=replace(contact.law, limit=limit))})  # fmt: skip
+        return replace(model, contacts={"damper": replace(contact, law=replace(contact.law, limit=limit))})
 
     by_function = model.resonance(of, **keys).data["resonance"]
     for name in ("amplitude", "frequency_hz", "energy"):
@@ -208,8 +224,8 @@ def test_python_asks_the_same(tmp_path: Path) -> None:
 
 
 def test_curves_by_arc_length_overtake_each_other_too(tmp_path: Path) -> None:
-    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
-    few = text[: text.index("values = ")] + "span = [100, 62]\npoints = 4\npeaks = 2\nharmonics = 3\n"  # fmt: skip
+    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")
+    few = text[: text.index("values = ")] + "span = [100, 62]\npoints = 4\npeaks = 2\nharmonics = 3\n"
     case = one_case(answered(few, tmp_path).tree["resonance"].to_dataset(), 0)
     assert case["overtaking_after"].values.tolist() == [1]
     assert case["overtaking_value"].values == pytest.approx([67.0], rel=0.03)
@@ -218,25 +234,28 @@ def test_curves_by_arc_length_overtake_each_other_too(tmp_path: Path) -> None:
 
 def test_too_few_harmonics_are_told(tmp_path: Path) -> None:
     text = B3.replace('law = "jenkins"', 'law = "unilateral_spring"')
-    text = text.replace("tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.2\n", "normal_stiffness_n_per_m = 3.0\n")  # fmt: skip
-    text = text.replace('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12, 0.09]', '"excitation"\nvalues = [1.0]')  # fmt: skip
+    text = text.replace("tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.2\n", "normal_stiffness_n_per_m = 3.0\n")
+    text = text.replace('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12, 0.09]', '"excitation"\nvalues = [1.0]')
     text = text.replace("[0.127, 0.223]", "[0.15, 0.3]")
     (told,) = answered(text, tmp_path / "few").verdicts
     assert "with 3 harmonics" in told.why
     assert told.remedy == "Raise resonance.harmonics."
-    (trusted,) = answered(text.replace("harmonics = 1", "harmonics = 6"), tmp_path / "more").verdicts  # fmt: skip
+    (trusted,) = answered(text.replace("harmonics = 1", "harmonics = 6"), tmp_path / "more").verdicts
     assert trusted.level == "trusted"
 
 
 def test_a_peak_that_no_sweep_at_its_value_meets_is_doubtful(tmp_path: Path) -> None:
     # softening, then hardening: up to 1 the upper peak is that of a detached curve, at 2 a sweep goes over it
-    text = DETACHED + """
+    text = (
+        DETACHED
+        + """
 [resonance]
 frequency_hz = [0.016, 0.3]
 parameter = "excitation"
 values = [0.95, 1.0, 2.0]
 harmonics = 1
-"""  # fmt: skip
+"""
+    )
     outcome = answered(text, tmp_path)
     (told,) = (v for v in outcome.verdicts if "followed back" in v.why)
     assert told.level == "doubtful"
@@ -248,7 +267,5 @@ harmonics = 1
 
 
 def test_a_key_that_the_cases_vary_too_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"resonance\.parameter: .* which \[vary\] varies too.*Drop it"
-    ):
+    with pytest.raises(InputError, match=r"resonance\.parameter: .* which \[vary\] varies too.*Drop it"):
         answered(f"{B3}[vary]\ncontact.damper.slip_limit_n = [0.2, 0.1]\n", tmp_path)

@@ -35,9 +35,7 @@ def two_masses() -> tuple[System, HarmonicLoad]:
     gap = np.zeros((3, 2))
     gap[0, 0] = 1.0
     system = System(
-        lumped(np.eye(2), k, 0.03 * k),
-        Interface(("c",), (Jenkins(k_t=0.3, limit=0.2),), gap),
-        np.array([1]),
+        lumped(np.eye(2), k, 0.03 * k), Interface(("c",), (Jenkins(k_t=0.3, limit=0.2),), gap), np.array([1])
     )
     return system, HarmonicLoad(np.zeros(2), {1: np.array([0.1, 0.05 * np.exp(0.4j)])})
 
@@ -46,9 +44,7 @@ def oscillator(cubic: float, damping: float, force: float) -> tuple[System, Harm
     """Unit mass and spring with a cubic one: x'' + 2 ζ x' + x + cubic x³ = force cos(ωt)."""
     law = CubicSpring(cubic_t=cubic, k_t=0.0)
     rows = np.array([[1.0], [0.0], [0.0]])
-    system = System(
-        lumped(ONE, ONE, 2.0 * damping * ONE), Interface(("s",), (law,), rows), np.array([0])
-    )
+    system = System(lumped(ONE, ONE, 2.0 * damping * ONE), Interface(("s",), (law,), rows), np.array([0]))
     return system, HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
 
 
@@ -76,9 +72,7 @@ def test_energy_is_what_dashpot_and_friction_take():
     (one,) = follow_peaks(PeakSearch(system, load, "limit", (0.6, 2.2), how=HOW), [0.15], 1)
     damping = system.plain_structure.damping
     x = one.coefficients
-    dashpot = sum(
-        np.pi * h**2 * one.omega * np.real(np.vdot(x[h], damping @ x[h])) for h in (1, 2, 3)
-    )
+    dashpot = sum(np.pi * h**2 * one.omega * np.real(np.vdot(x[h], damping @ x[h])) for h in (1, 2, 3))
     assert one.friction > 0.1 * one.energy
     assert one.energy == pytest.approx(dashpot + one.friction, rel=1e-9)
 
@@ -179,7 +173,7 @@ def in_time(
     last = 2.0 * np.pi / omega * (periods - 1 + np.arange(128) / 128)
     found = solve_ivp(
         lambda t, y: [y[1], acceleration(t, y[0], y[1])], (0.0, last[-1]), start, "DOP853", last, rtol=1e-9, atol=1e-11
-    )  # fmt: skip
+    )
     return float(2.0 * abs(np.fft.rfft(found.y[0])[harmonic]) / 128)
 
 
@@ -194,12 +188,15 @@ def stopped(force: float, damping: float, omega: float, stop: float):
 def test_a_superharmonic_resonance_is_that_of_time_integration():
     # harmonic 3 of a hardening oscillator near a third of its frequency; motions 0.6 % beside the peak are lower
     system, load = oscillator(1.0, 0.03, 0.4)
-    search = PeakSearch(system, load, "excitation", (0.3, 0.6), how=Discretisation(order=11), harmonic=3)  # fmt: skip
+    search = PeakSearch(system, load, "excitation", (0.3, 0.6), how=Discretisation(order=11), harmonic=3)
     (top,) = follow_peaks(search, [1.0], 1)
     assert top.is_maximum
     x = top.coefficients[:, 0]
     assert abs(x[3]) == pytest.approx(top.amplitude, rel=1e-12)
-    at = [in_time(hardening(0.4, 0.03, w), w, x, 3, n) for w, n in ((top.omega, 4), (0.994 * top.omega, 20), (1.006 * top.omega, 20))]  # fmt: skip
+    at = [
+        in_time(hardening(0.4, 0.03, w), w, x, 3, n)
+        for w, n in ((top.omega, 4), (0.994 * top.omega, 20), (1.006 * top.omega, 20))
+    ]
     assert at[0] == pytest.approx(top.amplitude, rel=2e-5)
     assert max(at[1:]) < 0.999 * at[0]
     # by phase, from level to level, what the tangent finds
@@ -214,10 +211,13 @@ def test_an_even_superharmonic_of_a_stop_is_that_of_time_integration():
     law = UnilateralSpring(k_n=0.5)
     system = System(lumped(ONE, ONE, 0.06 * ONE), Interface(("s",), (law,), rows), np.array([0]))
     load = HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-    search = PeakSearch(system, load, "excitation", (0.45, 0.65), how=Discretisation(order=12), harmonic=2)  # fmt: skip
+    search = PeakSearch(system, load, "excitation", (0.45, 0.65), how=Discretisation(order=12), harmonic=2)
     (top,) = follow_peaks(search, [1.0], 1)
     x = top.coefficients[:, 0]
-    at = [in_time(stopped(0.1, 0.03, w, 0.5), w, x, 2, n) for w, n in ((top.omega, 4), (0.98 * top.omega, 20), (1.02 * top.omega, 20))]  # fmt: skip
+    at = [
+        in_time(stopped(0.1, 0.03, w, 0.5), w, x, 2, n)
+        for w, n in ((top.omega, 4), (0.98 * top.omega, 20), (1.02 * top.omega, 20))
+    ]
     assert at[0] == pytest.approx(top.amplitude, rel=1e-4)
     assert max(at[1:]) < 0.99 * at[0]
 
@@ -225,21 +225,21 @@ def test_an_even_superharmonic_of_a_stop_is_that_of_time_integration():
 def test_a_subharmonic_resonance_is_that_of_time_integration():
     # a third of the frequency of the load; nothing leads there from the response of one period
     system, load = oscillator(1.0, 0.03, 3.0)
-    search = PeakSearch(system, load, "excitation", (2.8, 6.5), how=Discretisation(order=9), periods=3)  # fmt: skip
+    search = PeakSearch(system, load, "excitation", (2.8, 6.5), how=Discretisation(order=9), periods=3)
     top, more = follow_peaks(search, [0.95, 1.0], 1)
     assert all(p.converged and p.is_maximum for p in (top, more))
     assert more.amplitude > 5.0 * abs(more.coefficients[3, 0])
     # just before the peak, where the branch ends, the motion stays: SciPy goes from the peak's state to the balance's motion there
     omega = 0.98 * more.omega / 3.0
     balance = search.how.balance(system, load.over_periods(3), np.array([0]))
-    found = newton(lambda v: balance.linearise(v, omega), balance.unknowns(more.coefficients), Newton())  # fmt: skip
+    found = newton(lambda v: balance.linearise(v, omega), balance.unknowns(more.coefficients), Newton())
     motion = balance.coefficients(found.x)[:, 0]
     assert abs(motion[1]) > 0.9 * more.amplitude
 
     def force(t: float, x: float, v: float) -> float:
         return 3.0 * np.cos(3.0 * omega * t) - 0.06 * v - x - x**3
 
-    assert in_time(force, omega, more.coefficients[:, 0], 1, 60) == pytest.approx(abs(motion[1]), rel=1e-4)  # fmt: skip
+    assert in_time(force, omega, more.coefficients[:, 0], 1, 60) == pytest.approx(abs(motion[1]), rel=1e-4)
 
 
 def test_a_range_without_subharmonic_motions_is_told():
@@ -253,9 +253,7 @@ def test_a_range_without_subharmonic_motions_is_told():
     ("driven", "level", "frequency", "by_energy", "by_force"),
     [(0, 0.7, 0.0348, 0.97, 2.46), (1, 0.5, -0.0074, 1.02, None), (1, 1.1, -0.0056, 1.01, None)],
 )
-def test_quadrature_is_no_mode_where_one_force_cannot_balance_friction(
-    driven, level, frequency, by_energy, by_force
-):
+def test_quadrature_is_no_mode_where_one_force_cannot_balance_friction(driven, level, frequency, by_energy, by_force):
     # the table of docs/theory/tracking.md
     k = np.array([[2.0, -1.0], [-1.0, 1.0]])
     gap = np.zeros((3, 2))
@@ -275,7 +273,7 @@ def test_quadrature_is_no_mode_where_one_force_cannot_balance_friction(
     assert mode.converged
     assert point.omega / mode.omega - 1.0 == pytest.approx(frequency, abs=5e-5)
     h = np.arange(6)
-    kinetic = 0.5 * float(np.sum((h * point.omega) ** 2 * np.sum(np.abs(point.coefficients) ** 2, axis=1)))  # fmt: skip
+    kinetic = 0.5 * float(np.sum((h * point.omega) ** 2 * np.sum(np.abs(point.coefficients) ** 2, axis=1)))
     assert point.energy / (4 * np.pi * kinetic) / mode.level == pytest.approx(by_energy, abs=5e-3)
     if by_force is not None:
         shape = stuck.shape.real / np.linalg.norm(stuck.shape.real)

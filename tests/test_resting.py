@@ -52,9 +52,7 @@ def random_jacobian(seed, kinds, order, n, pairs=7):
     none = np.zeros((order + 1, n), dtype=complex)
     linear = MatrixProducts(Condensed(z, z, none, none), tuple(range(order + 1)))
     operator = rng.standard_normal((3 * len(kinds), n)) * (rng.random((3 * len(kinds), n)) < 0.3)
-    return StructuredJacobian(
-        linear, random_blocks(rng, kinds, pairs, m), sparse_rows(operator), 0.7
-    )
+    return StructuredJacobian(linear, random_blocks(rng, kinds, pairs, m), sparse_rows(operator), 0.7)
 
 
 def without_resting(jac) -> Resting:
@@ -76,7 +74,12 @@ def coupled_rows(jac) -> np.ndarray:
     return np.flatnonzero(found.T)
 
 
-@given(st.integers(0, 2**31), st.lists(st.sampled_from(KINDS), min_size=1, max_size=4), st.integers(0, 3), st.integers(0, 2))  # fmt: skip
+@given(
+    st.integers(0, 2**31),
+    st.lists(st.sampled_from(KINDS), min_size=1, max_size=4),
+    st.integers(0, 3),
+    st.integers(0, 2),
+)
 @settings(max_examples=40, deadline=None)
 def test_solution_and_sign_are_those_of_the_whole_array(seed, kinds, order, borders):
     jac = random_jacobian(seed, kinds, order, n=6)
@@ -97,17 +100,19 @@ def test_solution_and_sign_are_those_of_the_whole_array(seed, kinds, order, bord
     other = reduced_factors(TransposedElimination(elimination))
     allowed = 1e-11 * np.linalg.cond(whole) * np.linalg.norm(right) / np.linalg.norm(whole, 2)
     for found, matrix in (
-        (factors(right), whole), (factors(right, transposed=True), whole.T),
-        (other(right), whole.T), (other(right, transposed=True), whole),
-    ):  # fmt: skip
+        (factors(right), whole),
+        (factors(right, transposed=True), whole.T),
+        (other(right), whole.T),
+        (other(right, transposed=True), whole),
+    ):
         assert np.linalg.norm(found - np.linalg.solve(matrix, right)) <= allowed
     assert factors.sign == other.sign == np.linalg.slogdet(whole)[0]
 
 
 def test_signs_of_both_kinds_were_met():
-    signs = {reduced_factors(without_resting(random_jacobian(s, ("rests", "all"), 1, 6))).sign for s in range(20)}  # fmt: skip
+    signs = {reduced_factors(without_resting(random_jacobian(s, ("rests", "all"), 1, 6))).sign for s in range(20)}
     assert signs == {-1.0, 1.0}
-    eliminated = {without_resting(random_jacobian(s, ("rests", "all"), 1, 6)).sign for s in range(20)}  # fmt: skip
+    eliminated = {without_resting(random_jacobian(s, ("rests", "all"), 1, 6)).sign for s in range(20)}
     assert eliminated == {-1.0, 1.0}
 
 
@@ -115,7 +120,7 @@ def test_all_at_rest_leaves_nothing_and_all_coupled_leaves_all():
     still, moving = (random_jacobian(3, (kind,) * 4, 2, 6) for kind in ("rests", "all"))
     right = np.random.default_rng(0).standard_normal(still.shape[0])
     assert without_resting(still).size == 0
-    assert_same(reduced_factors(without_resting(still))(right), np.linalg.solve(still.dense(), right), 1e-11)  # fmt: skip
+    assert_same(reduced_factors(without_resting(still))(right), np.linalg.solve(still.dense(), right), 1e-11)
     touched = np.unique(moving.rows.columns[moving.rows.values.any(axis=1)]).size
     assert without_resting(moving).size == touched * 5
 
@@ -194,10 +199,7 @@ def counted(monkeypatch) -> list[int]:
 def follow_both(balance, span, made_of):
     """Follow a branch by whole arrays and without what rests, and compare the points; return those of the second."""
     branches = []
-    for made, linear in (
-        (replace(balance, jacobian="dense"), Dense()),
-        (balance, Automatic()),
-    ):
+    for made, linear in ((replace(balance, jacobian="dense"), Dense()), (balance, Automatic())):
         following = Following(
             newton=Newton(tolerance=1e-12, max_iterations=30, linear=linear),
             control=StepControl(scale=0.2, largest=0.2, max_points=300),
@@ -278,9 +280,7 @@ def test_what_is_eliminated_is_kept_at_a_frequency_while_the_same_contacts_rest(
 def test_rest_is_looked_at_contact_by_contact():
     """A soft stop that closes for good is no rounding of a contact 1e14 times as stiff beside it."""
     jac = random_jacobian(3, ["rest", "rest"], 2, 4)
-    same = replace(
-        jac.coupling, means=jac.coupling.means * np.array([1.0, 1e-14])[None, :, None, None]
-    )
+    same = replace(jac.coupling, means=jac.coupling.means * np.array([1.0, 1e-14])[None, :, None, None])
     other = replace(same, means=same.means * np.array([1.0, 2.0])[None, :, None, None])
     assert same.same_rest(replace(same))
     assert not same.same_rest(other)

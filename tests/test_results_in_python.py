@@ -24,16 +24,18 @@ def test_a_response_is_a_row_a_point_and_output() -> None:
     assert frame.attrs["units"]["amplitude"] == data["amplitude"].attrs["units"]
     data["verdict"] = ("point", np.arange(data.sizes["point"]) % 3, flags("verdict"))
     words = ss.Result(tree_of(forced_response=data)).to_dataframe()["verdict"]
-    assert words[:: data.sizes["output"]].tolist()[:4] == ["trusted", "doubtful", "wrong", "trusted"]  # fmt: skip
+    assert words[:: data.sizes["output"]].tolist()[:4] == ["trusted", "doubtful", "wrong", "trusted"]
 
 
 def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_for() -> None:
     height = np.array([[[1.0, 2.0], [3.0, np.nan]]])
-    data = xr.Dataset({
-        "amplitude": (("case", "branch", "point"), height),
-        "end": (("case", "branch"), [["gross slip", "lost"]]),
-        "mass_kg": ("case", [1.2]),
-    })  # fmt: skip
+    data = xr.Dataset(
+        {
+            "amplitude": (("case", "branch", "point"), height),
+            "end": (("case", "branch"), [["gross slip", "lost"]]),
+            "mass_kg": ("case", [1.2]),
+        }
+    )
     result = ss.Result(tree_of(nonlinear_mode=data))
     frame = result.to_dataframe("nonlinear_mode")
     assert frame["amplitude"].tolist() == [1.0, 2.0, 3.0]
@@ -56,20 +58,21 @@ def test_a_result_is_walked_through_by_the_names_of_its_analyses() -> None:
 
 
 def test_points_beyond_the_end_of_a_curve_are_no_rows_but_unsolved_points_are() -> None:
-    data = xr.Dataset({
-        "amplitude": (("case", "branch", "point"), [[[1.0, np.nan, np.nan]]]),
-        "frequency_hz": (("case", "branch", "point"), [[[5.0, 6.0, np.nan]]]),
-        "status": (("case", "branch", "point"), [[[0, 1, -1]]]),
-    })  # fmt: skip
+    data = xr.Dataset(
+        {
+            "amplitude": (("case", "branch", "point"), [[[1.0, np.nan, np.nan]]]),
+            "frequency_hz": (("case", "branch", "point"), [[[5.0, 6.0, np.nan]]]),
+            "status": (("case", "branch", "point"), [[[0, 1, -1]]]),
+        }
+    )
     frame = ss.Result(tree_of(nonlinear_mode=data)).to_dataframe()
     assert frame["frequency_hz"].tolist() == [5.0, 6.0]
 
 
 def test_a_variable_may_be_called_as_its_dimension() -> None:
-    data = xr.Dataset({
-        "amplitude": (("case", "level", "point"), np.ones((1, 2, 2))),
-        "level": (("case", "level"), [[0.5, 3.0]]),
-    })  # fmt: skip
+    data = xr.Dataset(
+        {"amplitude": (("case", "level", "point"), np.ones((1, 2, 2))), "level": (("case", "level"), [[0.5, 3.0]])}
+    )
     frame = ss.Result(tree_of(modal_synthesis=data)).to_dataframe()
     assert frame["level"].tolist() == [0.5, 0.5, 3.0, 3.0]
 

@@ -18,10 +18,7 @@ from stickslip.study.run import run_study
 
 SECONDS = 120.0
 # two tables multiply; modes do not depend on the load's case
-SLIPPING = {
-    "vary.load.shaker.force_n": "[5.0, 8.0]",
-    "modes.number": "3",
-}
+SLIPPING = {"vary.load.shaker.force_n": "[5.0, 8.0]", "modes.number": "3"}
 # a user's interrupt before harmonics are raised, a lost machine after some were raised, audited and lowered
 STOPS = {signal.SIGINT: "  point 6:", signal.SIGKILL: "  point 22:"}
 SCRIPT = """
@@ -47,11 +44,7 @@ def start(study: Path, workers: int) -> subprocess.Popen[str]:
     command = [sys.executable, "-u", str(script), str(study), str(workers)]
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | one_thread,
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | one_thread
     )
 
 
@@ -84,10 +77,7 @@ def journalled(study: Path) -> dict[str, list[tuple[int, str, bytes]]]:
 
 
 def same(found: Path, expected: Path) -> None:
-    trees = [
-        xr.load_datatree(path.parent / "results/result.nc", engine="h5netcdf")
-        for path in (found, expected)
-    ]
+    trees = [xr.load_datatree(path.parent / "results/result.nc", engine="h5netcdf") for path in (found, expected)]
     assert all(tree.attrs["complete"] == 1 for tree in trees)
     assert list(trees[0].children) == list(trees[1].children) == ["forced_response", "modes"]
     for name in trees[0].children:
@@ -106,11 +96,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(("how", "workers"), [(signal.SIGINT, 2), (signal.SIGKILL, 1)])
 def test_stopped_run_goes_on_to_the_same_numbers(
-    tmp_path: Path,
-    whole: Path,
-    how: signal.Signals,
-    workers: int,
-    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path, whole: Path, how: signal.Signals, workers: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     study = write_four_masses(tmp_path / how.name, SLIPPING)
     code, said = stopped(study, how, workers)
@@ -129,9 +115,7 @@ def test_stopped_run_goes_on_to_the_same_numbers(
         run_study(read_study(study))  # by one process, whatever began it
     assert "goes on after" in caplog.text
     after = journalled(study)
-    assert all(after[key][: len(rows)] == rows for key, rows in before.items()), (
-        "points were touched"
-    )
+    assert all(after[key][: len(rows)] == rows for key, rows in before.items()), "points were touched"
     same(study, whole)
 
 
@@ -141,9 +125,7 @@ def test_finished_run_solves_nothing_again(whole: Path) -> None:
     assert journalled(whole) == before
 
 
-def test_only_what_changes_is_built_and_solved_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_changes_is_built_and_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two tables of [vary] multiply: two masses, two numbers of modes; a part is made once for each mass."""
     made: list[object] = []
     lumped = parts.lumped

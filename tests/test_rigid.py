@@ -8,9 +8,7 @@ from test_relative import relative, two_flexible_bodies
 
 import stickslip as ss
 
-TWO_MASSES = ss.model.lumped(
-    np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
-)
+TWO_MASSES = ss.model.lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]]))
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
 
 
@@ -30,8 +28,7 @@ def at(omega, order, samples=None):
 
 
 @pytest.mark.parametrize(
-    ("omega", "first"),
-    [(0.55, (54.359118, 80.780423)), (1.0, (10.612322, 15.277103)), (1.5, (35.664777, 26.786093))],
+    ("omega", "first"), [(0.55, (54.359118, 80.780423)), (1.0, (10.612322, 15.277103)), (1.5, (35.664777, 26.786093))]
 )
 def test_sliding_motions_of_benchmark_b5(omega, first):
     # first order in 1/H without sticking: three orders extrapolate; 32 samples a harmonic leave an error of 1e-3
@@ -41,8 +38,7 @@ def test_sliding_motions_of_benchmark_b5(omega, first):
 
 
 @pytest.mark.parametrize(
-    ("omega", "first", "stick"),
-    [(0.4, (22.318648, 27.965463), 0.13680), (2.0, (10.048455, 0.302843), 0.36710)],
+    ("omega", "first", "stick"), [(0.4, (22.318648, 27.965463), 0.13680), (2.0, (10.048455, 0.302843), 0.36710)]
 )
 def test_sticking_motions_of_benchmark_b5(omega, first, stick):
     # first order in 1/H here too, but no power series: compared as it comes
@@ -58,9 +54,7 @@ def test_response_through_resonance_until_the_contact_sticks():
     assert all(p.converged for p in points)
     assert (points[0].omega, points[-1].omega) == (0.45, 2.2)
     heights = [abs(p.coefficients[1, 1]) for p in points]
-    assert (
-        0.55 < points[int(np.argmax(heights))].omega < 0.7
-    )  # first mode of the free structure: 0.618
+    assert 0.55 < points[int(np.argmax(heights))].omega < 0.7  # first mode of the free structure: 0.618
     assert heights[-1] < 1e-8
     # the first mass alone remains: K = 2, C = 0.04
     alone = 20.0 / abs(2.0 - 2.2**2 + 0.04j * 2.2)

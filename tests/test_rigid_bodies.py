@@ -19,9 +19,7 @@ from stickslip.units import RPM
 
 DEG = math.pi / 180
 OBLIQUE = Axis(direction=(0.3, -0.5, 1.0), origin=(0.1, 0.2, -0.3))
-WEDGE = WedgeDamper(
-    left_angle=40 * DEG, right_angle=65 * DEG, top_width=0.004, height=0.012, length=0.05, mass=0.09
-)
+WEDGE = WedgeDamper(left_angle=40 * DEG, right_angle=65 * DEG, top_width=0.004, height=0.012, length=0.05, mass=0.09)
 
 
 def cloud(damper, count=160_000):
@@ -32,10 +30,7 @@ def cloud(damper, count=160_000):
     unit = np.column_stack([(i * a) % 1 for a in (0.7548776662466927, 0.5698402909980532)])
     xz = low + unit * (high - low)
     after = np.roll(corners, -1, axis=0) - corners
-    side = [
-        d[0] * (xz[:, 1] - c[1]) - d[1] * (xz[:, 0] - c[0])
-        for c, d in zip(corners, after, strict=True)
-    ]
+    side = [d[0] * (xz[:, 1] - c[1]) - d[1] * (xz[:, 0] - c[0]) for c, d in zip(corners, after, strict=True)]
     inside = np.all(np.array(side) <= 0, axis=0) | np.all(np.array(side) >= 0, axis=0)
     xz = xz[inside]
     y = ((np.arange(len(xz)) * 0.6180339887498949) % 1 - 0.5) * damper.length
@@ -47,9 +42,7 @@ def cloud(damper, count=160_000):
     [
         WEDGE,
         replace(WEDGE, right_angle=90 * DEG, top_width=0.0),
-        CylinderDamper(
-            left_angle=40 * DEG, right_angle=60 * DEG, radius=0.006, length=0.04, mass=0.05
-        ),
+        CylinderDamper(left_angle=40 * DEG, right_angle=60 * DEG, radius=0.006, length=0.04, mass=0.05),
     ],
 )
 def test_centre_and_inertia_are_those_of_the_matter(damper):
@@ -70,9 +63,7 @@ def test_the_moments_of_a_triangular_wedge_are_the_textbook_ones():
     b, h, length, mass = 0.02, 0.01, 0.05, 0.1
     angle = math.atan2(h, b / 2)
     body = WedgeDamper(left_angle=angle, top_width=0.0, height=h, length=length, mass=mass).body()
-    about = mass * np.array(
-        [h**2 / 18 + length**2 / 12, h**2 / 18 + b**2 / 24, b**2 / 24 + length**2 / 12]
-    )
+    about = mass * np.array([h**2 / 18 + length**2 / 12, h**2 / 18 + b**2 / 24, b**2 / 24 + length**2 / 12])
     np.testing.assert_allclose(body.tensor, np.diag(about), rtol=1e-12)
     np.testing.assert_allclose(body.centre, [0, 0, -2 * h / 3], atol=1e-15)
 
@@ -87,32 +78,22 @@ def test_points_of_a_wedge_lie_on_its_sides_and_look_out():
         along = (xz - a) @ (b - a) / ((b - a) @ (b - a))
         np.testing.assert_allclose(xz, a + along[:, None] * (b - a), atol=1e-15)
         np.testing.assert_allclose(sorted(set(np.round(along, 9))), [1 / 6, 1 / 2, 5 / 6])
-        np.testing.assert_allclose(
-            sorted(set(np.round(points.position[:, 1], 9))), [-1 / 60, 0, 1 / 60]
-        )
+        np.testing.assert_allclose(sorted(set(np.round(points.position[:, 1], 9))), [-1 / 60, 0, 1 / 60])
         normal = points.frame[:, :, 2]
         sign = -1 if side == "left" else 1
-        np.testing.assert_allclose(
-            normal[0], [sign * math.sin(angle * DEG), 0, math.cos(angle * DEG)]
-        )
-        assert np.all(
-            (points.position - np.array(WEDGE.body().centre))[:, [0, 2]] @ normal[0, [0, 2]] > 0
-        )
+        np.testing.assert_allclose(normal[0], [sign * math.sin(angle * DEG), 0, math.cos(angle * DEG)])
+        assert np.all((points.position - np.array(WEDGE.body().centre))[:, [0, 2]] @ normal[0, [0, 2]] > 0)
         np.testing.assert_allclose(np.linalg.det(points.frame), 1.0)
     assert part.surfaces["right"].names[0] == "R1.1"
 
 
 def test_a_cylinder_touches_both_planes_through_the_apex():
-    damper = CylinderDamper(
-        left_angle=40 * DEG, right_angle=60 * DEG, radius=0.006, length=0.04, mass=0.05
-    )
+    damper = CylinderDamper(left_angle=40 * DEG, right_angle=60 * DEG, radius=0.006, length=0.04, mass=0.05)
     centre = np.array(damper.body().centre)
     for side in ("left", "right"):
         points = damper_part(damper).surfaces[side]
         normal = points.frame[0, :, 2]
-        np.testing.assert_allclose(
-            points.position @ normal, 0.0, atol=1e-15
-        )  # the plane holds the origin
+        np.testing.assert_allclose(points.position @ normal, 0.0, atol=1e-15)  # the plane holds the origin
         away = points.position - centre - np.outer(points.position[:, 1], [0, 1, 0])
         np.testing.assert_allclose(away, np.tile(0.006 * normal, (3, 1)), atol=1e-15)
 
@@ -154,22 +135,14 @@ def test_spin_softening_and_gyroscopic_matrix_are_derivatives_of_the_exact_energ
 
     unit = h * np.eye(6)
     hessian = np.array(
-        [
-            [
-                potential(a + b) - potential(a - b) - potential(b - a) + potential(-a - b)
-                for a in unit
-            ]
-            for b in unit
-        ]
+        [[potential(a + b) - potential(a - b) - potential(b - a) + potential(-a - b) for a in unit] for b in unit]
     ) / (4 * h * h)
     steps = np.array([(along(a) - along(-a)) / (2 * h) for a in unit]).T
     found = body.at_speed(speed, OBLIQUE, coriolis=True)
     for mine, exact in ((found.stiffness, hessian), (found.damping, steps - steps.T)):
         for rows in (slice(0, 3), slice(3, 6)):
             for columns in (slice(0, 3), slice(3, 6)):
-                scale = np.sqrt(
-                    np.abs(mine[rows, rows]).max() * np.abs(mine[columns, columns]).max()
-                )
+                scale = np.sqrt(np.abs(mine[rows, rows]).max() * np.abs(mine[columns, columns]).max())
                 assert np.abs(mine - exact)[rows, columns].max() < 1e-4 * scale
     force = -np.array([potential(a) - potential(-a) for a in unit]) / (2 * h)
     np.testing.assert_allclose(body.centrifugal(speed, OBLIQUE), force, rtol=1e-5, atol=1e-6)
@@ -182,14 +155,8 @@ def test_spin_softening_and_gyroscopic_matrix_are_derivatives_of_the_exact_energ
         ({"mass": None}, "WedgeDamper.mass: is missing, and so is the density. Give one of them"),
         ({"density": 7800.0}, "WedgeDamper.mass: and the density are both given"),
         ({"mass": 0.0}, "WedgeDamper.mass: must be positive"),
-        (
-            {"left_angle": math.pi / 2, "right_angle": math.pi / 2},
-            "WedgeDamper.right_angle: is upright",
-        ),
-        (
-            {"left_distances": (0.001, 0.01)},
-            "left_distances: must grow and lie on the side, from 0.00",
-        ),
+        ({"left_angle": math.pi / 2, "right_angle": math.pi / 2}, "WedgeDamper.right_angle: is upright"),
+        ({"left_distances": (0.001, 0.01)}, "left_distances: must grow and lie on the side, from 0.00"),
         ({"right_distances": (0.012, 0.01)}, "right_distances: must grow and lie on the side"),
         ({"sections": (0.0, 0.03)}, "sections: must grow and lie within half the length, 0.025 m"),
     ],
@@ -201,12 +168,7 @@ def test_a_wedge_that_cannot_be_is_refused(change, match):
 
 def test_axes_of_a_body_are_square_to_each_other():
     with pytest.raises(InputError, match=r"RigidBody\.axes: are no three unit vectors"):
-        RigidBody(
-            mass=1.0,
-            inertia=(1.0, 1.0, 1.0),
-            centre=(0, 0, 0),
-            axes=((1, 0, 0), (0, 1, 0), (0, 1, 1)),
-        )
+        RigidBody(mass=1.0, inertia=(1.0, 1.0, 1.0), centre=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0), (0, 1, 1)))
 
 
 RIM = """

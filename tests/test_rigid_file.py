@@ -96,13 +96,28 @@ def test_a_static_load_that_friction_holds_moves_nothing(tmp_path):
 
 
 REFUSED = [
-    ({'selection = "always_low"': 'selection = "jacobian_alert"'}, RIGID, [], 'harmonics.selection: is \'jacobian_alert\', which predicts'),
+    (
+        {'selection = "always_low"': 'selection = "jacobian_alert"'},
+        RIGID,
+        [],
+        "harmonics.selection: is 'jacobian_alert', which predicts",
+    ),
     ({"high = 3": "high = [1, 2, 3, 5]"}, RIGID, [], "harmonics.high: leaves harmonics out"),
     ({}, RIGID, ["--verify"], "contact.joint.law: --verify integrates in time, and rigid_coulomb has no stiffness"),
     ({}, RIGID, ["--verify-harmonics"], "--verify-harmonics predicts from contact forces"),
-    ({}, RIGID.replace("preload_n = 4.0\n", ""), [], "contact.joint.preload_n: is missing: the law rigid_coulomb takes its pressure"),
-    (THREE | {'first = "chain.m1"': 'first = "chain.m2"'}, RIGID, [], "output.points: names a node that a contact of rigid_coulomb touches"),
-]  # fmt: skip
+    (
+        {},
+        RIGID.replace("preload_n = 4.0\n", ""),
+        [],
+        "contact.joint.preload_n: is missing: the law rigid_coulomb takes its pressure",
+    ),
+    (
+        THREE | {'first = "chain.m1"': 'first = "chain.m2"'},
+        RIGID,
+        [],
+        "output.points: names a node that a contact of rigid_coulomb touches",
+    ),
+]
 
 
 @pytest.mark.parametrize(("changes", "contact", "words", "said"), REFUSED)

@@ -35,7 +35,9 @@ def of_contacts(ratio: float) -> tuple[np.ndarray, int]:
     structure = lumped(MASS, STIFFNESS, 0.02 * STIFFNESS)
     system = System(structure, Interface(("c",), (law,), GAP), np.arange(4))
     load = HarmonicLoad(PRESSED, {1: FORCE})
-    sweep = Sweep(omega_range=(0.999 * OMEGA, 1.001 * OMEGA), at=(OMEGA,), low=3, high=3, selection="always_low", peak_points=0)  # fmt: skip
+    sweep = Sweep(
+        omega_range=(0.999 * OMEGA, 1.001 * OMEGA), at=(OMEGA,), low=3, high=3, selection="always_low", peak_points=0
+    )
     point = accepted_points(list(forced_response(system, load, sweep)))[0]
     assert point.converged
     problem = forced_problem(system, load, sweep)
@@ -48,14 +50,10 @@ def test_the_error_over_the_stiffness_ratio_falls_with_slope_minus_one() -> None
     off = np.array([np.linalg.norm(x - judge) / np.linalg.norm(judge) for x, _ in found])
     # Newton's method ends at a residual of its tolerance times the largest force, the structure's own inverse makes this of it, tenfold
     sum_of_both = np.diag([4.0, 4.0]) * (1.0 + 0.02j * OMEGA) - OMEGA**2 * np.diag([3.0, 3.0])
-    left = (
-        Newton().tolerance * np.max(np.abs(PRESSED)) * np.linalg.norm(np.linalg.inv(sum_of_both), 2)
-    )
+    left = Newton().tolerance * np.max(np.abs(PRESSED)) * np.linalg.norm(np.linalg.inv(sum_of_both), 2)
     floor = 10.0 * left / np.linalg.norm(judge)
     clear = off > 10.0 * floor
     assert np.count_nonzero(clear) >= 3
     assert np.diff(np.log10(off[clear])) == pytest.approx(-1.0, abs=0.01)
-    assert np.all(
-        np.abs(off - off[0] * RATIOS[0] / RATIOS) <= 0.01 * off[0] * RATIOS[0] / RATIOS + floor
-    )
+    assert np.all(np.abs(off - off[0] * RATIOS[0] / RATIOS) <= 0.01 * off[0] * RATIOS[0] / RATIOS + floor)
     assert max(steps for _, steps in found) <= 5

@@ -30,12 +30,7 @@ from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING,
 from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.solve.newton_method import Newton
 
 HZ = 2 * np.pi
@@ -55,9 +50,8 @@ def step_at(hertz=161.0, harmonics=(0, 1), ahead=1.5, reference=ORDER):
     balance, solution = solved(system, load, omega, harmonics)
     measure = ErrorMeasure(np.arange(4))
     return Step(
-        balance, balance.with_harmonics(harmonics_of(reference)), (0, 1), solution.x,
-        omega, omega + ahead * HZ, measure,
-    )  # fmt: skip
+        balance, balance.with_harmonics(harmonics_of(reference)), (0, 1), solution.x, omega, omega + ahead * HZ, measure
+    )
 
 
 def real_rows(coefficients):
@@ -134,8 +128,10 @@ def test_the_twin_is_the_same_problem():
     own = high.linearise(high.unknowns(step.balance.coefficients(step.x)), step.omega).residual
     assert np.allclose(
         residual(rows_of_step(step), step.omega),
-        own.reshape(-1, 6) * high.force_scale, rtol=0, atol=1e-9 * high.force_scale,
-    )  # fmt: skip
+        own.reshape(-1, 6) * high.force_scale,
+        rtol=0,
+        atol=1e-9 * high.force_scale,
+    )
 
 
 def test_laxalde_measures_the_forces_left_out():
@@ -276,11 +272,7 @@ def test_strain_energy_of_a_condensed_structure_is_that_of_all_dofs(damping):
     rng = np.random.default_rng(3)
     a, b, c = rng.standard_normal((3, 6, 6))
     stiffness, mass = a @ a.T + 3 * np.eye(6), b @ b.T + 3 * np.eye(6)
-    own = {
-        "proportional": 0.1 * stiffness,
-        "general": 0.1 * c @ c.T,
-        "gyroscopic": 0.1 * c @ c.T + c - c.T,
-    }
+    own = {"proportional": 0.1 * stiffness, "general": 0.1 * c @ c.T, "gyroscopic": 0.1 * c @ c.T + c - c.T}
     structure = Structure(mass, own[damping], stiffness, table(tuple("abcdef")))
     load = HarmonicLoad(rng.standard_normal(6), {1: rng.standard_normal(6) + 1j})
     linear = condense(structure, np.array([1, 4]), load)
@@ -329,9 +321,13 @@ def test_rivals_take_the_single_passage_and_keep_their_own_threshold(made):
 
 def response(system, load, hertz, frequencies, selection, **options):
     sweep = Sweep(
-        omega_range=(hertz[0] * HZ, hertz[1] * HZ), frequencies=frequencies, selection=selection,
-        samples=SAMPLES, peak_points=0, **{"passages": "single", "high": 5, **options},
-    )  # fmt: skip
+        omega_range=(hertz[0] * HZ, hertz[1] * HZ),
+        frequencies=frequencies,
+        selection=selection,
+        samples=SAMPLES,
+        peak_points=0,
+        **{"passages": "single", "high": 5, **options},
+    )
     points = list(forced_response(system, load, sweep))
     return forced_problem(system, load, sweep), points
 
@@ -408,12 +404,11 @@ def test_no_lag_where_a_frequency_is_repeated_until_it_has_what_it_foretells(mad
     foretold = [
         strategy.judge(
             problem.step(
-                problem.balance(p.support),
-                problem.balance(p.support).unknowns(p.coefficients), p.omega, grid[3],
+                problem.balance(p.support), problem.balance(p.support).unknowns(p.coefficients), p.omega, grid[3]
             )
         ).following
         for p in tried
-    ]  # fmt: skip
+    ]
     for point, own, following in zip(tried, foretold, tried[1:], strict=False):
         assert following.support == tuple(sorted({*point.support, *own}))
         assert set(own) - set(point.support), "there was a reason to repeat it"
@@ -436,9 +431,7 @@ def test_single_and_double_passage_accept_the_same_solutions():
     """Section 4.4: two orders of the same work."""
     system, load = blades_and_damper()
     found = {
-        passages: accepted_points(
-            response(system, load, (157.0, 166.0), 13, "jacobian_alert", passages=passages)[1]
-        )
+        passages: accepted_points(response(system, load, (157.0, 166.0), 13, "jacobian_alert", passages=passages)[1])
         for passages in ("single", "double")
     }
     assert {len(p.support) for p in found["single"]} == {2, 6}
@@ -454,8 +447,7 @@ SOME_FAIL = Newton(max_iterations=4)
 
 
 @pytest.mark.parametrize(
-    ("selection", "options"),
-    [("jacobian_alert", {}), ("jaumouille", {}), ("grolet", {"newton": SOME_FAIL})],
+    ("selection", "options"), [("jacobian_alert", {}), ("jaumouille", {}), ("grolet", {"newton": SOME_FAIL})]
 )
 def test_single_passage_goes_on_as_it_would_have(selection, options):
     case = (*blades_and_damper(), (158.0, 164.0), 7, selection)
@@ -483,10 +475,15 @@ def test_indicators_have_no_units(made):
             balance, solution = solved(system, load, 161.0 * HZ, harmonics)
             steps.append(
                 Step(
-                    balance, balance.with_order(ORDER), (0, 1), solution.x, 161.0 * HZ, 162.0 * HZ,
+                    balance,
+                    balance.with_order(ORDER),
+                    (0, 1),
+                    solution.x,
+                    161.0 * HZ,
+                    162.0 * HZ,
                     ErrorMeasure(np.arange(4)),
                 )
-            )  # fmt: skip
+            )
         said.append(made().judge(replace(steps[1], before=steps[0])))
     assert said[0].following == said[1].following
     assert said[0].again == said[1].again
@@ -499,9 +496,7 @@ def test_indicators_have_no_units(made):
 
 def test_example_of_an_own_strategy():
     script = Path(__file__).parents[1] / "examples" / "own_strategy.py"
-    ended = subprocess.run(
-        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False
-    )
+    ended = subprocess.run([sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
     rows = re.findall(r"([\d.]+) rad/s: ([\d.]+) m with harmonics (.*)", ended.stdout)
     for omega, amplitude in [(float(w), float(a)) for w, a, _ in rows[:4]]:
@@ -524,9 +519,8 @@ def comparison():
 def test_comparison_counts_what_a_sweep_shows(comparison):
     system, load = griffin(0.03)
     judge = forced_problem(
-        system, load,
-        Sweep(omega_range=comparison.case.omega_range, high=10, samples=SAMPLES, selection="always_low"),
-    )  # fmt: skip
+        system, load, Sweep(omega_range=comparison.case.omega_range, high=10, samples=SAMPLES, selection="always_low")
+    )
     _, exact = response(system, load, SUPERHARMONIC, 7, "always_high", high=10)
     for selection in ("always_low", "jaumouille", "jacobian_alert", "always_high"):
         outcome = comparison.of(selection)

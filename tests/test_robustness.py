@@ -59,9 +59,7 @@ def test_the_load_grows_to_the_whole_through_folds(number):
 
     ways = list(homotopies(balance, omega, static))
     weights = problem.following(balance).weights
-    solution = solve_robustly(
-        evaluate, [np.zeros(balance.size)], problem.sweep.newton, ways[:1], weights
-    )
+    solution = solve_robustly(evaluate, [np.zeros(balance.size)], problem.sweep.newton, ways[:1], weights)
     assert solution.status is Status.CONVERGED
     assert solution.rung is Rung.HOMOTOPY
     assert residual_norm(balance, solution.x, omega) <= problem.sweep.newton.tolerance
@@ -76,21 +74,15 @@ def test_the_higher_harmonics_join_a_balance_of_the_driven_ones():
     x = balance.unknowns(static[None].astype(complex))
     x = x + np.max(np.abs(x)) * rng.normal(size=x.size)
     # where the load is whole the harmonics begin to join, and in the end all of them have
-    np.testing.assert_allclose(
-        growing.linearise(x, 1.0).residual, joining.linearise(x, 0.0).residual, rtol=1e-12
-    )
-    np.testing.assert_allclose(
-        joining.linearise(x, 1.0).residual, balance.linearise(x, omega).residual, rtol=1e-12
-    )
+    np.testing.assert_allclose(growing.linearise(x, 1.0).residual, joining.linearise(x, 0.0).residual, rtol=1e-12)
+    np.testing.assert_allclose(joining.linearise(x, 1.0).residual, balance.linearise(x, omega).residual, rtol=1e-12)
     # linear in the share, and its derivative by the unknowns is that of the residual
     at, step = joining.linearise(x, 0.3), 1e-6 * np.max(np.abs(x)) * rng.normal(size=x.size)
     change = joining.linearise(x, 1.0).residual - joining.linearise(x, 0.0).residual
     np.testing.assert_allclose(at.jac_p, change, rtol=0, atol=1e-10 * np.max(np.abs(change)))
     moved = [joining.linearise(x + s * step, 0.3).residual for s in (1.0, -1.0)]
     slope = 0.5 * (moved[0] - moved[1])
-    np.testing.assert_allclose(
-        times(at.jac, step), slope, rtol=0, atol=1e-4 * np.max(np.abs(slope))
-    )
+    np.testing.assert_allclose(times(at.jac, step), slope, rtol=0, atol=1e-4 * np.max(np.abs(slope)))
 
 
 def test_a_point_without_a_solution_ends_within_its_budget():

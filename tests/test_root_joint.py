@@ -102,10 +102,7 @@ def misses(folder, pairing, more, held, quadratic=False):
     return np.abs(-found.static_force[:, 2] / found.contacts.area / EXACT - 1.0).max()
 
 
-CONTACT = (
-    '[contact.joint]\nbetween = ["lower.top", "upper.bottom"]\npairing = "{}"\ninterference_m = 1e-6\n'
-    + LAW
-)
+CONTACT = '[contact.joint]\nbetween = ["lower.top", "upper.bottom"]\npairing = "{}"\ninterference_m = 1e-6\n' + LAW
 JOINED = (
     '[join.joint]\nbetween = ["lower.top", "upper.bottom"]\npairing = "{}"\n'
     '[contact.press]\nbetween = ["upper.top", "ground"]\ninterference_m = 1e-6\n' + LAW
@@ -181,9 +178,7 @@ def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     study.write_text(text, encoding="utf-8")
     assert "static equilibrium: 192 of 192 contact points are pressed" in command("check", study)
     command("run", study)
-    data = xr.load_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf")[
-        "forced_response"
-    ]
+    data = xr.load_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf")["forced_response"]
     # both flanks together carry the pull
     force = np.einsum("pxd,pd->px", data["contact_frame"].values, data["static_force"].values[0])
     np.testing.assert_allclose(force.sum(axis=0), [0.0, 0.0, -5000.0], atol=1e-6)
@@ -238,10 +233,7 @@ def test_rigid_contacts_of_meshes_are_the_limit_of_stiff_ones(tmp_path):
     """A block that rocks, slips and lifts off on another one: gaps of two flexible bodies become coordinates."""
     grid = ([0.0, 0.5, 1.0], [0.0, 1.0])
     found = []
-    for name, law in (
-        ("rigid", 'law = "rigid_coulomb"'),
-        ("stiff", LAW.replace(str(STIFFNESS), "1e15")),
-    ):
+    for name, law in (("rigid", 'law = "rigid_coulomb"'), ("stiff", LAW.replace(str(STIFFNESS), "1e15"))):
         (tmp_path / name).mkdir()
         own = law.replace("friction_coefficient = 0.3\n", "")
         data = answered(blocks(tmp_path / name, grid, grid, ROCKED.format(own), ()))
@@ -274,12 +266,28 @@ def between(first, second, name="joint", pairing="segment_to_segment"):
 
 
 REFUSED = [
-    (between("lower.top", "upper.top"), LENGTH, "contact.joint.between: 'lower.top' and 'upper.top' look the same way: their outward normals, (0.00, 0.00, 1.00) and (0.00, 0.00, 1.00), are 180° from opposite. Name the faces that meet, or check how the parts are placed, turned and mirrored. 'upper.bottom' lies nearer than 'upper.top': are surfaces swapped?"),
-    (between("lower.side", "upper.bottom"), LENGTH, "'lower.side' and 'upper.bottom' do not face each other: their outward normals, (-1.00, 0.00, 0.00) and (0.00, 0.00, -1.00), are 90° from opposite"),
+    (
+        between("lower.top", "upper.top"),
+        LENGTH,
+        "contact.joint.between: 'lower.top' and 'upper.top' look the same way: their outward normals, (0.00, 0.00, 1.00) and (0.00, 0.00, 1.00), are 180° from opposite. Name the faces that meet, or check how the parts are placed, turned and mirrored. 'upper.bottom' lies nearer than 'upper.top': are surfaces swapped?",
+    ),
+    (
+        between("lower.side", "upper.bottom"),
+        LENGTH,
+        "'lower.side' and 'upper.bottom' do not face each other: their outward normals, (-1.00, 0.00, 0.00) and (0.00, 0.00, -1.00), are 90° from opposite",
+    ),
     (between("lower.top", "upper.root"), LENGTH, "there is no surface or set 'upper.root'"),
-    (between("lower.top", "upper.bottom") + '[join.weld]\nbetween = ["lower.top", "upper.bottom"]\n', LENGTH, "contact.joint.between: names the surfaces that join.weld ties for good"),
-    (between("lower.root", "ground", pairing="node_to_node"), LENGTH, "contact.joint.between: no point of the contact can move: its nodes are clamped"),
-]  # fmt: skip
+    (
+        between("lower.top", "upper.bottom") + '[join.weld]\nbetween = ["lower.top", "upper.bottom"]\n',
+        LENGTH,
+        "contact.joint.between: names the surfaces that join.weld ties for good",
+    ),
+    (
+        between("lower.root", "ground", pairing="node_to_node"),
+        LENGTH,
+        "contact.joint.between: no point of the contact can move: its nodes are clamped",
+    ),
+]
 
 
 @pytest.mark.parametrize(("contact", "low", "said"), REFUSED)
@@ -290,11 +298,27 @@ def test_surfaces_that_cannot_meet_are_refused(contact, low, said, tmp_path):
 
 
 WARNED = [
-    (between("lower.top", "upper.bottom"), LENGTH - 5e-4, "contact.joint: lower.top and upper.bottom overlap by up to 0.0005 m as they are placed, at ("),
-    (between("lower.top", "upper.bottom"), LENGTH + 1e-4, "contact.joint: lower.top and upper.bottom lie apart by 0.0001 m"),
-    (between("lower.side", "ground", pairing="node_to_node"), LENGTH, "contact.joint: lower.side borders on clamped nodes, 1, 4, 7; the facets between them and it, 2 beside 2, take no part in the contact."),
-    (between("lower.top", "upper.bottom") + between("upper.bottom", "lower.top", "again"), LENGTH, "contact.again lies on the same points as contact.joint: their forces add up."),
-]  # fmt: skip
+    (
+        between("lower.top", "upper.bottom"),
+        LENGTH - 5e-4,
+        "contact.joint: lower.top and upper.bottom overlap by up to 0.0005 m as they are placed, at (",
+    ),
+    (
+        between("lower.top", "upper.bottom"),
+        LENGTH + 1e-4,
+        "contact.joint: lower.top and upper.bottom lie apart by 0.0001 m",
+    ),
+    (
+        between("lower.side", "ground", pairing="node_to_node"),
+        LENGTH,
+        "contact.joint: lower.side borders on clamped nodes, 1, 4, 7; the facets between them and it, 2 beside 2, take no part in the contact.",
+    ),
+    (
+        between("lower.top", "upper.bottom") + between("upper.bottom", "lower.top", "again"),
+        LENGTH,
+        "contact.again lies on the same points as contact.joint: their forces add up.",
+    ),
+]
 
 
 @pytest.mark.parametrize(("contact", "low", "said"), WARNED)

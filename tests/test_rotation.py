@@ -47,20 +47,14 @@ def test_matrices_of_inertia_act_on_rigid_motions_as_mechanics_says(width):
     perpendicular = np.eye(3) - np.outer(e, e)
     motion = rigid_motions(mesh.points)
     shifts = motion[:, :3]
-    np.testing.assert_allclose(
-        shifts.T @ (solid.spin_softening @ shifts), mass * perpendicular, atol=1e-12 * mass
-    )
-    np.testing.assert_allclose(
-        shifts.T @ (solid.coriolis @ shifts), mass * cross, atol=1e-12 * mass
-    )
+    np.testing.assert_allclose(shifts.T @ (solid.spin_softening @ shifts), mass * perpendicular, atol=1e-12 * mass)
+    np.testing.assert_allclose(shifts.T @ (solid.coriolis @ shifts), mass * cross, atol=1e-12 * mass)
     G = dense(solid.coriolis)
     assert np.abs(G + G.T).max() < 1e-15 * np.abs(G).max()
     centre = np.array(SIZE) / 2 + [0.1, -0.05, 0.02]
     speed = 300.0
     load = solid.centrifugal_load(speed)
-    assert relative(shifts.T @ load, speed**2 * mass * perpendicular @ (centre - SKEW.origin)) < (
-        1e-12
-    )
+    assert relative(shifts.T @ load, speed**2 * mass * perpendicular @ (centre - SKEW.origin)) < (1e-12)
     # the load has the potential Ω²/2 ∫ρ r²: turning the body about the axis does no work, nor does shifting it along
     spin = np.cross(e, mesh.points - SKEW.origin).ravel()
     assert abs(spin @ load) < 1e-12 * np.linalg.norm(spin) * np.linalg.norm(load)
@@ -82,9 +76,7 @@ def test_spin_softening_against_the_mass():
     origin=st.tuples(*[st.floats(-1, 1)] * 3),
     seed=st.integers(0, 99),
 )
-def test_every_axis_gives_skew_coriolis_and_softening_between_nothing_and_the_mass(
-    direction, origin, seed
-):
+def test_every_axis_gives_skew_coriolis_and_softening_between_nothing_and_the_mass(direction, origin, seed):
     """0 ≤ vᵀSv ≤ vᵀMv, equal when v has no component along the axis; Coriolis forces do no work; shifts of the axis load evenly."""
     mesh = box(8, SIZE, (2, 1, 1), 0.001)
     axis = Axis(direction, origin)
@@ -101,9 +93,7 @@ def test_every_axis_gives_skew_coriolis_and_softening_between_nothing_and_the_ma
     whole = assemble_solid(without_sets(mesh), STEEL).mass
     shift = np.tile(axis.arm(np.zeros((1, 3)))[0], len(mesh.points))
     expected = through_zero + (whole @ shift)[solid.moving]
-    np.testing.assert_allclose(
-        solid.centrifugal, expected, atol=1e-12 * max(np.abs(expected).max(), 1e-9)
-    )
+    np.testing.assert_allclose(solid.centrifugal, expected, atol=1e-12 * max(np.abs(expected).max(), 1e-9))
 
 
 # ---- static displacement ------------------------------------------------------------------------------------------------
@@ -181,9 +171,7 @@ def test_stretch_of_a_disk_with_a_hole_converges_with_the_fourth_order():
 def test_stretch_of_a_thin_ring():
     """u = ρΩ²R³/E, up to the square of thickness over radius."""
     radius, thick, speed = 0.5, 0.005, 400.0
-    mesh = annular_sector(
-        radius - thick / 2, radius + thick / 2, thick, sectors=36, divisions=(1, 1, 1)
-    )
+    mesh = annular_sector(radius - thick / 2, radius + thick / 2, thick, sectors=36, divisions=(1, 1, 1))
     tie, _ = radial_tie(mesh)
     u = rotating_solid(mesh, BAR, clamped=()).displacement(speed, tie=tie).reshape(-1, 3)
     stretch = np.linalg.norm(u, axis=1)
@@ -207,11 +195,7 @@ def test_finite_stretch_of_a_bar_against_a_shooting_solution():
 
     def end(P0):
         found = scipy.integrate.solve_ivp(
-            lambda _, y: [stretch(y[1]), -push * y[0]],
-            (0, length),
-            [0.0, P0],
-            rtol=1e-10,
-            atol=1e-10,
+            lambda _, y: [stretch(y[1]), -push * y[0]], (0, length), [0.0, P0], rtol=1e-10, atol=1e-10
         )
         return found.y[:, -1]
 
@@ -272,9 +256,7 @@ def test_stiffness_is_a_polynomial_of_the_speed(plate):
     for tangent in ("consistent", "textbook"):
         at = [dense(plate.at_speed(s, tangent=tangent).stiffness) for s in (3e3, 5e3, 6e3, 9e3)]
         squares = np.array([9.0, 25.0, 36.0, 81.0])
-        fit = np.linalg.lstsq(
-            np.vander(squares[:3], 3), np.array([a.ravel() for a in at[:3]]), rcond=None
-        )[0]
+        fit = np.linalg.lstsq(np.vander(squares[:3], 3), np.array([a.ravel() for a in at[:3]]), rcond=None)[0]
         fourth = (np.vander(squares[3:], 3) @ fit).reshape(at[3].shape)
         assert relative(fourth, at[3]) < 1e-11  # extrapolation multiplies round-off by 38
         K = at[0]
@@ -300,15 +282,10 @@ def test_turned_and_mirrored_solids_have_the_same_frequencies(mirror):
     axis = Axis(tuple(sign * turn @ SKEW.unit), tuple(turn @ SKEW.origin + shift))
     speed = 5000.0
     first, second = (
-        rotating_solid(m, STEEL, a).at_speed(speed, coriolis=True)
-        for m, a in ((mesh, SKEW), (moved, axis))
+        rotating_solid(m, STEEL, a).at_speed(speed, coriolis=True) for m, a in ((mesh, SKEW), (moved, axis))
     )
-    np.testing.assert_allclose(
-        natural_frequencies(second, 6), natural_frequencies(first, 6), rtol=1e-9
-    )
-    everywhere = scipy.sparse.block_diag(
-        [scipy.sparse.csr_array(turn)] * (first.n // 3), format="csr"
-    )
+    np.testing.assert_allclose(natural_frequencies(second, 6), natural_frequencies(first, 6), rtol=1e-9)
+    everywhere = scipy.sparse.block_diag([scipy.sparse.csr_array(turn)] * (first.n // 3), format="csr")
     for name in ("mass", "damping", "stiffness"):
         a, b = getattr(first, name), getattr(second, name)
         assert relative(dense(everywhere.T @ b @ everywhere), dense(a)) < 1e-11
@@ -422,9 +399,7 @@ def test_shaft_seen_from_its_rotating_axes():
     length, depth = 1.0, 0.02
     mesh = box(20, (length, depth, depth), (8, 1, 1))
     points = mesh.points - [0, depth / 2, depth / 2]
-    solid = rotating_solid(
-        SolidMesh(points, mesh.cells, mesh.node_sets), BAR, Axis((1.0, 0.0, 0.0))
-    )
+    solid = rotating_solid(SolidMesh(points, mesh.cells, mesh.node_sets), BAR, Axis((1.0, 0.0, 0.0)))
     still = natural_frequencies(solid.structure, 2)
     speed = 0.3 * 2 * math.pi * still[0]
     turning = solid.at_speed(speed, coriolis=True)

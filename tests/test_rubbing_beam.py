@@ -31,9 +31,7 @@ SMALL = {
     "harmonics.samples": "256",
     "harmonics.selection": '"always_high"',
 }
-SHAPE = Beam(
-    length=0.4, area=1.2e-4, second_moment=1.0e-9, second_moment_y=1.44e-9, material=Material()
-)
+SHAPE = Beam(length=0.4, area=1.2e-4, second_moment=1.0e-9, second_moment_y=1.44e-9, material=Material())
 
 
 def write(folder: Path, changes: dict[str, str]) -> Path:
@@ -57,7 +55,7 @@ def rubbing(structure, limit: float, stiffness: float, steps: int, periods: int 
     state = np.zeros(3 * structure.n)  # u, v, a
     moved = solve @ np.hstack([4 / dt**2 * M + 2 / dt * C, 4 / dt * M + C, M])
     one, none = np.eye(structure.n), np.zeros((structure.n, structure.n))
-    old = np.block([[none, none, none], [-2 / dt * one, -one, none], [-4 / dt**2 * one, -4 / dt * one, -one]])  # fmt: skip
+    old = np.block([[none, none, none], [-2 / dt * one, -one, none], [-4 / dt**2 * one, -4 / dt * one, -one]])
     new = np.vstack([one, 2 / dt * one, 4 / dt**2 * one])
     phases = np.array([0.0, math.pi / 2])
     pushed = FORCE * np.cos(omega * dt * np.arange(steps)[:, None] + phases) @ solve[:, tip].T
@@ -140,9 +138,7 @@ def test_a_node_without_a_normal_is_told_how_to_get_one(tmp_path: Path) -> None:
 
 
 def test_a_force_across_a_beam_that_bends_one_way_is_refused(tmp_path: Path) -> None:
-    path = write(
-        tmp_path, SMALL | {"part.beam.bending": '"z"', "contact.plate.acts": '"tangential"'}
-    )
+    path = write(tmp_path, SMALL | {"part.beam.bending": '"z"', "contact.plate.acts": '"tangential"'})
     lines = [line for line in path.read_text().splitlines() if not line.startswith("normal =")]
     path.write_text("\n".join(lines))
     said = refused("check", str(path))
@@ -168,13 +164,9 @@ def test_a_place_far_from_every_node_is_warned_of(tmp_path: Path) -> None:
 
     def warned(name: str, x: float) -> tuple[str, ...]:
         points = f'{{ tip = {{ on = "beam", near_m = [{x}, 0.0, 0.0] }} }}'
-        return (
-            read_study(write(tmp_path / name, SMALL | {"output.points": points})).model().warnings
-        )
+        return read_study(write(tmp_path / name, SMALL | {"output.points": points})).model().warnings
 
-    assert (
-        "output.points.tip.near_m: the nearest node of beam is 49.6 m away" in warned("a", 50.0)[0]
-    )
+    assert "output.points.tip.near_m: the nearest node of beam is 49.6 m away" in warned("a", 50.0)[0]
     assert warned("b", 0.41) == ()
 
 

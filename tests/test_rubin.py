@@ -143,9 +143,7 @@ def test_statics_of_a_free_body_under_balanced_loads(free):
     small = rubin(free, keep, 8)
     rng = np.random.default_rng(1)
     arms = free.dofs.position[keep[::3]]
-    rigid = np.hstack(
-        [np.tile(np.eye(3), (len(arms), 1)), np.vstack([np.cross(np.eye(3), a) for a in arms])]
-    )
+    rigid = np.hstack([np.tile(np.eye(3), (len(arms), 1)), np.vstack([np.cross(np.eye(3), a) for a in arms])])
     force = rng.standard_normal(keep.size)
     force -= rigid @ np.linalg.lstsq(rigid, force)[0]
     full = np.zeros(free.n)
@@ -171,9 +169,7 @@ def test_free_chain_without_geometry():
     stiffness[0, 0] = stiffness[19, 19] = 100.0
     floating = lumped(np.ones(20), stiffness)
     small = rubin(floating, np.array([0, 19]), 4)
-    np.testing.assert_allclose(
-        natural_frequencies(small, 4), natural_frequencies(floating, 4), atol=1e-7
-    )
+    np.testing.assert_allclose(natural_frequencies(small, 4), natural_frequencies(floating, 4), atol=1e-7)
     assert space_gap(small.basis, from_all_modes(floating, np.array([0, 19]), 4)) < 1e-9
 
 
@@ -195,9 +191,7 @@ def test_several_bodies_of_which_one_is_free():
     keep = np.array([8, 9])
     small = rubin(whole, keep, 6)
     assert space_gap(small.basis, from_all_modes(whole, keep, 6)) < 1e-9
-    np.testing.assert_allclose(
-        natural_frequencies(small, 6), natural_frequencies(whole, 6), atol=1e-7
-    )
+    np.testing.assert_allclose(natural_frequencies(small, 6), natural_frequencies(whole, 6), atol=1e-7)
 
 
 def rates(method, counts):
@@ -250,11 +244,7 @@ def test_rotation_and_mirror_change_nothing(seed, count, mirror, k):
     axis = Axis(tuple(rng.standard_normal(3)))
     Q = turned_frame(axis) @ np.diag([1.0, 1.0, -1.0 if mirror else 1.0])
     turn = scipy.sparse.kron(scipy.sparse.eye_array(full.n // 3), Q, format="csr")
-    other = Structure(
-        *(turn @ m @ turn.T for m in (full.mass, full.damping, full.stiffness)),
-        full.dofs,
-        full.sets,
-    )
+    other = Structure(*(turn @ m @ turn.T for m in (full.mass, full.damping, full.stiffness)), full.dofs, full.sets)
     full = Structure(full.mass, full.damping, full.stiffness, full.dofs, full.sets)
     keep = full.dof_set("inner")[:3]
     for method in (craig_bampton, rubin):
@@ -265,11 +255,7 @@ def test_rotation_and_mirror_change_nothing(seed, count, mirror, k):
 
 
 @settings(max_examples=8)
-@given(
-    seed=st.integers(0, 300),
-    k=st.integers(0, 2),
-    steps=st.lists(st.integers(0, 12), min_size=2, max_size=2),
-)
+@given(seed=st.integers(0, 300), k=st.integers(0, 2), steps=st.lists(st.integers(0, 12), min_size=2, max_size=2))
 def test_frequencies_come_from_above_and_fall(seed, k, steps):
     """Cauchy's interlacing, on random travelling waves; Rubin's space, too, is a subspace."""
     structure = travelling_wave(cyclic_sector(random_sector(5, seed, inner=4), 5), k)
@@ -290,17 +276,13 @@ def test_modes_below_a_frequency(held):
 
 
 def test_rigid_motions_may_not_be_left_out(free):
-    with pytest.raises(
-        InputError, match=r"got 4, and the structure has 6 rigid motions.*at least 6"
-    ):
+    with pytest.raises(InputError, match=r"got 4, and the structure has 6 rigid motions.*at least 6"):
         rubin(free, free.dof_set("tip"), 4)
 
 
 def test_dofs_without_residual_flexibility_are_named():
     soft = join(soft=chain(2, 1.0, 1.0), stiff=chain(5, 1.0, 1e6))
-    with pytest.raises(
-        SingularError, match=r"kept dofs soft.node1.x: the residual.*Keep fewer modes"
-    ):
+    with pytest.raises(SingularError, match=r"kept dofs soft.node1.x: the residual.*Keep fewer modes"):
         rubin(soft, np.array([1, 6]), 2)
     # two dofs tied by a rod a hundred million times as stiff: either is free to go, both are not
     stiff = chain(8, mass=1.0, stiffness=1e3).stiffness.copy()

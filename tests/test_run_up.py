@@ -141,13 +141,9 @@ def test_a_study_follows_engine_orders_over_speed(finished):
     assert data["engine_orders"].values.tolist() == [2, 3]
     assert data["wave_number"].values.tolist() == [2, 3]
     assert np.all(data["converged"].values == 1)
-    np.testing.assert_allclose(
-        data["frequency_hz"], data["points_order"] * data["speed_rpm"] / 60, rtol=1e-12
-    )
+    np.testing.assert_allclose(data["frequency_hz"], data["points_order"] * data["speed_rpm"] / 60, rtol=1e-12)
     top = int(data["peak_point"].values[0])
-    assert data["amplitude"].values[top, int(data["report_output"])] == pytest.approx(
-        data["peak_amplitude"].values[0]
-    )
+    assert data["amplitude"].values[top, int(data["report_output"])] == pytest.approx(data["peak_amplitude"].values[0])
     assert data["slipping"].values.max() > 0.5
     assert data["dissipated_w"].values.max() > 0
     assert np.all(data["stuck_hz"].values >= data["open_hz"].values * (1 - 1e-9))
@@ -192,9 +188,7 @@ def test_python_and_an_interrupted_run_give_the_same(finished, tmp_path):
     points = list(RUN_UP_ANALYSIS.solve(question, (), Kept()))
     notes = Kept()
     again = [*points[:6], *RUN_UP_ANALYSIS.solve(question, points[:6], notes)]
-    assert [(p.stage, p.engine_order, p.omega) for p in again] == [
-        (p.stage, p.engine_order, p.omega) for p in points
-    ]
+    assert [(p.stage, p.engine_order, p.omega) for p in again] == [(p.stage, p.engine_order, p.omega) for p in points]
     for one, other in zip(again, points, strict=True):
         np.testing.assert_array_equal(one.coefficients, other.coefficients)
 
@@ -230,15 +224,10 @@ RIGID = LUMPED.replace('"jenkins"', '"rigid_coulomb"').replace(
     [
         (LUMPED + AERO + RUN_UP, r"run_up: does not follow the aerodynamic forces of \[aero\]"),
         (LUMPED + MISTUNED + RUN_UP, r"run_up: is of tuned wheels, and \[mistuning.blades\]"),
-        (
-            RIGID + RUN_UP,
-            r"run_up.rate_rpm_per_s: .*contact.shroud.law",
-        ),
+        (RIGID + RUN_UP, r"run_up.rate_rpm_per_s: .*contact.shroud.law"),
     ],
 )
-def test_what_does_not_go_with_the_speed_is_refused_before_anything_is_computed(
-    tmp_path, text, said
-):
+def test_what_does_not_go_with_the_speed_is_refused_before_anything_is_computed(tmp_path, text, said):
     path = tmp_path / "study.toml"
     path.write_text(text)
     flutter = Path(__file__).parents[1] / "examples" / "flutter_ring" / "coefficients.csv"

@@ -57,11 +57,11 @@ def test_another_study_file_does_not_replace_a_result(tmp_path: Path) -> None:
     other = ToyStudy(tmp_path / "resp.toml", factors=(1.25,))
     other.path.touch()
     before = (first.folder / "result.nc").read_bytes(), (first.folder / "run.log").read_bytes()
-    with pytest.raises(InputError, match=r"resp\.toml: .* of study\.toml .*--results results_resp") as caught:  # fmt: skip
+    with pytest.raises(InputError, match=r"resp\.toml: .* of study\.toml .*--results results_resp") as caught:
         run_study(other)
     assert len(str(caught.value).splitlines()) == 1
     assert other.built == []
-    assert before == ((first.folder / "result.nc").read_bytes(), (first.folder / "run.log").read_bytes())  # fmt: skip
+    assert before == ((first.folder / "result.nc").read_bytes(), (first.folder / "run.log").read_bytes())
     run_study(other, fresh=True)
     assert result(other).attrs["study_file"] == "resp.toml"
     other.path.rename(tmp_path / "renamed.toml")  # the study file goes on under another name
@@ -149,18 +149,14 @@ if __name__ == "__main__":
 def test_killed_run_goes_on_to_the_same_numbers(tmp_path: Path, whole: ToyStudy) -> None:
     script = tmp_path / "run.py"
     script.write_text(KILLED.format(here=str(HERE), path=str(tmp_path / "study.toml")))
-    ended = subprocess.run(
-        [sys.executable, str(script)], check=False, capture_output=True, text=True, timeout=120
-    )
+    ended = subprocess.run([sys.executable, str(script)], check=False, capture_output=True, text=True, timeout=120)
     assert ended.returncode == -9
     again = study(tmp_path)
     run_study(again)
     same(result(again), result(whole))
 
 
-def test_job_that_kills_its_process_is_set_aside_and_taken_up_by_the_next_run(
-    tmp_path: Path, whole: ToyStudy
-) -> None:
+def test_job_that_kills_its_process_is_set_aside_and_taken_up_by_the_next_run(tmp_path: Path, whole: ToyStudy) -> None:
     poisoned = study(tmp_path, stop_at=2, how="kill", stop_in=0)
     outcome = run_study(poisoned, shard=Shard(1, 1))
     assert outcome.failed == 1
@@ -249,9 +245,7 @@ def test_equal_cases_share_a_job(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_job_without_a_solution_does_not_take_the_others_with_it(
-    tmp_path: Path, workers: int
-) -> None:
+def test_job_without_a_solution_does_not_take_the_others_with_it(tmp_path: Path, workers: int) -> None:
     outcome = run_study(study(tmp_path, stop_at=2, how="singular", stop_in=0), workers=workers)
     assert outcome.failed == 1
     (verdict,) = (v for v in outcome.verdicts if v.level == "wrong")
@@ -395,7 +389,5 @@ def test_result_is_read_without_this_package(whole: ToyStudy) -> None:
         "assert tree.attrs['complete'] == 1 and tree['toy'].value.shape == (2, 5, 40)\n"
         "assert all('units' in v.attrs and 'long_name' in v.attrs for v in tree['toy'].data_vars.values())\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", reader], capture_output=True, text=True, check=False
-    )
+    ended = subprocess.run([sys.executable, "-c", reader], capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr

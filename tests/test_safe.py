@@ -18,24 +18,21 @@ LAXALDE = {
     12: (195.676051, 617.325797, 2062.975678),
 }
 # benchmark B12: ring of twelve blades
-DEVIATIONS = (
-    0.012,
-    -0.018,
-    0.005,
-    0.021,
-    -0.009,
-    -0.014,
-    0.017,
-    0.002,
-    -0.023,
-    0.008,
-    0.011,
-    -0.012,
-)
+DEVIATIONS = (0.012, -0.018, 0.005, 0.021, -0.009, -0.014, 0.017, 0.002, -0.023, 0.008, 0.011, -0.012)
 MISTUNED = (
-    0.99780035, 0.99981406, 1.00071541, 1.00627219, 1.01313001, 1.01915664,
-    1.02112393, 1.02631985, 1.03313452, 1.03827659, 1.03918227, 1.04131025,
-)  # fmt: skip
+    0.99780035,
+    0.99981406,
+    1.00071541,
+    1.00627219,
+    1.01313001,
+    1.01915664,
+    1.02112393,
+    1.02631985,
+    1.03313452,
+    1.03827659,
+    1.03918227,
+    1.04131025,
+)
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +57,13 @@ def test_blisk_with_its_ring_free_and_stuck():
     spring[0, [wave.sets["disk"][0], wave.sets["ring"][0]]] = 1.0, -1.0
     stiff = wave.stiffness + 2e7 * spring.T @ spring
     hertz = np.sqrt(np.linalg.eigvals(np.linalg.solve(wave.mass, stiff)).real) / (2 * np.pi)
-    np.testing.assert_allclose(
-        np.sort(hertz), (190.06223, 542.00193, 623.38065, 1638.17819), atol=6e-6
-    )
+    np.testing.assert_allclose(np.sort(hertz), (190.06223, 542.00193, 623.38065, 1638.17819), atol=6e-6)
 
 
 def test_whole_blisk_has_the_frequencies_of_its_waves(blisk):
     whole = ss.model.natural_frequencies(ss.reduction.wheel(blisk_with_ring(ring=None)), 72)
     twice = [blisk.frequencies_hz, blisk.frequencies_hz[1:12]]
-    np.testing.assert_allclose(
-        np.sort(np.concatenate([t.ravel() for t in twice])), whole, rtol=1e-9
-    )
+    np.testing.assert_allclose(np.sort(np.concatenate([t.ravel() for t in twice])), whole, rtol=1e-9)
 
 
 def test_friction_ring_on_the_whole_wheel_is_the_published_sector():
@@ -83,13 +76,9 @@ def test_friction_ring_on_the_whole_wheel_is_the_published_sector():
 def test_ring_of_blades_tuned_and_mistuned():
     tuned = ss.response.nodal_diameter_map(blade_ring(12), 1).frequencies_hz[:, 0] * 2 * np.pi
     k = np.arange(7)
-    np.testing.assert_allclose(
-        tuned, np.sqrt(1 + 0.04 * (1 - np.cos(2 * np.pi * k / 12))), rtol=1e-12
-    )
+    np.testing.assert_allclose(tuned, np.sqrt(1 + 0.04 * (1 - np.cos(2 * np.pi * k / 12))), rtol=1e-12)
     ring = mistuned_blade_ring(DEVIATIONS, damping=0.004)
-    np.testing.assert_allclose(
-        ss.model.natural_frequencies(ring, 12) * 2 * np.pi, MISTUNED, atol=6e-9
-    )
+    np.testing.assert_allclose(ss.model.natural_frequencies(ring, 12) * 2 * np.pi, MISTUNED, atol=6e-9)
 
 
 def amplitude(ring, omega):
@@ -114,20 +103,8 @@ def test_peaks_of_the_ring_under_an_engine_order():
 def test_engine_orders_fold_at_half_the_sectors(blisk):
     # 26 = 24 + 2 and 22 = 24 - 2 excite two nodal diameters, 36 twelve, 24 none
     found = ss.response.safe(blisk, 300.0, (2, 22, 24, 26, 36))
-    assert {p.engine_order: p.nodal_diameter for p in found.points} == {
-        2: 2,
-        22: 2,
-        24: 0,
-        26: 2,
-        36: 12,
-    }
-    assert {p.engine_order: p.wave_number for p in found.points} == {
-        2: 2,
-        22: 22,
-        24: 0,
-        26: 2,
-        36: 12,
-    }
+    assert {p.engine_order: p.nodal_diameter for p in found.points} == {2: 2, 22: 2, 24: 0, 26: 2, 36: 12}
+    assert {p.engine_order: p.wave_number for p in found.points} == {2: 2, 22: 22, 24: 0, 26: 2, 36: 12}
     for point in found.points:
         hertz = blisk.frequencies_hz[point.nodal_diameter, point.mode]
         assert point.frequency_hz == hertz
@@ -154,9 +131,7 @@ def test_line_of_a_speed_turns_at_half_the_sectors():
     table = ss.response.nodal_diameter_map(blade_ring(5), 1)
     diameters, hertz = ss.response.safe(table, 2 * np.pi, (1, 7)).speed_line(2 * np.pi)
     # turns at 2.5, between two whole numbers, and at 0
-    assert dict(zip(hertz, diameters, strict=True)) == {
-        0: 0, 1: 1, 2: 2, 2.5: 2.5, 3: 2, 4: 1, 5: 0, 6: 1, 7: 2
-    }  # fmt: skip
+    assert dict(zip(hertz, diameters, strict=True)) == {0: 0, 1: 1, 2: 2, 2.5: 2.5, 3: 2, 4: 1, 5: 0, 6: 1, 7: 2}
 
 
 def test_points_of_the_diagram_lie_on_its_lines(blisk):
@@ -185,9 +160,7 @@ def test_orders_above_the_highest_mode_are_not_judged():
     # six blades of one mode: what the second would be, the map cannot know
     table = ss.response.nodal_diameter_map(blade_ring(6), 1)
     highest = {k: table.of_wave(k)[0] for k in range(6)}
-    speed = (
-        2 * np.pi * highest[2] / 2.5
-    )  # order 2 lies a fifth below its mode, order 4 far above it
+    speed = 2 * np.pi * highest[2] / 2.5  # order 2 lies a fifth below its mode, order 4 far above it
     assert ss.response.safe(table, speed, (2, 4), margin=0.1).not_judged == (4,)
     assert ss.response.safe(table, speed, (2, 4), margin=0.3).not_judged == (2, 4)
     assert ss.response.safe(table, speed / 4, (2, 4), margin=0.1).not_judged == ()

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from evidence.models.lumped import blades_and_damper, griffin
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.solve.iterate import COARSEST
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.status import Status
@@ -20,20 +15,12 @@ from stickslip.solve.status import Status
 def with_stiffness(system, factor):
     """Contacts whose springs are `factor` times as stiff."""
     laws = tuple(
-        replace(law, k_t=factor * law.k_t, k_w=factor * law.k_w, k_n=factor * law.k_n)
-        for law in system.interface.laws
+        replace(law, k_t=factor * law.k_t, k_w=factor * law.k_w, k_n=factor * law.k_n) for law in system.interface.laws
     )
     return replace(system, interface=replace(system.interface, laws=laws))
 
 
-AT = (
-    500.0,
-    520.0,
-    533.0,
-    534.5,
-    536.0,
-    560.0,
-)  # rad/s, about the resonance of blades that stick together
+AT = (500.0, 520.0, 533.0, 534.5, 536.0, 560.0)  # rad/s, about the resonance of blades that stick together
 
 
 def amplitudes(system, load, **options):
@@ -49,9 +36,7 @@ def amplitudes(system, load, **options):
 @pytest.mark.parametrize("factor", [1e7, 1e8, 1e9])
 def test_two_blades_with_stiff_contacts_tend_to_the_rigid_limit(factor):
     system, load = blades_and_damper(m=None)
-    thousand, ten_thousand, found = (
-        amplitudes(with_stiffness(system, f), load) for f in (1e3, 1e4, factor)
-    )
+    thousand, ten_thousand, found = (amplitudes(with_stiffness(system, f), load) for f in (1e3, 1e4, factor))
     # beside a rigid contact a spring gives way in proportion to 1/factor, which extrapolates
     rigid = ten_thousand + (ten_thousand - thousand) / 9.0
     np.testing.assert_allclose(found, rigid, rtol=1e-6)
@@ -63,9 +48,7 @@ def test_a_blade_that_slips_is_solved_to_the_last_digits(factor):
     system, load = griffin(0.05)
     omega, guess = 0.95, None
     for stiffness in (1.0, 1e2, 1e4, 1e6, factor):
-        problem = forced_problem(
-            with_stiffness(system, stiffness), load, Sweep(omega_range=(0.9, 1.1), low=5, high=5)
-        )
+        problem = forced_problem(with_stiffness(system, stiffness), load, Sweep(omega_range=(0.9, 1.1), low=5, high=5))
         x = np.zeros(problem.low.size) if guess is None else problem.low.unknowns(guess)
         before = guess
         found = newton(lambda v, b=problem.low: b.linearise(v, omega), x, Newton(max_iterations=60))

@@ -23,7 +23,7 @@ def test_the_blades_and_their_load_are_those_of_the_first_study() -> None:
     first, second = tables("two_blades"), tables("second_bending")
     for key in ("material", "damping", "contact", "load"):
         assert first[key] == second[key], key
-    one, other = ({k: v for k, v in t["part"]["blades"].items() if k not in ANGLES} for t in (first, second))  # fmt: skip
+    one, other = ({k: v for k, v in t["part"]["blades"].items() if k not in ANGLES} for t in (first, second))
     assert one == other
 
 
@@ -64,9 +64,7 @@ def found(**changed: AtPeak) -> Found:
     slips = AtPeak(5.0, 1e-6, 600.0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.0), 0)
     few = dict.fromkeys(RATIOS, slips) | {STUCK: replace(slips, slips=(0.0, 0.0, 0.0))}
     few |= {float(name[1:]): peak for name, peak in changed.items()}
-    return Found(
-        OWN, (150.0, 130.0, 170.0), few, dict.fromkeys(JUDGED, slips), {23.4: 0.02, 11.7: 0.04}
-    )
+    return Found(OWN, (150.0, 130.0, 170.0), few, dict.fromkeys(JUDGED, slips), {23.4: 0.02, 11.7: 0.04})
 
 
 def test_what_is_asked_of_the_damper() -> None:

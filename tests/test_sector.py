@@ -77,9 +77,7 @@ def test_node_sets_lie_on_their_faces(mesh):
     np.testing.assert_allclose(np.abs(under[:, 1]), side - rise, atol=ON_FACE)
     shroud = at(mesh, "shroud_high")
     tilted = Axis().turned(shroud, -SHROUDED.shroud_angle / 2)
-    np.testing.assert_allclose(
-        tilted[:, 1], tilted[:, 2] * math.tan(math.radians(20)), atol=ON_FACE
-    )
+    np.testing.assert_allclose(tilted[:, 1], tilted[:, 2] * math.tan(math.radians(20)), atol=ON_FACE)
 
 
 def test_contact_faces_do_not_touch_cut_faces(mesh):
@@ -119,9 +117,7 @@ def test_equal_geometries_give_equal_meshes(mesh):
         BladedSector(sectors=12, platform=None, **COARSE),
         BladedSector(platform=None, shroud=Shroud(span=0.6, face_angle=0.0), **COARSE),
         BladedSector(platform=Platform(gap=0.0), shroud=Shroud(face_angle=-0.3), **COARSE),
-        BladedSector(
-            sectors=36, disk=DiskProfile(web_width=0.05, rim_width=0.05), **COARSE
-        ),  # a disk of one width
+        BladedSector(sectors=36, disk=DiskProfile(web_width=0.05, rim_width=0.05), **COARSE),  # a disk of one width
     ],
 )
 def test_other_wheels_have_matching_faces_too(geometry):
@@ -143,10 +139,7 @@ def test_other_wheels_have_matching_faces_too(geometry):
         (lambda: DiskProfile(web_width=math.nan), "DiskProfile.web_width: must be positive"),
         (lambda: Airfoil(hub_thickness=0.1), "not below the chord"),
         (lambda: Shroud(span=1.2), r"must lie in \(0, 1\]"),
-        (
-            lambda: Shroud(face_angle=1.5),
-            r"Shroud.face_angle: must lie in \[-1.309, 1.309\], got 1.5",
-        ),
+        (lambda: Shroud(face_angle=1.5), r"Shroud.face_angle: must lie in \[-1.309, 1.309\], got 1.5"),
         (lambda: BladedSector(platform=Platform(depth=0.04)), "exceeds the rim's width"),
         (lambda: BladedSector(platform=Platform(underside_angle=0.9)), "inside the rim"),
         (lambda: BladedSector(airfoil=Airfoil(hub_chord=0.05)), "overhangs the platform"),
@@ -155,10 +148,7 @@ def test_other_wheels_have_matching_faces_too(geometry):
             lambda: BladedSector(disk=DiskProfile(rim_height=0.00005), platform=None),
             "too low for what the curved rim carries",
         ),
-        (
-            lambda: BladedSector(airfoil=Airfoil(tip_chord=0.1, tip_thickness=0.09)),
-            "reaches into the neighbour's",
-        ),
+        (lambda: BladedSector(airfoil=Airfoil(tip_chord=0.1, tip_thickness=0.09)), "reaches into the neighbour's"),
         (
             lambda: BladedSector(airfoil=Airfoil(tip_chord=0.2), shroud=Shroud(face_angle=0.0)),
             "cut through the airfoil",
@@ -177,11 +167,7 @@ def test_geometry_that_cannot_be_is_refused(make, message):
 def test_faces_in_pieces_are_named(monkeypatch):
     # a blade broader than its shroud's faces: what the check of the geometry would have refused
     monkeypatch.setattr(BladedSector, "_check_shroud", lambda self: None)
-    broad = BladedSector(
-        airfoil=Airfoil(tip_chord=0.2),
-        shroud=Shroud(span=0.7, depth=0.15, face_angle=0.0),
-        **COARSE,
-    )
+    broad = BladedSector(airfoil=Airfoil(tip_chord=0.2), shroud=Shroud(span=0.7, depth=0.15, face_angle=0.0), **COARSE)
     with pytest.raises(StickslipError, match=r"shroud face at .* came out in"):
         mesh_sector(broad)
 
@@ -275,12 +261,13 @@ def test_decks_that_cannot_be_are_refused(tmp_path):
     ("error", "said"),
     [
         (StickslipError("the sector's parts do not hang together"), "the sector's parts do not hang together"),
-        (RuntimeError("invalid boundary mesh"), "gmsh could not mesh the sector: invalid boundary mesh. Change the element sizes slightly"),
+        (
+            RuntimeError("invalid boundary mesh"),
+            "gmsh could not mesh the sector: invalid boundary mesh. Change the element sizes slightly",
+        ),
     ],
-)  # fmt: skip
-def test_what_gmsh_cannot_mesh_is_told(
-    error: Exception, said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+)
+def test_what_gmsh_cannot_mesh_is_told(error: Exception, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise error
 

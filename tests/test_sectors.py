@@ -32,24 +32,19 @@ def ring(order: int) -> tuple[ss.System, ss.HarmonicLoad]:
 def balanced(system: ss.System, load: ss.HarmonicLoad, omega: float, order: int) -> np.ndarray:
     """Amplitudes (order + 1, n) of one sector."""
     sweep = ss.Sweep(
-        omega_range=(omega, 1.0001 * omega), low=order, high=order, selection="always_low",
-        frequencies=2, peak_points=0,
-    )  # fmt: skip
+        omega_range=(omega, 1.0001 * omega), low=order, high=order, selection="always_low", frequencies=2, peak_points=0
+    )
     problem = ss.response.forced_problem(system, load, sweep)
     point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     assert point.converged
     return problem.low.linear.recover(point.omega, point.coefficients)
 
 
-def shot(
-    whole: SectorsInTime, motion: np.ndarray, omega: float, steps: int, **more
-) -> ShootingResult:
+def shot(whole: SectorsInTime, motion: np.ndarray, omega: float, steps: int, **more) -> ShootingResult:
     gaps, laws = whole.contacts.gap_operator, whole.contacts.laws
     start = start_from_harmonics(whole.spread(motion), omega, gaps, laws)
     stepping = TimeStepping(steps, tolerance=1e-9, max_periods=200)
-    found = shoot(
-        whole.structure, gaps, laws, whole.load, omega, np.arange(whole.structure.n), start, stepping, **more
-    )  # fmt: skip
+    found = shoot(whole.structure, gaps, laws, whole.load, omega, np.arange(whole.structure.n), start, stepping, **more)
     assert found.converged
     return found
 
@@ -66,9 +61,7 @@ def test_all_sectors_move_as_the_balance_of_one_and_one_share_of_the_period_tell
     # but for the mean of the ring, which 0.1 N/m holds: a multiplier within 1e-6 of 1
     assert np.abs(one.harmonics[1:] - every.harmonics[1:]).max() < 1e-8 * size
     # the same multipliers; those that slip has deleted are roots of rounding
-    ours, theirs = (
-        f.floquet.multipliers[np.abs(f.floquet.multipliers) > 1e-3] for f in (one, every)
-    )
+    ours, theirs = (f.floquet.multipliers[np.abs(f.floquet.multipliers) > 1e-3] for f in (one, every))
     assert ours.size == theirs.size > 12
     for value in theirs:
         assert np.abs(ours - value).min() < 1e-6
@@ -88,10 +81,7 @@ def test_contacts_between_sectors_in_either_coordinates(relative: bool | None) -
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
     between, following = ss.contact.neighbour_gaps(sector.structure, 3, **place)
     ground = scipy.sparse.csr_array((np.ones(3), (np.arange(3), low)), shape=between.shape)
-    gaps = (
-        scipy.sparse.vstack([between, ground]).tocsr(),
-        scipy.sparse.vstack([following, 0.0 * ground]).tocsr(),
-    )
+    gaps = (scipy.sparse.vstack([between, ground]).tocsr(), scipy.sparse.vstack([following, 0.0 * ground]).tocsr())
     wheel, operator = ss.reduction.tuned_wheel(sector, 1, order, gaps, relative=relative)
     assert (wheel.multipliers.size > 0) == (relative is False)
     spring = ss.Jenkins(k_t=0.5, k_w=0.4, k_n=0.3, limit=0.1)
@@ -112,7 +102,7 @@ def test_the_check_inside_a_run_integrates_all_sectors() -> None:
     (system, load), omega = ring(13), 2 * math.pi * 624.0
     sweep = ss.Sweep(
         omega_range=(omega, 1.0001 * omega), low=13, high=13, selection="always_low", frequencies=2, peak_points=0
-    )  # fmt: skip
+    )
     problem = ss.response.forced_problem(system, load, sweep)
     point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     found = integrated(problem, point, load, periods=8)
@@ -124,24 +114,17 @@ def test_the_check_inside_a_run_integrates_all_sectors() -> None:
 
 def test_what_cannot_be_integrated_is_refused() -> None:
     system, load = ring(3)
-    with pytest.raises(
-        InputError, match=r"has no wave 8: it was made for harmonics up to 3. Give tuned_wheel 6"
-    ):
+    with pytest.raises(InputError, match=r"has no wave 8: it was made for harmonics up to 3. Give tuned_wheel 6"):
         all_sectors(system, load)
     one = ss.model.lumped(np.ones(1), np.ones((1, 1)))
     alone = replace(
-        system,
-        structure=one,
-        interface=replace(system.interface, gap_operator=np.eye(3)[:, :1]),
-        outputs=np.arange(1),
+        system, structure=one, interface=replace(system.interface, gap_operator=np.eye(3)[:, :1]), outputs=np.arange(1)
     )
     with pytest.raises(InputError, match="got no tuned wheel"):
         all_sectors(alone, load)
     system, load = ring(13)
     whole = all_sectors(system, load)
-    with pytest.raises(
-        InputError, match=r"is 1000, which 12 sectors cannot share. Give a multiple, such as 1008"
-    ):
+    with pytest.raises(InputError, match=r"is 1000, which 12 sectors cannot share. Give a multiple, such as 1008"):
         shot(whole, np.zeros((2, system.structure.n)), 3900.0, 1000, symmetry=whole.motion)
 
 
@@ -160,9 +143,14 @@ def test_one_share_of_one_wave_moves_as_all_24_sectors_that_know_of_no_waves() -
     force[wheel.sets["tip"]] = np.exp(2j * np.pi * 2 * np.arange(24) / 24)
     laws = (ss.Jenkins(k_t=2e7, limit=4.0),) * 24
     every = shoot(
-        wheel, gaps, laws, ss.HarmonicLoad(np.zeros(wheel.n), {1: force}), omega, wheel.sets["tip"],
+        wheel,
+        gaps,
+        laws,
+        ss.HarmonicLoad(np.zeros(wheel.n), {1: force}),
+        omega,
+        wheel.sets["tip"],
         stepping=TimeStepping(steps, tolerance=1e-9, max_periods=400),
-    )  # fmt: skip
+    )
     assert every.converged
     tips = [i for i, name in enumerate(whole.structure.dofs.labels) if name.endswith("node2.x")]
     tips_of_one = np.tile(one.harmonics[:, tips], 2)

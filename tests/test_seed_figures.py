@@ -23,24 +23,35 @@ BELOW = "Where the predicted error is below 5 % the actual one is, too"
 @pytest.fixture(scope="module")
 def evidence():
     sweep = Sweep(
-        omega_range=(2 * np.pi * 156, 2 * np.pi * 168),
-        points=8,
-        high=5,
-        peak_points=2,
-        evaluator="intervals",
+        omega_range=(2 * np.pi * 156, 2 * np.pi * 168), points=8, high=5, peak_points=2, evaluator="intervals"
     )
     model = Model(
-        blades_and_damper()[0], sweep, lambda ratio: blades_and_damper(excitation=RATIO / ratio)[1], 4, np.array([0, 2]), np.array([0]),
-    )  # fmt: skip
+        blades_and_damper()[0],
+        sweep,
+        lambda ratio: blades_and_damper(excitation=RATIO / ratio)[1],
+        4,
+        np.array([0, 2]),
+        np.array([0]),
+    )
     few = (60.0, RATIO)
     plan = Plan(
-        ratios=few, weak=60.0, strong=RATIO, strongest=RATIO, time_ratios=(RATIO,), all_ratios=few, timing_ratios=(RATIO,),
-        branch_hertz=(156.0, 168.0), hertz=(159.0, 165.0), frequencies=7, timing_hertz=(159.0, 165.0), timing_frequencies=4, repeats=2,
-        markers=1, marker_hertz=(-1.0, 1.0),
-    )  # fmt: skip
-    second = SecondPlan(
-        ratios=(60.0, 29.0), all_ratios=(60.0,), hertz=(159.0, 165.0), frequencies=7
+        ratios=few,
+        weak=60.0,
+        strong=RATIO,
+        strongest=RATIO,
+        time_ratios=(RATIO,),
+        all_ratios=few,
+        timing_ratios=(RATIO,),
+        branch_hertz=(156.0, 168.0),
+        hertz=(159.0, 165.0),
+        frequencies=7,
+        timing_hertz=(159.0, 165.0),
+        timing_frequencies=4,
+        repeats=2,
+        markers=1,
+        marker_hertz=(-1.0, 1.0),
     )
+    second = SecondPlan(ratios=(60.0, 29.0), all_ratios=(60.0,), hertz=(159.0, 165.0), frequencies=7)
     return gather(model, model, plan, second, lambda _: None)
 
 
@@ -57,10 +68,7 @@ def test_known_miss_of_the_published_rule_is_counted(evidence):
 
 
 def test_verdict_follows_the_numbers(evidence):
-    kept = {
-        ratio: [p for p in found if not p.predicted < 0.05 <= p.real]
-        for ratio, found in evidence.pairs.items()
-    }
+    kept = {ratio: [p for p in found if not p.predicted < 0.05 <= p.real] for ratio, found in evidence.pairs.items()}
     assert row(statements(replace(evidence, pairs=kept)), BELOW).verdict == "holds"
 
 
@@ -139,8 +147,7 @@ def test_a_verdict_on_spread_does_not_grow_with_the_number_of_frequencies():
     """The range of 119 values is nearly always larger than that of 11 of the same distribution."""
     rng = np.random.default_rng(0)
     wider = [
-        _middle_half(np.exp(rng.normal(size=119))) > _middle_half(np.exp(rng.normal(size=11)))
-        for _ in range(1000)
+        _middle_half(np.exp(rng.normal(size=119))) > _middle_half(np.exp(rng.normal(size=11))) for _ in range(1000)
     ]
     assert 0.4 < np.mean(wider) < 0.7
     assert _middle_half(np.array([1.0, 2.0, 4.0])) == pytest.approx(np.log(2.0))
@@ -148,10 +155,9 @@ def test_a_verdict_on_spread_does_not_grow_with_the_number_of_frequencies():
 
 def test_a_peak_in_time_among_unknown_frequencies_decides_no_shift(evidence):
     t = evidence.in_time
-    lost = [m._replace(orbit=replace(m.orbit, motion="not periodic", hertz=m.orbit.hertz + 0.1)) for m in t.markers]  # fmt: skip
+    lost = [m._replace(orbit=replace(m.orbit, motion="not periodic", hertz=m.orbit.hertz + 0.1)) for m in t.markers]
     own = row(
-        statements(replace(evidence, in_time=replace(t, markers=[*t.markers, *lost]))),
-        "One harmonic overestimates",
+        statements(replace(evidence, in_time=replace(t, markers=[*t.markers, *lost]))), "One harmonic overestimates"
     )
     assert own.verdict == "undecided"
 

@@ -24,12 +24,7 @@ from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.model.matrices import chain
 from stickslip.model.structure import Structure
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.system import System
 from stickslip.solve.krylov import Automatic, to_tolerance
 from stickslip.solve.newton_method import Newton, newton
@@ -55,30 +50,22 @@ def both(system, load, hertz, samples=256):
 def test_published_form_for_homogeneous_forces(hertz):
     low, high, x, padded, omega = both(*blades_and_damper(), hertz)
     alert = jacobian_alert(low, high, x, omega, ALL)
-    assert np.allclose(
-        alert.start, published(high, padded, omega), rtol=0, atol=1e-9 * np.abs(x).max()
-    )
+    assert np.allclose(alert.start, published(high, padded, omega), rtol=0, atol=1e-9 * np.abs(x).max())
 
 
 def test_published_form_fails_with_a_preload_in_the_contact():
     system, load = blades_and_damper()
     laws = tuple(
-        ElasticCoulomb(
-            k_t=law.k_t, k_w=0.0, k_n=law.k_n, mu=law.mu, preload=20.0, residual_traction=0.0
-        )
+        ElasticCoulomb(k_t=law.k_t, k_w=0.0, k_n=law.k_n, mu=law.mu, preload=20.0, residual_traction=0.0)
         for law in system.interface.laws
     )
-    low, high, x, padded, omega = both(
-        replace(system, interface=replace(system.interface, laws=laws)), load, 160.0
-    )
+    low, high, x, padded, omega = both(replace(system, interface=replace(system.interface, laws=laws)), load, 160.0)
     alert = jacobian_alert(low, high, x, omega, ALL)
     # Newton's form is one step to the high-order solution, the published one lands elsewhere
     exact = newton(lambda v: high.linearise(v, omega), alert.start, Newton()).x
     away = np.max(np.abs(exact - padded))
     assert np.max(np.abs(alert.start - exact)) < away
-    assert np.max(np.abs(published(high, padded, omega) - exact)) > 3 * np.max(
-        np.abs(alert.start - exact)
-    )
+    assert np.max(np.abs(published(high, padded, omega) - exact)) > 3 * np.max(np.abs(alert.start - exact))
 
 
 @pytest.mark.parametrize("hertz", [150.0, 155.0, 170.0, 200.0])
@@ -92,23 +79,13 @@ def test_no_alert_in_full_stick(hertz):
 
 @pytest.mark.parametrize(
     ("hertz", "percent"),
-    [
-        (159, 0.0070),
-        (160, 0.5494),
-        (161, 15.310),
-        (163, 1.1485),
-        (164, 0.6292),
-        (220, 2.2010),
-        (228, 2.4511),
-    ],
+    [(159, 0.0070), (160, 0.5494), (161, 15.310), (163, 1.1485), (164, 0.6292), (220, 2.2010), (228, 2.4511)],
 )
 def test_published_predictions(hertz, percent):
     """Benchmark B7; 163 Hz is the known miss of the method: the true error there is 7.28 %."""
     low, high, x, _, omega = both(*blades_and_damper(), float(hertz))
     alert = jacobian_alert(low, high, x, omega, ALL)
-    assert 100 * alert.error == pytest.approx(
-        percent, abs=6e-4
-    )  # as printed: four decimals, three for the large one
+    assert 100 * alert.error == pytest.approx(percent, abs=6e-4)  # as printed: four decimals, three for the large one
 
 
 def test_small_motions_do_not_raise_the_alarm():
@@ -116,9 +93,7 @@ def test_small_motions_do_not_raise_the_alarm():
     before = np.abs(low.linear.recover(omega, low.coefficients(x))[1])
     alert = jacobian_alert(low, high, x, omega, ALL)
     assert before[alert.worst] > 1e-3 * before[ALL.dofs].max()
-    single = [
-        jacobian_alert(low, high, x, omega, ErrorMeasure(np.array([d]))).error for d in ALL.dofs
-    ]
+    single = [jacobian_alert(low, high, x, omega, ErrorMeasure(np.array([d]))).error for d in ALL.dofs]
     assert alert.error == pytest.approx(max(single), rel=1e-12)
     assert int(np.argmax(single)) == alert.worst
 
@@ -210,9 +185,7 @@ def errors(problem, pair):
 @pytest.mark.parametrize("hertz", [160.0, 163.0, 228.0])
 def test_forms_agree_where_forces_are_homogeneous(hertz):
     low, high, x, _, omega = both(*blades_and_damper(), hertz)
-    one, other = (
-        jacobian_alert(low, high, x, omega, ALL, form=form) for form in ("newton", "published")
-    )
+    one, other = (jacobian_alert(low, high, x, omega, ALL, form=form) for form in ("newton", "published"))
     assert other.error == pytest.approx(one.error, rel=1e-8)
     assert np.allclose(other.start, one.start, rtol=0, atol=1e-9 * np.abs(x).max())
 
@@ -252,13 +225,7 @@ def test_strategy_takes_either_form():
     case = oscillator(CubicSpring(cubic_t=1.0))
     asked = []
     for form in ("newton", "published"):
-        sweep = Sweep(
-            omega_range=(0.6, 0.9),
-            selection=JacobianAlert(form=form),
-            high=5,
-            frequencies=4,
-            peak_points=0,
-        )
+        sweep = Sweep(omega_range=(0.6, 0.9), selection=JacobianAlert(form=form), high=5, frequencies=4, peak_points=0)
         points = list(forced_response(*case, sweep))
         asked.append(sum(p.asked.size > 0 for p in points if p.stage == "low"))
     assert asked == [0, 4]  # the true error is below 0.1 %
@@ -304,7 +271,7 @@ def test_odd_harmonics_suffice_where_the_system_is_symmetric():
 
 def test_odd_harmonics_are_told_to_be_too_few_where_it_is_not():
     """B6 has a static normal load: even harmonics matter, and the alert from odd to all of them says how much."""
-    problem, pairs = both_orders(*blades_and_damper(), 2 * np.pi * 160, 2 * np.pi * 163, 4, low=(1, 3, 5))  # fmt: skip
+    problem, pairs = both_orders(*blades_and_damper(), 2 * np.pi * 160, 2 * np.pi * 163, 4, low=(1, 3, 5))
     full = problem.high.with_order(5)
     largest = 0.0
     for pair in pairs:
@@ -313,9 +280,7 @@ def test_odd_harmonics_are_told_to_be_too_few_where_it_is_not():
             problem.low, full, problem.low.unknowns(few.coefficients), few.omega, problem.measure
         ).error
         x = newton(
-            lambda v, w=few.omega: full.linearise(v, w),
-            full.unknowns(few.coefficients),
-            Newton(max_iterations=60),
+            lambda v, w=few.omega: full.linearise(v, w), full.unknowns(few.coefficients), Newton(max_iterations=60)
         )
         assert x.status.converged
         real = problem.real_error(few, replace(few, coefficients=full.coefficients(x.x)))
@@ -327,9 +292,7 @@ def test_odd_harmonics_are_told_to_be_too_few_where_it_is_not():
 def test_harmonics_that_the_load_drives_are_all_measured():
     """Harmonics 1 and 3 drive a slider; the change over both is that of a solution with 15."""
     case = oscillator(Jenkins(k_t=0.5, limit=0.1), third=0.05)
-    problem, pairs = both_orders(
-        *case, 0.3, 1.4, 12, low=(1, 3), high=(1, 3, 5, 7, 9, 11, 13, 15), relative_to="each"
-    )
+    problem, pairs = both_orders(*case, 0.3, 1.4, 12, low=(1, 3), high=(1, 3, 5, 7, 9, 11, 13, 15), relative_to="each")
     assert problem.measure.harmonics == (1, 3)
     which = set()
     for few, many in pairs:
@@ -349,8 +312,7 @@ def test_products_give_the_alert_of_the_array(high):
     low, solution = solved(system, load, omega, 1, 256)
     linear = condense(system.structure, system.retained, load)
     dense, products = (
-        harmonic_balance(linear, system.interface, high, 256, "intervals", form)
-        for form in ("dense", "structured")
+        harmonic_balance(linear, system.interface, high, 256, "intervals", form) for form in ("dense", "structured")
     )
     assert products.structured
     assert not dense.structured
@@ -430,11 +392,7 @@ def test_error_over_contact_dofs_and_chosen_harmonics():
     assert measure.dofs.tolist() == [0, 1, 2, 3, 4, 5]
     assert measure.harmonics == (0, 1)
     few, more = (
-        max(
-            p.predicted_error
-            for p in accepted_points(list(forced_response(own, load, sweep)))
-            if p.stage == "low"
-        )
+        max(p.predicted_error for p in accepted_points(list(forced_response(own, load, sweep))) if p.stage == "low")
         for own in (system, chosen)
     )
     assert more > few > 0.0  # the damper's own dofs change more than the blades

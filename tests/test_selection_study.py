@@ -40,10 +40,7 @@ SLIPPING = {
 DECIDE = tuple(name for name in SELECTIONS if always_kept(strategy_named(name)) is None)
 ALONE = tuple(name for name in DECIDE if not strategy_named(name).verifies)
 # one of those that go through the frequencies alone in every run of the tests, the others with the long ones
-JOURNEYS = [
-    pytest.param(name, marks=pytest.mark.validation) if name in ALONE[1:] else name
-    for name in SELECTIONS
-]
+JOURNEYS = [pytest.param(name, marks=pytest.mark.validation) if name in ALONE[1:] else name for name in SELECTIONS]
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Study:
     """Mesh and reduce the blades once: selections do not touch them."""
     path = write_two_blades(tmp_path_factory.mktemp("blades"), SLIPPING)
     text = path.read_text(encoding="utf-8")
-    path.write_text("\n".join(x for x in text.splitlines() if "vary" not in x and "ratio = [" not in x) + "\n")  # fmt: skip
+    path.write_text("\n".join(x for x in text.splitlines() if "vary" not in x and "ratio = [" not in x) + "\n")
     return read_study(path)
 
 
@@ -82,9 +79,7 @@ def run(study: Study, *checks: str) -> Ran:
     lines = [text for t in tables for text in (t.title, *t.lines)]
     root = outcome.tree.attrs
     data = outcome.tree["forced_response"].to_dataset()
-    return Ran(
-        data.assign_attrs(root | data.attrs), "\n".join([*lines, *map(str, outcome.verdicts)])
-    )
+    return Ran(data.assign_attrs(root | data.attrs), "\n".join([*lines, *map(str, outcome.verdicts)]))
 
 
 def forget_after(study: Study, kept: int) -> int:
@@ -125,9 +120,7 @@ def test_every_strategy_from_a_file_to_result_and_page(base: Study, name: str) -
     parts = np.abs(data.output_displacement.values).sum(axis=(2, 3))
     assert np.all(parts[kept == 0] == 0.0)
     assert np.all(parts[:, :2] > 0.0)
-    np.testing.assert_array_equal(
-        data.unknowns.values, data.sizes["retained"] * (2 * kept.sum(axis=1) - 1)
-    )
+    np.testing.assert_array_equal(data.unknowns.values, data.sizes["retained"] * (2 * kept.sum(axis=1) - 1))
     assert int(data.unknowns_solved[0]) == int(data.attempt_unknowns.sum())
     assert ("alert_error_percent" in data) == (decides and not alone)
     if alone:
@@ -154,11 +147,7 @@ def test_every_strategy_from_a_file_to_result_and_page(base: Study, name: str) -
     ("harmonics", "after"),
     [
         ({"selection": "maple", "high": 4}, 2),
-        pytest.param(
-            {"selection": "jacobian_alert", "passages": "single", "high": 3},
-            2,
-            marks=pytest.mark.validation,
-        ),
+        pytest.param({"selection": "jacobian_alert", "passages": "single", "high": 3}, 2, marks=pytest.mark.validation),
         ({"selection": "jacobian_alert", "low": [1], "high": [1, 3, 5]}, 3),
     ],
     ids=["single passage", "alert in a single passage", "list of harmonics"],
@@ -206,9 +195,7 @@ def check(study: Study) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "over",
-    ["outputs", "contacts", ["tip1.x", "L1.1.z", "damper.x"], ["tip1.x", "damper.z", "damper.rx"]],
-    ids=str,
+    "over", ["outputs", "contacts", ["tip1.x", "L1.1.z", "damper.x"], ["tip1.x", "damper.z", "damper.rx"]], ids=str
 )
 def test_error_is_taken_where_the_study_says(base: Study, over: object) -> None:
     study = changed(base, {"alert_over": over, "alert_harmonics": [0, 1]}, "over")
@@ -252,16 +239,16 @@ def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> 
 
 def test_the_options_of_a_rival_reach_the_response(tmp_path: Path) -> None:
     keys = {
-        "harmonics.selection": '"grolet"', "harmonics.high": "5", "harmonics.strategy_threshold": "1e-6",
+        "harmonics.selection": '"grolet"',
+        "harmonics.high": "5",
+        "harmonics.strategy_threshold": "1e-6",
         "forced_response.frequencies": "10",
-    }  # fmt: skip
+    }
     solved = {}
     for options in ({}, {"per_dof": "true"}, {"per_dof": "true", "repeats": "true"}):
         own = keys | {f"harmonics.{name}": value for name, value in options.items()}
         study = read_study(write_four_masses(tmp_path / "_".join(options), own))
-        assert study.tables.harmonics.chooser == Grolet(
-            threshold=1e-6, **dict.fromkeys(options, True)
-        )
+        assert study.tables.harmonics.chooser == Grolet(threshold=1e-6, **dict.fromkeys(options, True))
         solved[tuple(options)] = int(run(study).data.unknowns_solved.sum())
     # of each coordinate by itself fewer are kept, and what is repeated is solved twice
     assert solved[("per_dof",)] < solved[()]
@@ -345,10 +332,7 @@ def test_what_cannot_be_is_refused_with_a_remedy(base: Study, name: str) -> None
 @pytest.mark.parametrize(
     ("harmonics", "message"),
     [
-        (
-            {"low": [3]},
-            "load.shaker.harmonic: 1 is not kept by harmonics.low = [3]. Add it there, or leave that out.",
-        ),
+        ({"low": [3]}, "load.shaker.harmonic: 1 is not kept by harmonics.low = [3]. Add it there, or leave that out."),
         ({"alert_over": ["tip1.x", "L1.9.x"]}, "'L1.9.x'"),
     ],
     ids=["force left out", "no such label"],
@@ -362,13 +346,11 @@ def test_what_does_not_fit_the_model_is_refused_with_a_remedy(
 
 
 def test_one_frequency_is_no_sweep(base: Study) -> None:
-    with pytest.raises(InputError, match=r"forced_response.frequencies: must be greater than or equal to 2, got 1\."):  # fmt: skip
+    with pytest.raises(InputError, match=r"forced_response.frequencies: must be greater than or equal to 2, got 1\."):
         changed(base, {}, "one", frequencies=1)
 
 
-def test_the_result_tells_the_facts_of_its_model_and_the_log_how_well_it_is_reduced(
-    tmp_path: Path,
-) -> None:
+def test_the_result_tells_the_facts_of_its_model_and_the_log_how_well_it_is_reduced(tmp_path: Path) -> None:
     forces = {"vary.load.shaker.force_n": "[0.5, 0.6]"}
     study = read_study(write_four_masses(tmp_path, forces))
     outcome = run_study(study)

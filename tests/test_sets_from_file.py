@@ -23,9 +23,7 @@ both = { pattern = "tip", box_m = [[0, 0.01, -1], [1, 1, 1]] }
 
 
 def study(folder, file, more=""):
-    (folder / "study.toml").write_text(
-        f'schema_version = 2\n[part.block]\nfile = "{file}"\nunits = "SI"\n{SETS}{more}'
-    )
+    (folder / "study.toml").write_text(f'schema_version = 2\n[part.block]\nfile = "{file}"\nunits = "SI"\n{SETS}{more}')
     return ss.Study.from_file(folder / "study.toml")
 
 
@@ -58,10 +56,7 @@ def test_sets_of_a_mesh_are_picked_by_names_box_and_cylinder(block, tmp_path):
 def test_sets_of_matrices_hold_the_dofs_of_what_is_picked(block, tmp_path):
     whole = study(tmp_path, "block.inp").model().parts["block"].structure
     kept = {name: own for name, own in whole.sets.items() if name not in wanted(block.points)}
-    save_structure(
-        Structure(whole.mass, whole.damping, whole.stiffness, whole.dofs, kept),
-        tmp_path / "block.npz",
-    )
+    save_structure(Structure(whole.mass, whole.damping, whole.stiffness, whole.dofs, kept), tmp_path / "block.npz")
     part = study(tmp_path, "block.npz").model().parts["block"].structure
     for name in wanted(block.points):
         assert np.array_equal(np.sort(part.sets[name]), np.sort(whole.sets[name]))
@@ -75,17 +70,11 @@ def test_sets_of_matrices_hold_the_dofs_of_what_is_picked(block, tmp_path):
             r"sets\.far: picks none .*between \[0, 0, 0\] and \[0\.1, 0\.02, 0\.02\] m",
         ),
         ('far = { pattern = "tpi*" }', r"sets\.far\.pattern: fits no set .*'tpi\*'.*TIP"),
-        (
-            "tip = { box_m = [[0, 0, 0], [1, 1, 1]] }",
-            r"sets\.tip: is the name of a set of the file",
-        ),
+        ("tip = { box_m = [[0, 0, 0], [1, 1, 1]] }", r"sets\.tip: is the name of a set of the file"),
         ("far = {}", r"sets\.far\.pattern: picks nothing"),
         ("far = { radius_m = [0, 1] }", r"sets\.far\.pattern: picks nothing"),
         ("far = { cylinder_m = [[0, 0, 0], [0, 0, 1]] }", r"sets\.far\.radius_m: is missing"),
-        (
-            "far = { cylinder_m = [[0, 0, 0], [0, 0, 1]], radius_m = [1, 1] }",
-            r"radius_m: must rise",
-        ),
+        ("far = { cylinder_m = [[0, 0, 0], [0, 0, 1]], radius_m = [1, 1] }", r"radius_m: must rise"),
     ],
 )
 def test_sets_that_pick_nothing_are_refused(block, tmp_path, key, message):
@@ -113,9 +102,7 @@ def test_coupled_pairs_and_rotation_of_an_archive_are_taken(tmp_path):
     speed = "\n[rotation]\nspeed_rpm = 9000.0"
     model = archive(tmp_path, PAIRS + "OMEGA,0,0,942.477796\n", speed)
     mesh = model.parts["cube"].mesh
-    low, high = (
-        mesh.numbers[mesh.node_sets[name]].tolist() for name in ("cyclic_low", "cyclic_high")
-    )
+    low, high = (mesh.numbers[mesh.node_sets[name]].tolist() for name in ("cyclic_low", "cyclic_high"))
     assert (low, high) == ([10, 20, 50, 60], [10, 40, 50, 80])  # two of them on the axis
     assert model.neighbours is not None
     assert not any("turns" in text for text in model.warnings)
@@ -126,11 +113,7 @@ def test_coupled_pairs_and_rotation_of_an_archive_are_taken(tmp_path):
 @pytest.mark.parametrize(
     ("commands", "keys", "message"),
     [
-        (
-            PAIRS + "OMEGA,0,0,942.477796",
-            "",
-            r"rotation\.speed_rpm: is missing, .*part\.cube turns at 9000 rpm",
-        ),
+        (PAIRS + "OMEGA,0,0,942.477796", "", r"rotation\.speed_rpm: is missing, .*part\.cube turns at 9000 rpm"),
         (PAIRS + "CMOMEGA,ROTOR,0,0,9", "", r"line \d+: rotates by CMOMEGA"),
         (PAIRS + "CE,R5.0,DEFI,1,2,0.0", "", r"line \d+: constrains the model \(CE\)"),
         ("CP,1,UX,20,40,60", "", r"constrains the model \(CP\)"),
@@ -144,9 +127,6 @@ def test_what_an_archive_says_is_not_dropped(tmp_path, commands, keys, message):
 
 def test_rotation_of_a_deck_in_other_words_is_refused(block, tmp_path):
     deck = tmp_path / "block.inp"
-    deck.write_text(
-        deck.read_text()
-        + "*STEP\n*STATIC\n*DLOAD\nEALL, ROTA, 9., 0., 0., 0., 1., 0., 0.\n*END STEP\n"
-    )
+    deck.write_text(deck.read_text() + "*STEP\n*STATIC\n*DLOAD\nEALL, ROTA, 9., 0., 0., 0., 1., 0., 0.\n*END STEP\n")
     with pytest.raises(InputError, match="rotates by ROTA, and rotation is read as CENTRIF alone"):
         study(tmp_path, "block.inp").model()

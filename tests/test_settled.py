@@ -16,9 +16,7 @@ from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.settled import SOLUTIONS, settle
 from stickslip.response.verification import own_error
 
-SWEEP = ss.Sweep(
-    omega_range=(2 * math.pi * 9.0, 2 * math.pi * 14.0), points=12, peak_points=4, threshold=0.01
-)
+SWEEP = ss.Sweep(omega_range=(2 * math.pi * 9.0, 2 * math.pi * 14.0), points=12, peak_points=4, threshold=0.01)
 
 
 def solved(sweep, done=()):
@@ -35,11 +33,7 @@ def judged(points, sweep):
     found = {}
     for p in ss.response.accepted_points(points):
         more = [a for a in audits.get(p.omega, []) if a.harmonics.size > p.harmonics.size]
-        error = (
-            problem.real_error(p, max(more, key=lambda a: a.harmonics.size))
-            if more
-            else p.predicted_error
-        )
+        error = problem.real_error(p, max(more, key=lambda a: a.harmonics.size)) if more else p.predicted_error
         found[p.omega] = bool(error > sweep.threshold)
     return found
 
@@ -61,7 +55,9 @@ def test_a_point_takes_no_more_than_its_own_budget():
 def test_an_interrupted_run_goes_on_as_it_would_have(share):
     points = solved(SWEEP)
     again = solved(SWEEP, points[: int(share * len(points))])
-    assert [(p.stage, p.omega, p.harmonics.size) for p in again] == [(p.stage, p.omega, p.harmonics.size) for p in points]  # fmt: skip
+    assert [(p.stage, p.omega, p.harmonics.size) for p in again] == [
+        (p.stage, p.omega, p.harmonics.size) for p in points
+    ]
     for one, other in zip(points, again, strict=True):
         np.testing.assert_allclose(other.coefficients, one.coefficients, rtol=1e-6, atol=1e-12)
 
@@ -124,9 +120,7 @@ def test_a_doubt_about_a_fixed_harmonic_order_is_settled_by_comparing(monkeypatc
     problem = ss.response.forced_problem(system, load, sweep)
     audits, accepted = audits_by_frequency(points), ss.response.accepted_points(points)
     assert max(p.order for p in accepted) == 3
-    many = replace(
-        sweep, at=tuple(p.omega for p in accepted), low=25, high=25, selection="always_high"
-    )
+    many = replace(sweep, at=tuple(p.omega for p in accepted), low=25, high=25, selection="always_high")
     true = list(ss.forced_response(system, load, many))
     small = 0
     for point, exact in zip(accepted, true, strict=True):
@@ -150,7 +144,7 @@ def test_an_audit_that_is_doubted_itself_settles_nothing():
     near = int(np.argmin(np.abs(told.hz - 37.8637)))
     exact = model_of(machine).forced_response(
         hz=[float(told.hz[near])], low=41, high=41, samples=512, selection="always_high", stability="off"
-    )["forced_response"]  # fmt: skip
+    )["forced_response"]
     parts = exact.output_displacement.values[0, machine.harmonic]
     true = parts[:, 0] + 1j * parts[:, 1]
     assert told.level[near] == 0

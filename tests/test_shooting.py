@@ -39,9 +39,7 @@ def rattler(seed: int) -> tuple[PeriodMap, FloatArray]:
     random = np.random.default_rng(seed)
     stiffness = random.normal(size=(9, 9))
     structure = structure_of(
-        np.diag(random.uniform(0.5, 2.0, 9)),
-        0.1 * np.eye(9),
-        stiffness @ stiffness.T + 4.0 * np.eye(9),
+        np.diag(random.uniform(0.5, 2.0, 9)), 0.1 * np.eye(9), stiffness @ stiffness.T + 4.0 * np.eye(9)
     )
     gap = np.zeros((6, 9))
     gap[np.arange(6), np.arange(6)] = 1.0
@@ -71,9 +69,7 @@ def states(mapping: PeriodMap, state: FloatArray) -> set[str]:
     seen |= {"slip +"} if np.any(slips & ~opened[:, :, None] & (force[:, :, :2] > 0.0)) else set()
     seen |= {"slip -"} if np.any(slips & ~opened[:, :, None] & (force[:, :, :2] < 0.0)) else set()
     landed = np.any(opened[:-1] & ~opened[1:])
-    return (
-        seen | ({"landing"} if landed else set()) | ({"stick"} if np.any(~slips[:, 0]) else set())
-    )
+    return seen | ({"landing"} if landed else set()) | ({"stick"} if np.any(~slips[:, 0]) else set())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -96,9 +92,7 @@ def test_monodromy_is_the_derivative_of_the_period_map(seed: int) -> None:
 def linear_multipliers(structure: Structure, stiffness: FloatArray, omega: float) -> np.ndarray:
     n = structure.n
     inverse = np.linalg.inv(structure.mass)
-    first_order = np.block(
-        [[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ structure.damping]]
-    )
+    first_order = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ structure.damping]])
     return np.exp(np.linalg.eigvals(first_order) * 2 * np.pi / omega)
 
 
@@ -130,9 +124,7 @@ def test_where_all_stick_the_orbit_and_the_multipliers_are_those_of_the_linear_s
 
 def test_where_all_are_open_the_tractions_are_forgotten_at_once() -> None:
     structure, _, _, _ = wedge()
-    grounded = structure_of(
-        structure.mass, structure.damping + 5.0 * np.eye(6), structure.stiffness + 1e5 * np.eye(6)
-    )
+    grounded = structure_of(structure.mass, structure.damping + 5.0 * np.eye(6), structure.stiffness + 1e5 * np.eye(6))
     _, gap, _, load = wedge()
     far = [ElasticCoulomb(k_t=3e5, k_w=2e5, k_n=3e5, mu=0.5, preload=-1e6)] * 2
     exact = linear_multipliers(grounded, grounded.stiffness, 900.0)
@@ -196,12 +188,9 @@ def test_a_small_disturbance_decays_as_the_multipliers_say(omega: float) -> None
     arguments = griffin_arguments(omega)
     result = shoot(*arguments, stepping=TimeStepping(512, tolerance=1e-9))
     first, second, *_ = result.floquet.multipliers
-    start = TransientStart(
-        result.final.displacement + 1e-6, result.final.velocity - 2e-6, result.final.states
-    )
+    start = TransientStart(result.final.displacement + 1e-6, result.final.velocity - 2e-6, result.final.states)
     left = [
-        plain_march(result, arguments, start, periods).final.displacement[0]
-        - result.final.displacement[0]
+        plain_march(result, arguments, start, periods).final.displacement[0] - result.final.displacement[0]
         for periods in (2, 3, 4, 5, 6)
     ]
     for x0, x1, x2 in zip(left, left[1:], left[2:], strict=False):
@@ -223,9 +212,7 @@ def test_it_is_the_motion_that_integration_settles_to_in_far_fewer_periods() -> 
     np.testing.assert_allclose(
         settled.harmonics, result.harmonics, rtol=0, atol=1e-8 * size
     )  # the tolerance of the integration
-    np.testing.assert_allclose(
-        settled.contact_force, result.contact_force, rtol=0, atol=1e-6 * 120.0
-    )
+    np.testing.assert_allclose(settled.contact_force, result.contact_force, rtol=0, atol=1e-6 * 120.0)
     assert result.periods < settled.periods / 10
     # what is left of the transient decays with the largest multiplier
     assert settled.remaining < 1e-8

@@ -93,11 +93,7 @@ def test_rotations_may_come_in_any_unit():
         stiffness=unit[:, None] * structure.stiffness * unit,
     )
     gaps = system.interface.gap_operator.toarray() * unit
-    other = replace(
-        system,
-        structure=turned,
-        interface=Interface(system.interface.names, system.interface.laws, gaps),
-    )
+    other = replace(system, structure=turned, interface=Interface(system.interface.names, system.interface.laws, gaps))
     loads = load, HarmonicLoad(load.static * unit, {1: load.harmonics[1] * unit})
     found, plain = [], []
     for own, own_load in zip((system, other), loads, strict=True):
@@ -167,9 +163,7 @@ def test_what_a_solution_neglects_is_what_its_jacobian_lacks(kept):
     own = few.with_harmonics(kept) if kept[-1] > 1 else few
     if 1 in kept:  # else the motion itself is cut
         at = own.unknowns(few.coefficients(solution.x))
-        assert np.allclose(
-            harmonic_block_norms(own, at, omega), whole[np.ix_(same, same)], rtol=1e-9, atol=1e-12
-        )
+        assert np.allclose(harmonic_block_norms(own, at, omega), whole[np.ix_(same, same)], rtol=1e-9, atol=1e-12)
     left = whole - missing
     for i, h in enumerate(high.harmonics):
         for j, k in enumerate(high.harmonics):

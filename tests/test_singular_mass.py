@@ -23,13 +23,8 @@ def bricks(path, count, *, held=False, kind="C3D20R"):
     nodes, cells = {}, []
     for i in range(count):
         corners = [(x + i, y, z) for x, y, z in CORNERS]
-        middles = [
-            tuple((a + b) / 2 for a, b in zip(corners[j], corners[k], strict=True))
-            for j, k in HEX_EDGES
-        ]
-        cells.append(
-            [nodes.setdefault(tuple(map(float, p)), len(nodes) + 1) for p in [*corners, *middles]]
-        )
+        middles = [tuple((a + b) / 2 for a, b in zip(corners[j], corners[k], strict=True)) for j, k in HEX_EDGES]
+        cells.append([nodes.setdefault(tuple(map(float, p)), len(nodes) + 1) for p in [*corners, *middles]])
     lines = ["*NODE", *(f"{n}, {x}, {y}, {z}" for (x, y, z), n in nodes.items())]
     lines.append(f"*ELEMENT, TYPE={kind}, ELSET=E")
     for n, cell in enumerate(cells, 1):
@@ -59,9 +54,7 @@ def test_a_summary_tells_modes_and_the_singular_mass(tmp_path):
 def test_a_free_brick_that_strains_nothing_in_more_ways_is_refused_at_speed(tmp_path):
     deck = read_deck(bricks(tmp_path / "one.inp", 1))
     solid = rotating_solid(deck.mesh, deck.material, clamped=(), quadrature=deck.quadrature)
-    with pytest.raises(
-        SingularError, match=r"without strain in more ways than rigidly.*take C3D20"
-    ):
+    with pytest.raises(SingularError, match=r"without strain in more ways than rigidly.*take C3D20"):
         inertia_relief(solid)
     exact = rotating_solid(deck.mesh, deck.material, clamped=())
     assert inertia_relief(exact) is not None
@@ -70,9 +63,7 @@ def test_a_free_brick_that_strains_nothing_in_more_ways_is_refused_at_speed(tmp_
 def test_a_long_row_of_such_bricks_is_refused_by_its_mass(tmp_path):
     """Beyond the size of dense algebra. Each brick of a row has a motion with neither mass nor stiffness; before, "factorise" said so."""
     structure = assemble_deck(read_deck(bricks(tmp_path / "row.inp", 14, held=True)))
-    with pytest.raises(
-        SingularError, match=r"mass and stiffness are singular together.*take C3D20"
-    ):
+    with pytest.raises(SingularError, match=r"mass and stiffness are singular together.*take C3D20"):
         normal_modes(structure, 3)
 
 
@@ -108,9 +99,7 @@ def test_a_free_body_keeps_its_rigid_motions_beside_massless_ones():
 def test_multipliers_and_negative_masses_are_named():
     K = np.array([[2.0, -1, 1], [-1, 2, -1], [1, -1, 0]])
     dofs = Dofs(np.arange(1, 4), ("x",) * 3, np.zeros((3, 3)))
-    with pytest.raises(
-        InputError, match=r"1 coordinates without mass are multipliers of constraints, node3.x one"
-    ):
+    with pytest.raises(InputError, match=r"1 coordinates without mass are multipliers of constraints, node3.x one"):
         dense_modes(K, np.diag([1.0, 1.0, 0.0]), 1, dofs=dofs)
     with pytest.raises(InputError, match="mass: is not positive: a motion, coordinate 1 the most"):
         dense_modes(np.eye(2), np.diag([1.0, -1.0]), 1)
@@ -122,9 +111,7 @@ def test_multipliers_and_negative_masses_are_named():
 def test_the_dense_and_the_sparse_road_agree_on_massless_dofs():
     """A chain of 700 masses of which each third has none: Lanczos, and the same cut short enough for dense algebra."""
     n = 90
-    K = scipy.sparse.diags_array(
-        [2.0 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]
-    ).tocsr()
+    K = scipy.sparse.diags_array([2.0 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]).tocsr()
     M = scipy.sparse.diags_array((np.arange(n) % 3 > 0).astype(float)).tocsr()
     none = scipy.sparse.csr_array((n, n))
     structure = Structure(M, none, K, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3))), {})

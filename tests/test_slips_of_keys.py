@@ -54,26 +54,36 @@ CONVERTED = [
     ("stiffness_n", ["stiffness_n_per_m"], 2.0, "Did you mean 'stiffness_n_per_m'?"),
     ("mass_m", ["mass_kg"], 2.0, "Did you mean 'mass_kg'?"),
     ("colour", ["speed_rpm"], 2.0, "Known: speed_rpm."),
-]  # fmt: skip
+]
 
 
-@pytest.mark.parametrize(
-    ("word", "known", "value", "said"), CONVERTED, ids=[f"{c[0]}={c[2]}" for c in CONVERTED]
-)
+@pytest.mark.parametrize(("word", "known", "value", "said"), CONVERTED, ids=[f"{c[0]}={c[2]}" for c in CONVERTED])
 def test_a_key_in_another_unit_is_converted(word, known, value, said):
     assert nearest_key(word, known, value) == said
     assert meant_key(word, known) == (known[0] if said.startswith("Did") else "")
 
 
 MISSPELT = [
-    ("engine_order =", "engine_ordre =", ["load.gas.engine_ordre: unknown key 'engine_ordre'. Did you mean 'engine_order'?"]),
-    ("friction_coefficient", "friction_coeficient", ["contact.shroud.friction_coeficient: unknown key 'friction_coeficient'. Did you mean 'friction_coefficient'?"]),
-    ("normal_stiffness_n_per_m ", "normal_stiffness_n_per_mm ", ["contact.shroud.normal_stiffness_n_per_mm: unknown key", "600000 N/mm are 6e+08 N/m."]),
+    (
+        "engine_order =",
+        "engine_ordre =",
+        ["load.gas.engine_ordre: unknown key 'engine_ordre'. Did you mean 'engine_order'?"],
+    ),
+    (
+        "friction_coefficient",
+        "friction_coeficient",
+        ["contact.shroud.friction_coeficient: unknown key 'friction_coeficient'. Did you mean 'friction_coefficient'?"],
+    ),
+    (
+        "normal_stiffness_n_per_m ",
+        "normal_stiffness_n_per_mm ",
+        ["contact.shroud.normal_stiffness_n_per_mm: unknown key", "600000 N/mm are 6e+08 N/m."],
+    ),
     ("\nlaw = ", "\nlwa = ", ["contact.shroud.lwa: unknown key 'lwa'. Did you mean 'law'?"]),
     ("\nbetween = ", "\nbetwen = ", ["contact.shroud.betwen: unknown key 'betwen'. Did you mean 'between'?"]),
     ("\nfile = ", "\nfille = ", ["part.blade.fille: unknown key 'fille'. Did you mean 'file'?"]),
     ("speed_rpm = ", "speed_hz = ", ["rotation.speed_hz: unknown key 'speed_hz'. Did you mean 'speed_rpm'? "]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("right", "wrong", "said"), MISSPELT, ids=[m[1].strip() for m in MISSPELT])
@@ -103,12 +113,8 @@ def test_unknown_keys_come_before_what_is_missing(tmp_path):
 
 def test_vary_and_python_name_the_key_in_its_unit(tmp_path):
     path = write_four_masses(tmp_path, {"vary.load.shaker.force_kn": "[1.0]"})
-    with pytest.raises(
-        InputError, match=r"no key 'force_kn'. Did you mean 'force_n'\? 1 kN is 1000 N"
-    ):
+    with pytest.raises(InputError, match=r"no key 'force_kn'. Did you mean 'force_n'\? 1 kN is 1000 N"):
         read_study(path)
     model = read_study(write_four_masses(tmp_path / "right")).model()
-    with pytest.raises(
-        InputError, match=r"frequency_rpm.*Did you mean 'frequency_hz'\? 600 rpm are 10 Hz"
-    ):
+    with pytest.raises(InputError, match=r"frequency_rpm.*Did you mean 'frequency_hz'\? 600 rpm are 10 Hz"):
         ss.Model(parts=model.parts, loads=model.loads).forced_response(frequency_rpm=600.0)

@@ -158,8 +158,7 @@ def test_rayleigh_damping_has_its_ratio_at_both_frequencies():
 
 
 @pytest.mark.parametrize(
-    ("ratio", "between", "message"),
-    [(-0.1, (1, 2), "must not be negative"), (0.1, (2, 1), "needs 0 < low < high")],
+    ("ratio", "between", "message"), [(-0.1, (1, 2), "must not be negative"), (0.1, (2, 1), "needs 0 < low < high")]
 )
 def test_bad_damping_is_named(ratio, between, message):
     solid = assemble_solid(prism((0.01, 0.01, 0.02), (1, 1, 2)), STEEL)

@@ -99,9 +99,7 @@ def test_stiff_springs_over_decades(name):
     options = Newton(tolerance=1e-9, max_iterations=150, globalisation=name)
     solutions = [newton(springs(seed, 30, 30, 2.0), np.zeros(30), options) for seed in range(20)]
     assert sum(s.status.converged for s in solutions) >= 19
-    assert {s.status for s in solutions} <= {
-        Status.CONVERGED, Status.STALLED, Status.TOO_MANY_ITERATIONS
-    }  # fmt: skip
+    assert {s.status for s in solutions} <= {Status.CONVERGED, Status.STALLED, Status.TOO_MANY_ITERATIONS}
 
 
 @pytest.mark.parametrize("name", CORRECTORS)
@@ -110,10 +108,7 @@ def test_lift_off_of_a_stiff_contact(name, start):
     # soft spring, preload, and a contact a million times stiffer: the residual rises a million times faster behind the kink
     def contact(x):
         closed = x[0] < 0.0
-        return At(
-            np.array([x[0] + (1e6 * x[0] if closed else 0.0) - 2.0]),
-            np.array([[1.0 + 1e6 * closed]], order="F"),
-        )
+        return At(np.array([x[0] + (1e6 * x[0] if closed else 0.0) - 2.0]), np.array([[1.0 + 1e6 * closed]], order="F"))
 
     solution = newton(contact, np.array([start]), Newton(globalisation=name))
     assert solution.status is Status.CONVERGED
@@ -182,9 +177,7 @@ def test_units_of_the_force_change_the_tolerance_alone(name, force):
     problem = springs(3, 6, 8)
     plain = newton(problem, np.zeros(6), Newton(globalisation=name, tolerance=2.0**-33))
     other = newton(
-        scaled(problem, np.ones(6), force),
-        np.zeros(6),
-        Newton(globalisation=name, tolerance=2.0**-33 * force),
+        scaled(problem, np.ones(6), force), np.zeros(6), Newton(globalisation=name, tolerance=2.0**-33 * force)
     )
     assert plain.status is Status.CONVERGED
     assert other.iterations == plain.iterations
@@ -216,10 +209,7 @@ def test_badly_scaled(name):
 def test_a_singular_start_is_left(name):
     # at x = 0 the second unknown has no influence: Newton has no step, the gradient leads on
     def product(x):
-        return At(
-            np.array([x[0] - 1.0, x[0] * x[1] - 2.0]),
-            np.array([[1.0, 0.0], [x[1], x[0]]], order="F"),
-        )
+        return At(np.array([x[0] - 1.0, x[0] * x[1] - 2.0]), np.array([[1.0, 0.0], [x[1], x[0]]], order="F"))
 
     assert newton(product, np.zeros(2), Newton()).status is Status.SINGULAR
     solution = newton(product, np.zeros(2), Newton(globalisation=name, max_iterations=60))
@@ -247,8 +237,7 @@ def test_a_nearly_singular_jacobian(name):
     def narrow(x):
         bend = np.tanh(x[1] - 12.0)
         return At(
-            np.array([x[0] - 1.0, bend + 0.5]),
-            np.array([[1.0, 0.0], [0.0, (1.0 - bend) * (1.0 + bend)]], order="F"),
+            np.array([x[0] - 1.0, bend + 0.5]), np.array([[1.0, 0.0], [0.0, (1.0 - bend) * (1.0 + bend)]], order="F")
         )
 
     options = Newton(globalisation=name, max_iterations=200, tolerance=1e-11)
@@ -396,11 +385,7 @@ def test_factors_solve_with_a_bordered_matrix_and_its_transpose(m):
 @pytest.mark.parametrize("corner", [2.5, -0.4])
 def test_a_border_whose_row_prescribes_the_last_unknown_alone(corner):
     random = np.random.default_rng(5)
-    a, column, right = (
-        random.standard_normal((5, 5)),
-        random.standard_normal(5),
-        random.standard_normal(6),
-    )
+    a, column, right = (random.standard_normal((5, 5)), random.standard_normal(5), random.standard_normal(6))
     before = a.copy()
     whole = array_of(Bordered(a, column, np.zeros(5), corner))
     found, sign = Dense().solve_bordered(a, column, np.zeros(5), corner, right)
@@ -455,9 +440,7 @@ def test_a_jacobian_known_by_its_products(name):
 
     options = Newton(globalisation=name, max_iterations=100)
     exact = newton(problem, np.zeros(8), options)
-    solution = newton(
-        evaluate, np.zeros(8), Newton(globalisation=name, linear=Through(), max_iterations=100)
-    )
+    solution = newton(evaluate, np.zeros(8), Newton(globalisation=name, linear=Through(), max_iterations=100))
     assert exact.status is solution.status is Status.CONVERGED
     bound = unknowns_bound(exact.x, problem(exact.x), problem(solution.x))
     assert np.abs(solution.x - exact.x).max() <= bound
@@ -503,8 +486,7 @@ def loads(s):
 
 def stuck(start):
     return all(
-        not newton(well, start, Newton(globalisation=name, max_iterations=FEW)).status.converged
-        for name in CORRECTORS
+        not newton(well, start, Newton(globalisation=name, max_iterations=FEW)).status.converged for name in CORRECTORS
     )
 
 
@@ -523,9 +505,7 @@ def test_a_homotopy_passes_folds_to_the_root(kind):
     starts = [start for start in starts if stuck(start)]
     assert len(starts) >= 3
     for start in starts:
-        solution = solve_robustly(
-            well, [start], Newton(max_iterations=FEW), homotopies(kind, start), patience=FEW
-        )
+        solution = solve_robustly(well, [start], Newton(max_iterations=FEW), homotopies(kind, start), patience=FEW)
         assert solution.status is Status.CONVERGED
         assert solution.rung is Rung.HOMOTOPY
         assert solution.x[0] == pytest.approx(-2.1038034, abs=1e-6)
@@ -563,5 +543,10 @@ def test_where_nothing_helps_the_nearest_attempt_is_returned():
 
 def test_rungs_are_counted_in_their_order():
     assert [rung.name for rung in sorted(Rung)] == [
-        "FULL_STEPS", "DAMPED_STEP", "SHORTER_STEP", "OTHER_GLOBALISATION", "HOMOTOPY", "IN_TIME"
-    ]  # fmt: skip
+        "FULL_STEPS",
+        "DAMPED_STEP",
+        "SHORTER_STEP",
+        "OTHER_GLOBALISATION",
+        "HOMOTOPY",
+        "IN_TIME",
+    ]

@@ -15,12 +15,7 @@ from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Rung, Status
 
 TOLERANCE = 1e-12
-WAYS = [
-    ("arc_length", "tangent"),
-    ("arc_length", "secant"),
-    ("local", "tangent"),
-    ("local", "secant"),
-]
+WAYS = [("arc_length", "tangent"), ("arc_length", "secant"), ("local", "tangent"), ("local", "secant")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +48,7 @@ FOLDS = [(-1 / np.sqrt(3), 2 / np.sqrt(27)), (1 / np.sqrt(3), -2 / np.sqrt(27))]
 
 def corner(slope):
     """p = 1 - slope |x|: a fold that is a corner."""
-    return Curve(
-        lambda x, p: p - 1 + slope * abs(x),
-        lambda x, _: slope * (1.0 if x > 0 else -1.0),
-        lambda _x, _p: 1.0,
-    )
+    return Curve(lambda x, p: p - 1 + slope * abs(x), lambda x, _: slope * (1.0 if x > 0 else -1.0), lambda _x, _p: 1.0)
 
 
 def along(parametrisation="arc_length", predictor="tangent", linear=None, **control):
@@ -98,9 +89,7 @@ def test_folds_of_the_cubic_are_located(parametrisation, predictor, largest):
 def test_a_fold_at_a_corner_is_located(slope):
     # the tangent jumps: there is no zero to find, only the place of the jump
     problem, following = corner(slope), along()
-    points = list(
-        trace(problem, begin(problem, -0.7 / slope, 0.3, following), 0.2, following, [FOLD])
-    )
+    points = list(trace(problem, begin(problem, -0.7 / slope, 0.3, following), 0.2, following, [FOLD]))
     (fold,) = [point for point in points if point.mark]
     assert fold.x[0] == pytest.approx(0.0, abs=1e-8 / min(slope, 1.0))
     assert fold.p == pytest.approx(1.0, abs=1e-8)
@@ -142,9 +131,7 @@ def test_a_branch_goes_on_from_a_located_fold():
 
 def test_a_mark_that_cannot_be_located_says_why():
     # between the two points the residual is not a number
-    hole = Curve(
-        lambda x, p: np.nan if 0.1 < p < 0.9 else x - 1.0, lambda _x, _p: 1.0, lambda _x, _p: 0.0
-    )
+    hole = Curve(lambda x, p: np.nan if 0.1 < p < 0.9 else x - 1.0, lambda _x, _p: 1.0, lambda _x, _p: 0.0)
     following = along()
     before, after = begin(hole, 1.0, 0.0, following), begin(hole, 1.0, 1.0, following)
     middle = Mark(name="middle", value=lambda point: point.p - 0.4)

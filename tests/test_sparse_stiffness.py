@@ -48,9 +48,7 @@ def reduced(system: System) -> System:
     return replace(system, structure=system.structure.structure)
 
 
-def balance_of(
-    system: System, share: float, points: int = 8, order: int = ORDER
-) -> HarmonicBalance:
+def balance_of(system: System, share: float, points: int = 8, order: int = ORDER) -> HarmonicBalance:
     linear = system.condensed(plates(points).load(share, "slide"), order)
     return harmonic_balance(linear, system.interface, order, SAMPLES, jacobian="structured")
 
@@ -72,9 +70,7 @@ def lossy() -> SparseStiffness:
     """A sparse structure with Coriolis terms, structural damping and a load in two harmonics."""
     own = plates().system.structure.structure
     rng = np.random.default_rng(3)
-    half = scipy.sparse.random_array(
-        (own.n, own.n), density=0.02, rng=rng, data_sampler=rng.standard_normal
-    )
+    half = scipy.sparse.random_array((own.n, own.n), density=0.02, rng=rng, data_sampler=rng.standard_normal)
     skew = abs(own.damping).max() * (half - half.T)
     turning = structural_damping(own.with_damping(own.damping + skew), 0.02)
     force = rng.standard_normal((2, own.n)) + 1j * rng.standard_normal((2, own.n))
@@ -88,9 +84,7 @@ def test_products_are_those_of_the_arrays(lossy):
     own = lossy.matrices
     k, c, m, loss = (a.toarray() for a in (own.stiffness, own.damping, own.mass, own.loss))
     harmonics = (0, 1, 3)
-    blocks = [k + 0j] + [
-        k + 1j * loss + 1j * h * OMEGA * c - (h * OMEGA) ** 2 * m for h in harmonics[1:]
-    ]
+    blocks = [k + 0j] + [k + 1j * loss + 1j * h * OMEGA * c - (h * OMEGA) ** 2 * m for h in harmonics[1:]]
     whole = real_matrix(blocks)
     at = lossy.products(OMEGA, harmonics)
     assert isinstance(at, Shareable)
@@ -106,9 +100,7 @@ def test_products_are_those_of_the_arrays(lossy):
 
 def test_slopes_are_those_of_differences(lossy):
     rows = np.random.default_rng(0).standard_normal((7, lossy.n))
-    step = (
-        1e-3 * OMEGA
-    )  # the dynamic stiffness is quadratic in ω: central differences are exact but for rounding
+    step = 1e-3 * OMEGA  # the dynamic stiffness is quadratic in ω: central differences are exact but for rounding
     side = [lossy.products(OMEGA + s, (0, 1, 2, 3)).product(rows) for s in (-step, step)]
     product, slope = lossy.products(OMEGA, (0, 1, 2, 3)).product_and_slope(rows)
     assert relative(product, np.mean(side, axis=0)) < 1e-3
@@ -151,20 +143,24 @@ def test_motion_is_that_of_the_condensed_structure(points):
     full = dense.linear.recover(OMEGA, dense.coefficients(z))
     assert relative(q, full) < 1e-8
     energy = sparse.linear.strain_energy(OMEGA, q)
-    np.testing.assert_allclose(energy, dense.linear.strain_energy(OMEGA, full[:, dense.linear.retained]), rtol=1e-8)  # fmt: skip
+    np.testing.assert_allclose(energy, dense.linear.strain_energy(OMEGA, full[:, dense.linear.retained]), rtol=1e-8)
     outputs = system.outputs
-    np.testing.assert_array_equal(
-        sparse.linear.output_rows(OMEGA, 1, outputs) @ q[1], q[1][outputs]
-    )
+    np.testing.assert_array_equal(sparse.linear.output_rows(OMEGA, 1, outputs) @ q[1], q[1][outputs])
 
 
 def test_arc_length_finds_the_branch_of_the_condensed_structure():
     system, load = plates().system, plates().load(0.2, "slide")
     first = np.sqrt(normal_modes(system.stuck_structure(), 1).squares[0])
     sweep = Sweep(
-        omega_range=(0.95 * first, 1.02 * first), selection="always_high", high=ORDER, samples=SAMPLES,
-        evaluator="intervals", points=4, peak_points=0, newton=Newton(tolerance=1e-10),
-    )  # fmt: skip
+        omega_range=(0.95 * first, 1.02 * first),
+        selection="always_high",
+        high=ORDER,
+        samples=SAMPLES,
+        evaluator="intervals",
+        points=4,
+        peak_points=0,
+        newton=Newton(tolerance=1e-10),
+    )
     points = list(forced_response(system, load, sweep))
     assert len(points) >= 4
     assert all(p.converged for p in points)
@@ -178,7 +174,10 @@ def test_arc_length_finds_the_branch_of_the_condensed_structure():
 
 def test_static_seat_is_that_of_the_condensed_structure():
     system = plates().system
-    static = plates().load(0.0).static + 1e3 * np.random.default_rng(0).standard_normal(system.structure.n) / system.structure.n  # fmt: skip
+    static = (
+        plates().load(0.0).static
+        + 1e3 * np.random.default_rng(0).standard_normal(system.structure.n) / system.structure.n
+    )
     dense = reduced(system)
     found = preload(system, static)
     assert relative(found[dense.retained], preload(dense, static)) < 1e-8
@@ -192,9 +191,7 @@ def test_harmonics_are_raised_as_in_the_condensed_structure():
     sparse, dense = ([p for p in points if p.stage != "peak"] for points in both)
     assert [p.support for p in sparse] == [p.support for p in dense]
     assert len({p.support for p in sparse}) > 1
-    np.testing.assert_allclose(
-        [p.predicted_error for p in sparse], [p.predicted_error for p in dense], rtol=1e-3
-    )
+    np.testing.assert_allclose([p.predicted_error for p in sparse], [p.predicted_error for p in dense], rtol=1e-3)
 
 
 # ---- factors ------------------------------------------------------------------------------------------------------------
@@ -245,7 +242,7 @@ def test_double_precision_where_single_tells_too_little(monkeypatch):
 
 
 def test_parts_kept_whole_are_not_condensed_where_they_are_too_large(tmp_path, monkeypatch):
-    text = (EXAMPLE / "study.toml").read_text().replace("fixed_interface_modes = 20", 'method = "none"')  # fmt: skip
+    text = (EXAMPLE / "study.toml").read_text().replace("fixed_interface_modes = 20", 'method = "none"')
     for name in ("blade.inp", "disk.inp"):
         shutil.copy(EXAMPLE / name, tmp_path)
     (tmp_path / "study.toml").write_text(text)
@@ -257,9 +254,16 @@ def test_parts_kept_whole_are_not_condensed_where_they_are_too_large(tmp_path, m
     assert isinstance(whole.system.structure, Unreduced)
     assert relative(whole.static_force, condensed.static_force) < 1e-8
     sweep = Sweep(
-        omega_range=(2 * np.pi * 1900, 2 * np.pi * 1950), at=(2 * np.pi * 1920,), low=1, high=1, selection="always_high",
-        samples=SAMPLES, evaluator="intervals", peak_points=0, newton=Newton(tolerance=1e-10),
-    )  # fmt: skip
+        omega_range=(2 * np.pi * 1900, 2 * np.pi * 1950),
+        at=(2 * np.pi * 1920,),
+        low=1,
+        high=1,
+        selection="always_high",
+        samples=SAMPLES,
+        evaluator="intervals",
+        peak_points=0,
+        newton=Newton(tolerance=1e-10),
+    )
     found = []
     for one in (whole, condensed):
         problem = forced_problem(one.system, one.load, sweep)
@@ -276,9 +280,14 @@ def test_few_dofs_are_arrays():
     own = plates().system.structure.structure
     held = np.arange(60)
     few = replace(
-        own, mass=own.mass[held][:, held], damping=own.damping[held][:, held], stiffness=own.stiffness[held][:, held],
-        dofs=replace(own.dofs, node=own.dofs.node[held], component=own.dofs.component[:60], position=own.dofs.position[held]),
-    )  # fmt: skip
+        own,
+        mass=own.mass[held][:, held],
+        damping=own.damping[held][:, held],
+        stiffness=own.stiffness[held][:, held],
+        dofs=replace(
+            own.dofs, node=own.dofs.node[held], component=own.dofs.component[:60], position=own.dofs.position[held]
+        ),
+    )
     interface = plates().system.interface
     one = replace(interface, names=("a",), laws=interface.laws[:1], gap_operator=np.eye(3, 60))
     system = System(Unreduced(few), one, np.array([0]))

@@ -106,9 +106,7 @@ LAWS = {
 def test_multipliers_are_those_of_the_flow_map(law, seed):
     rng = np.random.default_rng([seed, list(LAWS).index(law)])
     structure = random_structure(rng, 3)
-    interface = Interface(
-        ("a", "b"), (LAWS[law](),) * 2, rng.standard_normal((6, 3)), np.array([0.7, 1.3])
-    )
+    interface = Interface(("a", "b"), (LAWS[law](),) * 2, rng.standard_normal((6, 3)), np.array([0.7, 1.3]))
     found, off = compared(structure, interface, random_gaps(rng, 2, 3), 0.8)
     assert found.transitions > 0
     assert off < 2e-7
@@ -127,7 +125,7 @@ def test_laws_of_many_sliders_have_a_state_for_each():
 def solved(limit, omega, order):
     system, load = griffin(limit)
     point = at_frequency(system, load, omega / (2 * np.pi), order, samples=512, span=0.02)
-    sweep = Sweep(omega_range=(0.9 * omega, omega), low=order, high=order, samples=512, selection="always_low")  # fmt: skip
+    sweep = Sweep(omega_range=(0.9 * omega, omega), low=order, high=order, samples=512, selection="always_low")
     return forced_problem(system, load, sweep), point
 
 
@@ -144,9 +142,17 @@ def stopped(order):
     """Return a mass that meets a stop with friction, as a problem, and the points of its response."""
     structure, _, _ = one_mass(0.02)
     law = ElasticCoulomb(k_t=3.0, k_w=0.0, k_n=8.0, mu=0.3, preload=0.5)
-    system = System(structure, Interface(("stop",), (law,), np.array([[0.6], [0.0], [0.8]])), np.array([0]))  # fmt: skip
+    system = System(structure, Interface(("stop",), (law,), np.array([[0.6], [0.0], [0.8]])), np.array([0]))
     load = HarmonicLoad(np.zeros(1), {1: np.ones(1, dtype=complex)})
-    sweep = Sweep(omega_range=(0.5, 3.5), low=order, high=order, selection="always_low", frequencies=20, peak_points=0, evaluator="events")  # fmt: skip
+    sweep = Sweep(
+        omega_range=(0.5, 3.5),
+        low=order,
+        high=order,
+        selection="always_low",
+        frequencies=20,
+        peak_points=0,
+        evaluator="events",
+    )
     return forced_problem(system, load, sweep), list(forced_response(system, load, sweep))
 
 
@@ -157,7 +163,7 @@ def verdicts(order, many=31):
     best = problem.balance(tuple(range(many + 1)))
     operator = problem.low.interface.gap_operator
     for point in points:
-        start, options = best.unknowns(point.coefficients), Newton(tolerance=1e-11, max_iterations=60)  # fmt: skip
+        start, options = best.unknowns(point.coefficients), Newton(tolerance=1e-11, max_iterations=60)
         exact = newton(lambda x: best.linearise(x, point.omega), start, options)  # noqa: B023
         if not (point.converged and exact.status.converged):
             continue
@@ -189,7 +195,7 @@ def test_newton_goes_on_where_a_step_leads_nowhere_and_its_change_counts_twice()
         balance = with_stiffness(problem.balance(more.support))
         residual = balance.linearise(balance.unknowns(more.coefficients), more.omega).residual
         assert np.max(np.abs(residual)) < 1e-9
-        found, plain, better = stability(problem, point), *(as_solved(problem, p) for p in (point, more))  # fmt: skip
+        found, plain, better = stability(problem, point), *(as_solved(problem, p) for p in (point, more))
         change = abs(better.floquet.multipliers[0] - plain.floquet.multipliers[0])
         # of two of a pair either may be the partner
         assert found.errors[0] <= FARTHER * change * (1.0 + 1e-9)
@@ -199,7 +205,9 @@ def test_newton_goes_on_where_a_step_leads_nowhere_and_its_change_counts_twice()
 def test_the_reason_names_the_multiplier_and_its_error():
     found = stability(*solved(0.1, 1.1, 11))
     assert found.multiplier == np.max(np.abs(found.floquet.multipliers))
-    assert found.reason.startswith(f"the largest multiplier that is not neutral has the modulus {found.multiplier:.4g} ± ")  # fmt: skip
+    assert found.reason.startswith(
+        f"the largest multiplier that is not neutral has the modulus {found.multiplier:.4g} ± "
+    )
     first = np.arange(found.errors.size) == 0
     wide = replace(found, errors=np.where(first, 0.5, 0.0), moduli=None)
     assert (wide.multiplier, wide.multiplier_error) == (found.multiplier, 0.5)
@@ -231,7 +239,7 @@ def test_a_growth_with_an_error_of_its_own_size_is_undecided():
     found = replace(stability(*solved(0.1, 1.1, 11)), moduli=None)
     first = np.arange(found.errors.size) == 0
     large = replace(found.floquet, multipliers=np.where(first, -58.6, 0.1))
-    for error, verdict in ((20.0, "unstable"), (29.0, "unstable"), (29.5, "undecided"), (55.1, "undecided")):  # fmt: skip
+    for error, verdict in ((20.0, "unstable"), (29.0, "unstable"), (29.5, "undecided"), (55.1, "undecided")):
         wide = np.where(first, error, 0.0)
         assert replace(found, floquet=large, errors=wide).verdict == verdict
     # another multiplier may show it all the same
@@ -275,7 +283,9 @@ def test_multipliers_do_not_depend_on_units_nor_on_the_time_of_the_load():
         shifted[[2 * h - 1, 2 * h]] = np.array([[c, s], [-s, c]]) @ gaps[[2 * h - 1, 2 * h]]
     found = motion_stability(structure, interface, shifted, 0.8).floquet.multipliers
     assert matched(found, expected) < 1e-10
-    kilo = replace(structure, mass=1e3 * structure.mass, damping=1e3 * structure.damping, stiffness=1e3 * structure.stiffness)  # fmt: skip
+    kilo = replace(
+        structure, mass=1e3 * structure.mass, damping=1e3 * structure.damping, stiffness=1e3 * structure.stiffness
+    )
     heavy = replace(interface, weights=np.full(2, 1e3))
     assert matched(motion_stability(kilo, heavy, gaps, 0.8).floquet.multipliers, expected) < 1e-10
 
@@ -307,9 +317,10 @@ MARCHED = {
     "Bouc-Wen": (BoucWen(k_t=1.5, beta=0.5, gamma=0.2), lambda x, v, z: 1.5 * z, bouc_wen_rate),
     "regularised": (
         RegularisedCoulomb(mu=0.4, transition_velocity=0.3, preload=2.0),
-        lambda x, v, z: 0.8 * np.tanh(v / 0.3), lambda z, x, v: 0.0,
+        lambda x, v, z: 0.8 * np.tanh(v / 0.3),
+        lambda z, x, v: 0.0,
     ),
-}  # fmt: skip
+}
 
 
 def smooth_multipliers(structure, row, motion, omega, force, rate, small=1e-3):
@@ -330,10 +341,10 @@ def smooth_multipliers(structure, row, motion, omega, force, rate, small=1e-3):
         return [rate(z[0], x, v)]
 
     def image(y):
-        return solve_ivp(flow, (0.0, period), y, method="DOP853", rtol=1e-9, atol=1e-12, max_step=0.2).y[:, -1]  # fmt: skip
+        return solve_ivp(flow, (0.0, period), y, method="DOP853", rtol=1e-9, atol=1e-12, max_step=0.2).y[:, -1]
 
     def drift(z):
-        return solve_ivp(settling, (0.0, period), [z], method="DOP853", rtol=1e-9, max_step=0.2).y[0, -1] - z  # fmt: skip
+        return solve_ivp(settling, (0.0, period), [z], method="DOP853", rtol=1e-9, max_step=0.2).y[0, -1] - z
 
     z = brentq(drift, -1.42, 1.42) if drift(1.0) else 0.0
     columns = []
@@ -375,11 +386,9 @@ def test_sampled_and_located_contacts_go_together():
     friction = LAWS["lift-off"]()
     springs = (CubicSpring(k_t=0.9, k_w=0.5, k_n=0.4), Bonded(k_t=0.9, k_w=0.5, k_n=0.4))
     sampled, located = (
-        motion_stability(
-            structure, Interface(("a", "b"), (friction, law), operator, np.array([0.7, 1.3])), gaps, 0.8
-        )
+        motion_stability(structure, Interface(("a", "b"), (friction, law), operator, np.array([0.7, 1.3])), gaps, 0.8)
         for law in springs
-    )  # fmt: skip
+    )
     assert located.resting == 2
     assert (sampled.transitions, sampled.resting) == (located.transitions, 0)
     assert matched(sampled.floquet.multipliers, located.floquet.multipliers) < 1e-9
@@ -388,7 +397,7 @@ def test_sampled_and_located_contacts_go_together():
 @pytest.mark.parametrize("law", ["variable normal force", "lift-off", "lift-off into stick"])
 def test_planar_friction_along_a_line_is_that_of_a_spring_along_it(law):
     rng = np.random.default_rng(3)
-    structure, operator, gaps = random_structure(rng, 3), rng.standard_normal((6, 3)), random_gaps(rng, 2, 3)  # fmt: skip
+    structure, operator, gaps = random_structure(rng, 3), rng.standard_normal((6, 3)), random_gaps(rng, 2, 3)
     operator[[1, 4]], gaps[:, [1, 4]] = 0.0, 0.0
     spring = replace(LAWS[law](), k_w=0.0)
     planar = CoupledCoulomb(k_t=spring.k_t, k_n=spring.k_n, mu=spring.mu, preload=spring.preload)
@@ -404,7 +413,7 @@ def test_planar_friction_along_a_line_is_that_of_a_spring_along_it(law):
 
 
 def one_mass(damping=0.05):
-    structure = Structure(np.eye(1), np.array([[damping]]), np.eye(1), Dofs(np.arange(1), ("x",), np.zeros((1, 3))))  # fmt: skip
+    structure = Structure(np.eye(1), np.array([[damping]]), np.eye(1), Dofs(np.arange(1), ("x",), np.zeros((1, 3))))
     gaps = np.zeros((3, 3))
     gaps[1, 0] = 2.7
     return structure, np.array([[1.0], [0.0], [0.0]]), gaps
@@ -424,9 +433,7 @@ def test_steep_friction_takes_velocity_where_that_passes_zero(velocity):
     assert found.error < 5e-4
 
 
-@pytest.mark.parametrize(
-    ("law", "states"), [(Dahl(k_t=1.0, limit=0.5), 2), (BoucWen(k_t=1.5, beta=0.5, gamma=0.2), 2)]
-)
+@pytest.mark.parametrize(("law", "states"), [(Dahl(k_t=1.0, limit=0.5), 2), (BoucWen(k_t=1.5, beta=0.5, gamma=0.2), 2)])
 def test_a_tangent_without_stiffness_adds_no_multiplier(law, states):
     structure, operator, gaps = one_mass()
     found = motion_stability(structure, Interface(("a",), (law,), operator), gaps, 1.1)

@@ -30,10 +30,7 @@ def stopped(sweep: Sweep):
     structure = Structure(np.eye(1), DAMPING * np.eye(1), np.eye(1), numbered_dofs(1))
     stop = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=20.0, mu=0.0, preload=-20.0)
     contact = Interface(("stop",), (stop,), np.array([[0.0], [0.0], [-1.0]]))
-    system, load = (
-        System(structure, contact, np.array([0])),
-        HarmonicLoad(np.zeros(1), {1: np.array([0.15 + 0j])}),
-    )
+    system, load = (System(structure, contact, np.array([0])), HarmonicLoad(np.zeros(1), {1: np.array([0.15 + 0j])}))
     problem = forced_problem(system, load, sweep)
     points = [p for p, _ in accepted_pairs(list(forced_response(system, load, sweep)))]
     return problem, points
@@ -57,9 +54,7 @@ def test_a_pair_of_one_damped_mass_has_the_modulus_of_its_damping_whatever_its_c
 
 def test_no_motion_is_solved_without_need(monkeypatch):
     """Each motion that is solved with more harmonics has its multipliers taken: none is solved when the verdict is known."""
-    problem, points = stopped(
-        Sweep(omega_range=(0.85, 1.35), points=12, peak_points=0, low=1, high=3)
-    )
+    problem, points = stopped(Sweep(omega_range=(0.85, 1.35), points=12, peak_points=0, low=1, high=3))
     solved, taken = [], []
     more_harmonics, of_point = settled.more_harmonics, settled.of_point
 
@@ -82,22 +77,16 @@ def test_no_motion_is_solved_without_need(monkeypatch):
 
 def test_what_nothing_damps_is_neutral_and_not_integrated_for_long():
     body = ss.model.lumped(np.eye(1), np.eye(1), names=("x",))
-    spring = ss.Contact(
-        between=("p.x", "ground"), law=ss.CubicSpring(cubic_t=1.0), acts="tangential"
-    )
+    spring = ss.Contact(between=("p.x", "ground"), law=ss.CubicSpring(cubic_t=1.0), acts="tangential")
     model = ss.Model(
-        parts={"p": ss.Part(structure=body)}, contacts={"s": spring}, loads={"f": ss.Load(on="p.x", newton=0.1)},
+        parts={"p": ss.Part(structure=body)},
+        contacts={"s": spring},
+        loads={"f": ss.Load(on="p.x", newton=0.1)},
         outputs=(ss.Output(name="o", on="p.x"),),
-    )  # fmt: skip
+    )
     result = model.forced_response(hz=(0.19, 0.2546), points=8, high=7)
     data = result["forced_response"]
-    meanings = dict(
-        zip(
-            data.motion_stability.flag_meanings.split(),
-            data.motion_stability.flag_values,
-            strict=True,
-        )
-    )
+    meanings = dict(zip(data.motion_stability.flag_meanings.split(), data.motion_stability.flag_values, strict=True))
     assert set(data.motion_stability.values.tolist()) == {meanings["neutral"]}
     assert "verify_motion" not in data
     assert not any(v.level == "wrong" for v in result.verdicts)
@@ -137,9 +126,7 @@ def test_the_list_of_transitions_does_not_depend_on_where_the_cycle_begins():
     lists = [cycle_of(problem, p) for p in (free, hit)]
     assert lists[0] != lists[1]
     assert [has_transitions(c) for c in lists if c is not None] == [False, True]
-    turned = replace(
-        hit, coefficients=hit.coefficients * np.exp(1j * np.arange(hit.order + 1))[:, None]
-    )
+    turned = replace(hit, coefficients=hit.coefficients * np.exp(1j * np.arange(hit.order + 1))[:, None])
     assert cycle_of(problem, turned) == lists[1]
 
 
@@ -156,13 +143,13 @@ def test_the_sign_of_the_determinant_follows_from_the_tangent():
 def two_folds() -> ss.Result:
     """The response of one mass with a stop that folds twice and runs backwards between."""
     body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), np.eye(1), names=("m",))
-    stop = ss.Contact(
-        between=("b.m", "ground"), law=ss.UnilateralSpring(k_n=5e3, initial_gap=1e-3), acts="normal"
-    )
+    stop = ss.Contact(between=("b.m", "ground"), law=ss.UnilateralSpring(k_n=5e3, initial_gap=1e-3), acts="normal")
     model = ss.Model(
-        parts={"b": ss.Part(structure=body)}, contacts={"stop": stop}, loads={"f": ss.Load(on="b.m", newton=2.0)},
+        parts={"b": ss.Part(structure=body)},
+        contacts={"stop": stop},
+        loads={"f": ss.Load(on="b.m", newton=2.0)},
         outputs=(ss.Output(name="m", on="b.m"),),
-    )  # fmt: skip
+    )
     return model.forced_response(hz=(16.5, 18.5))
 
 
@@ -178,9 +165,7 @@ def test_an_unstable_stretch_is_an_answer_and_marks_no_case(tmp_path):
     assert set(branch.motion_stability.values[: back[0]].tolist()) == {0}
     assert int(data.case_verdict.values[0]) == 0
     assert int(data.motion_stability.values[int(data.peak_point.values[0])]) == 0
-    first = next(
-        v for v in result.verdicts if v.level == "trusted" and v.why.startswith("peak with")
-    )
+    first = next(v for v in result.verdicts if v.level == "trusted" and v.why.startswith("peak with"))
     assert ", stable" in first.why
     assert not any(v.level == "wrong" for v in result.verdicts)
     drawn = result.plot("response")
@@ -199,9 +184,7 @@ def with_another_verdict(monkeypatch, order: int, size: float) -> None:
 
 
 @pytest.mark.parametrize(("size", "another"), [(1.2, True), (0.95, False)])
-def test_a_motion_on_the_other_side_of_the_circle_comes_with_its_verdict(
-    monkeypatch, size, another
-):
+def test_a_motion_on_the_other_side_of_the_circle_comes_with_its_verdict(monkeypatch, size, another):
     problem, points = stopped(Sweep(omega_range=(0.95, 1.1), points=4, peak_points=0))
     point = points[-1]
     with_another_verdict(monkeypatch, point.order, size)
@@ -222,10 +205,12 @@ def test_a_motion_on_the_other_side_of_the_circle_comes_with_its_verdict(
 def test_a_point_is_told_by_the_motion_whose_stability_is_told(monkeypatch, fixed):
     """With ``high = "auto"`` that motion takes its place; where a study fixes fewer harmonics the multipliers leave it undecided."""
     body = ss.model.lumped(np.eye(1), np.eye(1), DAMPING * np.eye(1), names=("x",))
-    stop = ss.Contact(between=("body.x", "ground"), law=ss.UnilateralSpring(k_n=20.0, initial_gap=1.0), acts="normal")  # fmt: skip
+    stop = ss.Contact(between=("body.x", "ground"), law=ss.UnilateralSpring(k_n=20.0, initial_gap=1.0), acts="normal")
     model = ss.Model(
-        parts={"body": ss.Part(structure=body)}, contacts={"stop": stop}, loads={"shaker": ss.Load(on="body.x", newton=0.15)},
-    )  # fmt: skip
+        parts={"body": ss.Part(structure=body)},
+        contacts={"stop": stop},
+        loads={"shaker": ss.Load(on="body.x", newton=0.15)},
+    )
     keys = {"hz": [h / (2 * np.pi) for h in (0.95, 1.0, 1.05)]} | ({"high": 3} if fixed else {})
     before = model.forced_response(**keys)["forced_response"]
     most = int(before.order.values.max())

@@ -26,28 +26,11 @@ from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analyses.forced import examination, looked, stable, with_stability
 from stickslip.study.analyses.forced.comparison import Check
-from stickslip.study.analyses.forced.examining import (
-    CARRIED,
-    examined_points,
-    largest,
-    neighbours_of,
-    with_stable_peak,
-)
-from stickslip.study.analyses.forced.in_time import (
-    MOST_TOLD,
-    check_in_time,
-    seconds_in_time,
-    shows_after,
-)
+from stickslip.study.analyses.forced.examining import CARRIED, examined_points, largest, neighbours_of, with_stable_peak
+from stickslip.study.analyses.forced.in_time import MOST_TOLD, check_in_time, seconds_in_time, shows_after
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import ALONE, Question
-from stickslip.study.analyses.forced.stable import (
-    Examined,
-    cost_line,
-    examine,
-    to_integrate,
-    with_motion,
-)
+from stickslip.study.analyses.forced.stable import Examined, cost_line, examine, to_integrate, with_motion
 from stickslip.study.analyses.forced.stable_rules import fewer
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.models.study import read_study
@@ -153,9 +136,7 @@ def test_a_peak_under_friction_is_stable_and_attained() -> None:
     assert "attained" in check.sentence
 
 
-def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     data = dataset(solved(undecided(monkeypatch)))
     peak = at_peak(data)
     assert data.stability_verdict.values[peak] == "stable"
@@ -228,9 +209,7 @@ def test_a_verdict_is_carried_along_only_between_like_points_far_from_the_circle
     assert looked_at(asked, replace(response, peak=-1)) == {}
 
 
-def test_what_the_work_does_not_reach_is_not_examined_but_for_the_peak(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_the_work_does_not_reach_is_not_examined_but_for_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = rubbed()
     response = response_of(asked)
     monkeypatch.setattr("stickslip.study.analyses.forced.examining.ALWAYS_ROWS", 0)
@@ -279,9 +258,7 @@ def test_a_neighbour_of_what_time_attained_is_not_doubted() -> None:
 def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (case,) = read_study(
-        write_shrouded_sector(tmp_path, {"forced_response.stability": '"peak"'})
-    ).cases()
+    (case,) = read_study(write_shrouded_sector(tmp_path, {"forced_response.stability": '"peak"'})).cases()
     monkeypatch.setattr(examination, "MOST_WHEEL", 0.0)
     monkeypatch.setattr(examination, "MOST_HILL", 0.0)
     asked = FORCED_RESPONSE.inputs(case, case.build())
@@ -328,17 +305,13 @@ def test_a_large_wheel_is_not_examined_whatever_waves_it_has(
     assert bool(examination.too_long(wheel, forced=False)) == (n > 30)
 
 
-def test_a_large_wheel_is_examined_by_hills_method_at_its_peak(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_large_wheel_is_examined_by_hills_method_at_its_peak(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twelve sectors of 200 coordinates: what `test_hill` finds of small wheels is asked for in place of all multipliers."""
     small = rubbed()
     response = response_of(small)
     asked = on_a_wheel(small, 200, 20, every=True)
     vars(asked)["problem"] = small.problem  # that of a wheel without gaps cannot be set up
-    monkeypatch.setattr(
-        stable, "settled_stability", lambda *_: pytest.fail("the monodromy was begun")
-    )
+    monkeypatch.setattr(stable, "settled_stability", lambda *_: pytest.fail("the monodromy was begun"))
     outside = Floquet(np.array([1.2 + 0.0j]))
     grown = Stability(outside, np.array([1e-3]), 0, 0, 4)
     wave = WaveDisturbance(1.2 + 0.0j, 9, 1.0, 50.0 * HZ)
@@ -404,12 +377,7 @@ CHECK = Check(180.0, 1.02e-3, 1e-3, settled=True, periods=90, order=5, refined=1
 
 @pytest.mark.parametrize(
     ("motion", "verdict"),
-    [
-        ("attained", "stable"),
-        ("left", "unstable"),
-        ("not periodic", "unstable"),
-        ("not settled", "undecided"),
-    ],
+    [("attained", "stable"), ("left", "unstable"), ("not periodic", "unstable"), ("not settled", "undecided")],
 )
 def test_motions_in_time_decide(motion: str, verdict: str) -> None:
     found = with_motion(EXAMINED, replace(CHECK, motion=motion, scatter=0.02))  # type: ignore[arg-type]
@@ -448,9 +416,7 @@ def test_periods_after_which_a_disturbance_has_shown() -> None:
     assert shows_after(0.0) == 1
     assert shows_after(1.0) == shows_after(float("nan")) == MOST_TOLD
     capped = replace(CHECK, periods=600, motion="attained", shows_after=1000)
-    assert capped.sentence.endswith(
-        "(followed for 600 periods at most, of 1000 in which a disturbance would show)"
-    )
+    assert capped.sentence.endswith("(followed for 600 periods at most, of 1000 in which a disturbance would show)")
 
 
 def invoke(*words: str) -> tuple[int, str]:
@@ -480,7 +446,12 @@ def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
 
 
 def test_a_long_time_is_told_in_hours_and_days() -> None:
-    assert [examination._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == ["8 s", "7000 s", "2 hours", "15 days"]  # fmt: skip
+    assert [examination._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == [
+        "8 s",
+        "7000 s",
+        "2 hours",
+        "15 days",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -498,9 +469,7 @@ def test_the_wave_that_grows_is_named(
 ) -> None:
     structure = Structure(np.eye(2), np.zeros((2, 2)), np.eye(2), numbered_dofs(2))
     whole = TunedWheel(dict.fromkeys(range(12), structure), 12, 5, 2) if wheel else structure
-    asked: Any = SimpleNamespace(
-        problem="problem", model=SimpleNamespace(system=SimpleNamespace(structure=whole))
-    )
+    asked: Any = SimpleNamespace(problem="problem", model=SimpleNamespace(system=SimpleNamespace(structure=whole)))
     found: Any = SimpleNamespace(verdict=verdict, multiplier=1.2)
     grows = None if wave is None else WaveDisturbance(1.2 + 0.0j, wave, 1.0, 50.0 * HZ)
 

@@ -41,9 +41,7 @@ def told(words: list[str]) -> None:
     assert found.exit_code == 0, found.output
 
 
-def test_researcher(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_researcher(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(EXAMPLES)
     code = blocks("researcher", "python")
@@ -60,7 +58,7 @@ def test_researcher(
     assert rows["guarded_alert"] == "400 1.648 mm"
     assert rows["always_high"] == "660 1.648 mm"
     own = re.findall(r"^(\w+): (\d+) unknowns, ([\d.]+) mm$", said, flags=re.MULTILINE)
-    assert [(kind, peak) for kind, _, peak in own] == [("str", "1.648"), ("Unbalanced", "1.648"), ("str", "1.648")]  # fmt: skip
+    assert [(kind, peak) for kind, _, peak in own] == [("str", "1.648"), ("Unbalanced", "1.648"), ("str", "1.648")]
     assert int(own[1][1]) < int(own[2][1])
     assert {p.name for p in tmp_path.iterdir()} >= {"response.html", "strategies.html", "curve.csv"}
 
@@ -116,7 +114,7 @@ def test_the_task_map_has_every_question_and_every_command() -> None:
     assert [name for name in ANALYSES if f"`[{name}]`" not in page] == []
     names = [c.name or c.callback.__name__ for c in app.registered_commands]
     assert [name for name in names if not re.search(rf"`stickslip {name}\b", page)] == []
-    links = re.findall(r"\]\(([^)#]+)\)", page) + [f"../{e}" for e in re.findall(r"`(examples/\w+)`", page)]  # fmt: skip
+    links = re.findall(r"\]\(([^)#]+)\)", page) + [f"../{e}" for e in re.findall(r"`(examples/\w+)`", page)]
     assert [link for link in links if not (ROOT / "docs" / link).exists()] == []
     told_of = page + (ROOT / "docs" / "journeys.md").read_text(encoding="utf-8")
     there = {study.parent.name for study in EXAMPLES.glob("*/study.toml")}

@@ -31,7 +31,7 @@ def judged(n: int, k: float, periods: int) -> np.ndarray:
     def moves(t: float, y: np.ndarray, shut: float) -> np.ndarray:
         u, v = y[:n], y[n:]
         pressed = shut * np.eye(n)[-1] * (PRELOAD - k * u[-1])
-        return np.concatenate([v, inverse @ (force * np.cos(OMEGA * t) - damping @ v - stiffness @ u + pressed)])  # fmt: skip
+        return np.concatenate([v, inverse @ (force * np.cos(OMEGA * t) - damping @ v - stiffness @ u + pressed)])
 
     def meets(t: float, y: np.ndarray, shut: float) -> float:
         return PRELOAD - k * y[n - 1]
@@ -44,7 +44,17 @@ def judged(n: int, k: float, periods: int) -> np.ndarray:
             gap = meets(t, y, 0.0)
             shut = float((gap if abs(gap) > 1e-8 else -y[2 * n - 1]) > 0.0)
             meets.direction = -1.0 if shut else 1.0  # type: ignore[attr-defined]
-            part = solve_ivp(moves, (t, times[-1]), y, "DOP853", rtol=1e-9, atol=1e-11, events=meets, args=(shut,), dense_output=turn == periods - 1)  # fmt: skip
+            part = solve_ivp(
+                moves,
+                (t, times[-1]),
+                y,
+                "DOP853",
+                rtol=1e-9,
+                atol=1e-11,
+                events=meets,
+                args=(shut,),
+                dense_output=turn == periods - 1,
+            )
             if part.sol:
                 seen.append(part.sol(times[(times > t) & (times <= part.t[-1])])[:n].T)
             t, y = part.t[-1], part.y[:, -1]
@@ -91,11 +101,11 @@ def test_what_stays_shut_or_is_too_stiff_for_any_step() -> None:
     structure, gap, _, load, omega = where
     pressed = [ss.UnilateralSpring(k_n=1e6, preload=100.0)]
     held = load_of(1, {1: [1.0]}, [-100.0])
-    shut = with_enough_steps(lambda s: prepared(structure, gap, pressed, held, omega, s), rest(1, pressed), 64)  # fmt: skip
+    shut = with_enough_steps(lambda s: prepared(structure, gap, pressed, held, omega, s), rest(1, pressed), 64)
     assert shut.steps == 64  # never opens, so no step is too long for it
     hard = [ss.UnilateralSpring(k_n=1e9, preload=PRELOAD)]
-    most = with_enough_steps(lambda s: prepared(structure, gap, hard, load, omega, s), rest(1, hard), 64)  # fmt: skip
+    most = with_enough_steps(lambda s: prepared(structure, gap, hard, load, omega, s), rest(1, hard), 64)
     assert most.steps == MOST_STEPS
     contacts = ss.Interface(("stop",), tuple(hard), gap)
-    found = course(structure, contacts, load, omega, np.array([0]), rest(1, hard), steps=4096, least=4, most=4)  # fmt: skip
+    found = course(structure, contacts, load, omega, np.array([0]), rest(1, hard), steps=4096, least=4, most=4)
     assert (found.steps, found.coarse) == (MOST_STEPS, True)

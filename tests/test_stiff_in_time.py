@@ -84,9 +84,14 @@ def balanced(law: ContactLaw, order: int = 61) -> float:
     contacts = ss.Interface(("c",), (law,), gap)
     system = ss.System(structure, contacts, outputs=outputs)
     sweep = ss.Sweep(
-        omega_range=(omega, 1.0001 * omega), low=order, high=order, selection="always_low", frequencies=2,
-        peak_points=0, samples=2048,
-    )  # fmt: skip
+        omega_range=(omega, 1.0001 * omega),
+        low=order,
+        high=order,
+        selection="always_low",
+        frequencies=2,
+        peak_points=0,
+        samples=2048,
+    )
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     assert points[0].converged
     return float(abs(points[0].coefficients[1, 0]))
@@ -105,9 +110,7 @@ def test_stiff_contacts_have_the_amplitude_of_the_balance_at_the_default_step(k:
 @pytest.mark.parametrize("k", [1e3, 1e6, 1e9])
 def test_a_stiff_contact_that_sticks_is_a_constraint(k: float) -> None:
     # two masses, the second held by a contact that never slips: static response, whatever the step makes of its vibration
-    structure = structure_of(
-        np.diag([1.0, 0.01]), np.diag([0.05, 0.001]), np.array([[2.0, -1.0], [-1.0, 1.0]])
-    )
+    structure = structure_of(np.diag([1.0, 0.01]), np.diag([0.05, 0.001]), np.array([[2.0, -1.0], [-1.0, 1.0]]))
     law = ss.Jenkins(k_t=k, limit=1e3)
     gap = np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
     load = load_of(2, {1: [1.0, 0.0]})
@@ -205,9 +208,14 @@ def test_impacts_whose_growth_the_step_does_not_know_have_no_verdict(steps: int)
     law = ss.UnilateralSpring(k_n=142.12168829157827, preload=0.3)
     load = load_of(1, {1: [0.5962442782050664 - 0.5983731712727243j]})
     found = shoot(
-        structure, np.array([[0.0], [0.0], [1.0]]), [law], load, 0.5472870405353577, np.array([0]),
+        structure,
+        np.array([[0.0], [0.0], [1.0]]),
+        [law],
+        load,
+        0.5472870405353577,
+        np.array([0]),
         stepping=TimeStepping(steps, tolerance=1e-8, max_periods=60),
-    )  # fmt: skip
+    )
     assert found.converged
     assert not found.stable
     assert abs(found.floquet.growth - 2.758) <= found.growth_error

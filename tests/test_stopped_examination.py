@@ -68,16 +68,13 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[complex]:
 
 
 def test_points_and_pieces_are_taken_over_and_told(
-    motion: Any,
-    made: list[complex],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
+    motion: Any, made: list[complex], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     problem, point = motion
 
     def examine(_question: Any, accepted: Any, keep: Any) -> Examined:
         found = hill_stability(problem, accepted.point, keep).stability
-        return Examined(accepted.point.omega, found.verdict, found.multiplier, found.multiplier_error, "")  # fmt: skip
+        return Examined(accepted.point.omega, found.verdict, found.multiplier, found.multiplier_error, "")
 
     monkeypatch.setattr(looked, "examine", examine)
     accepted: Any = SimpleNamespace(point=point)
@@ -100,10 +97,7 @@ def test_points_and_pieces_are_taken_over_and_told(
     assert len(made) == nodes + 2 * NODES  # what was at work at each stop
     assert sorted(journal.stored) == ["stability.0", "stability.1"]  # pieces are given up
     (line,) = caplog.messages
-    assert (
-        line
-        == f"stability: {point.omega / HZ:.3f} Hz: 5 pieces are taken over from a run that was stopped"
-    )
+    assert line == f"stability: {point.omega / HZ:.3f} Hz: 5 pieces are taken over from a run that was stopped"
     after = Looked(question, journal)
     assert noted([after(accepted), after(accepted)]) == noted(whole)
     after.tell()

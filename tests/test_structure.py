@@ -32,8 +32,7 @@ def test_join_is_block_diagonal_and_renames_sets(sparse):
     first, second = chain(2, 1.0, 10.0), lumped([2.0], [[5.0]], names=["tip"])
     if sparse:
         first = Structure(
-            *(scipy.sparse.csr_array(m) for m in (first.mass, first.damping, first.stiffness)),
-            first.dofs,
+            *(scipy.sparse.csr_array(m) for m in (first.mass, first.damping, first.stiffness)), first.dofs
         )
     whole = join(a=first, b=second)
     stiffness = whole.stiffness.toarray() if sparse else whole.stiffness
@@ -66,23 +65,14 @@ def test_expand_without_reduction_is_the_identity():
 @pytest.mark.parametrize("part", ["mass", "damping"])
 def test_chain_matrices(part):
     small = chain(3, mass=0.5, stiffness=4.0, damping_factor=0.25)
-    expected = {
-        "mass": 0.5 * np.eye(3),
-        "damping": [[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]],
-    }
+    expected = {"mass": 0.5 * np.eye(3), "damping": [[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]]}
     np.testing.assert_array_equal(getattr(small, part), expected[part])
 
 
 def test_printing_one_says_what_it_is_without_its_matrices():
     """The text of a dataclass would hold all numbers of all matrices."""
     full = chain(12, 1.0, 1.0)
-    full = Structure(
-        full.mass,
-        full.damping,
-        full.stiffness,
-        full.dofs,
-        {"tip": np.array([11]), "all": np.arange(12)},
-    )
+    full = Structure(full.mass, full.damping, full.stiffness, full.dofs, {"tip": np.array([11]), "all": np.arange(12)})
     assert repr(full) == "<Structure: 12 dofs; dense real; sets tip (1), all (12)>"
     small = craig_bampton(full, full.dof_set("tip"), 2)
     expected = "3 dofs; dense real; in other coordinates than the 12 dofs of its model; sets tip (1), modes (2)"
@@ -93,11 +83,6 @@ def test_printing_one_says_what_it_is_without_its_matrices():
         {f"set{i}": np.arange(i) for i in range(30)},
         loss=full.stiffness,
     )
-    assert repr(many).startswith(
-        "<Structure: 12 dofs; sparse complex; structural damping; sets set0 (0), "
-    )
+    assert repr(many).startswith("<Structure: 12 dofs; sparse complex; structural damping; sets set0 (0), ")
     assert repr(many).endswith("set7 (7) and 22 more>")
-    assert (
-        repr(Structure(*(np.eye(1),) * 3, modal_dofs(1)))
-        == "<Structure: 1 dofs; dense real; no sets>"
-    )
+    assert repr(Structure(*(np.eye(1),) * 3, modal_dofs(1))) == "<Structure: 1 dofs; dense real; no sets>"

@@ -31,12 +31,7 @@ def travelling() -> Structure:
     sets = {"tip": np.array([2, 0]), "empty": np.array([], dtype=int), "Nabe ø": np.array([4])}
     basis = scipy.sparse.csr_array(rng.standard_normal((8, 5)) * (1 + 1j))
     return Structure(
-        scipy.sparse.eye_array(5, format="csr"),
-        scipy.sparse.csr_array((5, 5)),
-        stiffness,
-        dofs,
-        sets,
-        basis,
+        scipy.sparse.eye_array(5, format="csr"), scipy.sparse.csr_array((5, 5)), stiffness, dofs, sets, basis
     )
 
 
@@ -146,9 +141,7 @@ def test_python_objects_are_never_loaded(tmp_path):
 
 def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
     header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)}
-    )
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
     with zipfile.ZipFile(tmp_path / "s.npz", "w") as archive:
         archive.writestr("mass.npy", header.getvalue())
     with pytest.raises(InputError, match="8000000000000000 bytes"):

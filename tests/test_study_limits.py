@@ -112,7 +112,12 @@ def test_numbers_that_no_quantity_is_are_refused_by_key(tmp_path: Path, key: str
 
 
 def test_numbers_at_the_limits_run_without_a_fault(tmp_path: Path) -> None:
-    few = {"forced_response.points": "2", "forced_response.peak_points": "0", "harmonics.high": "3", "harmonics.samples": "64"}  # fmt: skip
+    few = {
+        "forced_response.points": "2",
+        "forced_response.peak_points": "0",
+        "harmonics.high": "3",
+        "harmonics.samples": "64",
+    }
     extreme = {
         "forced_response.frequency_hz": "[1e-30, 1e30]",
         "part.chain.masses_kg": "[1e-30, 1.0, 1e30, 1.0]",
@@ -123,20 +128,14 @@ def test_numbers_at_the_limits_run_without_a_fault(tmp_path: Path) -> None:
     assert any(verdict.rank for verdict in outcome.verdicts)  # and nobody is told to trust it
 
 
-@pytest.mark.parametrize(
-    "deck", ["calculix_wheel/wheel.inp", "own_blades/blade.inp", "sector_deck/sector.inp"]
-)
+@pytest.mark.parametrize("deck", ["calculix_wheel/wheel.inp", "own_blades/blade.inp", "sector_deck/sector.inp"])
 @pytest.mark.parametrize("packed", [False, True])
-def test_the_size_of_a_deck_tells_about_how_many_nodes_it_has(
-    deck: str, packed: bool, tmp_path: Path
-) -> None:
+def test_the_size_of_a_deck_tells_about_how_many_nodes_it_has(deck: str, packed: bool, tmp_path: Path) -> None:
     text = (Path(__file__).parent.parent / "examples" / deck).read_bytes()
     keyword, nodes = b"", 0
     for line in text.splitlines():
         keyword = line.upper() if line.startswith(b"*") else keyword
-        nodes += (
-            keyword.startswith(b"*NODE") and not line.startswith(b"*") and b"PRINT" not in keyword
-        )
+        nodes += keyword.startswith(b"*NODE") and not line.startswith(b"*") and b"PRINT" not in keyword
     path = tmp_path / ("deck.inp.gz" if packed else "deck.INP")
     path.write_bytes(gzip.compress(text) if packed else text)
     assert 0.7 < file_nodes(path) / nodes < 1.4  # decks with other columns are off by so much

@@ -10,13 +10,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from small_v2 import (
-    EXAMPLES,
-    write_four_masses,
-    write_shrouded_deck,
-    write_shrouded_sector,
-    write_two_blades,
-)
+from small_v2 import EXAMPLES, write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
 
 from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -96,10 +90,7 @@ def test_every_law_can_be_written_in_a_study(name, tmp_path):
     needed = [key for key, need in keys_of(name, per_area=False).items() if need]
     values = {key: [1.0] if key.startswith("along") else 0.5 for key in needed}
     if name in ("cubic_spring", "polynomial_spring"):
-        values |= {
-            "cubic_spring": {"cubic_normal_n_per_m3": 1.0},
-            "polynomial_spring": {"along_n": [1.0]},
-        }[name]
+        values |= {"cubic_spring": {"cubic_normal_n_per_m3": 1.0}, "polynomial_spring": {"along_n": [1.0]}}[name]
     if name in ("bonded", "jenkins", "iwan", "dahl", "bouc_wen"):
         values["normal_stiffness_n_per_m"] = 1.0
     table = ContactTable.model_validate({"between": ["a.b", "c.d"], "law": name} | values)
@@ -107,34 +98,21 @@ def test_every_law_can_be_written_in_a_study(name, tmp_path):
 
 
 def test_an_iwan_law_has_its_population():
-    given = {
-        "between": ["a.b", "c.d"],
-        "law": "iwan",
-        "tangential_stiffness_n_per_m": 1.0,
-        "slip_limit_n": 1.0,
-    }
+    given = {"between": ["a.b", "c.d"], "law": "iwan", "tangential_stiffness_n_per_m": 1.0, "slip_limit_n": 1.0}
     made = ContactTable.model_validate(
         given | {"population": {"kind": "four_parameter", "chi": -0.5, "beta": 0.1, "sliders": 5}}
     ).library()
     assert made.population == FourParameter(chi=-0.5, beta=0.1, n_sliders=5)
     assert ContactTable.model_validate(given).library() == Iwan(k_t=1.0, limit=1.0)
-    with pytest.raises(
-        ValidationError, match=r"is not known, got 'four_paramter'. Did you mean 'four_parameter'"
-    ):
+    with pytest.raises(ValidationError, match=r"is not known, got 'four_paramter'. Did you mean 'four_parameter'"):
         ContactTable.model_validate(given | {"population": {"kind": "four_paramter"}})
-    with pytest.raises(
-        ValidationError, match=r"is no parameter of the law jenkins.*it belongs to iwan"
-    ):
-        ContactTable.model_validate(
-            given | {"law": "jenkins", "population": {"kind": "uniform_band"}}
-        )
+    with pytest.raises(ValidationError, match=r"is no parameter of the law jenkins.*it belongs to iwan"):
+        ContactTable.model_validate(given | {"law": "jenkins", "population": {"kind": "uniform_band"}})
 
 
 def test_the_schema_lists_tables_and_keys():
     schema = json.loads(json_schema())
-    assert {"part", "contact", "load", "vary", "forced_response", "modes"} <= set(
-        schema["properties"]
-    )
+    assert {"part", "contact", "load", "vary", "forced_response", "modes"} <= set(schema["properties"])
     assert "friction_coefficient" in schema["$defs"]["Contact"]["properties"]
     assert schema["$defs"]["FlatCurved"]["properties"]["mass_kg"]["exclusiveMinimum"] == 0
     described = [p for d in schema["$defs"].values() for p in d.get("properties", {}).values()]
@@ -143,12 +121,7 @@ def test_the_schema_lists_tables_and_keys():
 
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
-    folders = {
-        "blades": "two_blades",
-        "sector": "shrouded_sector",
-        "wheel": "friction_ring",
-        "masses": "four_masses",
-    }
+    folders = {"blades": "two_blades", "sector": "shrouded_sector", "wheel": "friction_ring", "masses": "four_masses"}
     if kind in folders:
         written = (EXAMPLES / folders[kind] / "study.toml").read_text(encoding="utf-8")
         own, head = example_text(kind), written.partition("[vary]")[0]
@@ -170,8 +143,7 @@ def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "most"),
-    [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80), ("root_joint", 60)],
+    ("name", "most"), [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80), ("root_joint", 60)]
 )
 def test_the_examples_are_short_and_good(name, most):
     path = EXAMPLES / name / "study.toml"
@@ -222,10 +194,7 @@ def test_a_law_and_its_share_reach_the_model(tmp_path):
 def test_a_friction_coefficient_that_varies_meshes_nothing_again(tmp_path):
     path = write_two_blades(tmp_path, {"vary.contact.flat.friction_coefficient": "[0.3]"})
     study = read_study(path)
-    first, other = (
-        study.model(),
-        study.replace({"contact.curved.friction_coefficient": 0.1}).model(),
-    )
+    first, other = (study.model(), study.replace({"contact.curved.friction_coefficient": 0.1}).model())
     assert first.parts["blades"] is other.parts["blades"]
     assert other.contacts["curved"].law.mu == 0.1
     coarser = study.replace({"part.blades.foot_size_m": 0.02})
@@ -237,12 +206,7 @@ def test_what_a_model_depends_on_changes_its_digest_and_nothing_else_does(tmp_pa
     path = write_shrouded_deck(tmp_path)
     study = read_study(path)
     digest = study.cases()[0].digest
-    same = {
-        "title": "another",
-        "modes.number": 3,
-        "output.folder": "elsewhere",
-        "limits.work_s": 100.0,
-    }
+    same = {"title": "another", "modes.number": 3, "output.folder": "elsewhere", "limits.work_s": 100.0}
     assert study.replace(same).cases()[0].digest == digest
     for key, value in {"rotation.speed_rpm": 1.0, "contact.shroud.gap_m": 1e-6}.items():
         other = {key: value} | ({"contact.shroud.preload_n": 0.0} if "gap" in key else {})
@@ -288,12 +252,27 @@ WRONG = [
         {"contact.flat.slip_limit_n": "3.0"},
         "contact.flat.slip_limit_n: is no parameter of the law elastic_coulomb, got 3.0; it belongs to jenkins",
     ),
-    ({"contact.flat.law": '"jenkins"'}, "contact.flat.slip_limit_n: is missing, the law jenkins needs it. Add it: friction force"),
-    ({"contact.flat.law": '"elastic_coulom"'}, "contact.flat.law: is not known, got 'elastic_coulom'. Did you mean 'elastic_coulomb'?"),
-    ({"contact.flat.friction_coefficient": "-0.1"}, "contact.flat.friction_coefficient: must be greater than or equal to 0, got -0.1."),
+    (
+        {"contact.flat.law": '"jenkins"'},
+        "contact.flat.slip_limit_n: is missing, the law jenkins needs it. Add it: friction force",
+    ),
+    (
+        {"contact.flat.law": '"elastic_coulom"'},
+        "contact.flat.law: is not known, got 'elastic_coulom'. Did you mean 'elastic_coulomb'?",
+    ),
+    (
+        {"contact.flat.friction_coefficient": "-0.1"},
+        "contact.flat.friction_coefficient: must be greater than or equal to 0, got -0.1.",
+    ),
     ({"contact.flat.per": '"area"'}, "Give normal_stiffness_n_per_m3, or another per."),
-    ({"contact.flat.between": '["damper.flat", "blades.underside_3"]'}, "there is no surface or set 'blades.underside_3'. Did you mean 'blades.underside_2'?"),
-    ({"contact.flat.between": '["damber.flat", "blades.underside_1"]'}, "contact.flat.between: there is no part 'damber'. Did you mean 'damper'?"),
+    (
+        {"contact.flat.between": '["damper.flat", "blades.underside_3"]'},
+        "there is no surface or set 'blades.underside_3'. Did you mean 'blades.underside_2'?",
+    ),
+    (
+        {"contact.flat.between": '["damber.flat", "blades.underside_1"]'},
+        "contact.flat.between: there is no part 'damber'. Did you mean 'damper'?",
+    ),
     ({"contact.flat.between": '["damper.flat", "next.blades.underside_1"]'}, "'blades' is no sector of a wheel"),
     ({"contact.flat.between": '["ground", "blades.underside_1"]'}, "Give ['blades.underside_1', 'ground']."),
     ({"load.shaker.ratio_of": '"load.pul"'}, "load.shaker.ratio_of: 'load.pul' is no load. Did you mean 'load.pull'?"),
@@ -301,54 +280,106 @@ WRONG = [
     ({"load.shaker.direction": '"q"'}, "load.shaker.direction: is no direction, got 'q'."),
     ({"load.shaker.harmonic": "0"}, "forced_response: has no harmonic load to respond to."),
     ({"load.shaker.harmonic": "2", "harmonics.low": "1"}, "load.shaker.harmonic: 2 is not kept by harmonics.low = 1."),
-    ({"load.shaker.force_n": "3.0"}, "load.shaker.force_n: needs one of force_n, ratio_of and pressure, got force_n and ratio_of."),
-    ({"part.blades.pitch_m": "-1.0"}, "part.blades.pitch_m: must be greater than 0, got -1.0. It means: distance of the two blades along x in m"),
-    ({"part.blades.shape": '"prism_blade"'}, "part.blades.shape: is not known, got 'prism_blade'. Did you mean 'prism_blades'?"),
+    (
+        {"load.shaker.force_n": "3.0"},
+        "load.shaker.force_n: needs one of force_n, ratio_of and pressure, got force_n and ratio_of.",
+    ),
+    (
+        {"part.blades.pitch_m": "-1.0"},
+        "part.blades.pitch_m: must be greater than 0, got -1.0. It means: distance of the two blades along x in m",
+    ),
+    (
+        {"part.blades.shape": '"prism_blade"'},
+        "part.blades.shape: is not known, got 'prism_blade'. Did you mean 'prism_blades'?",
+    ),
     ({"part.blades.pich_m": "0.05"}, "part.blades.pich_m: unknown key 'pich_m'. Did you mean 'pitch_m'?"),
     ({"part.blades.hub_chord_m": "0.2"}, "part.blades.hub_chord_m: the airfoil's hub section"),
-    ({"part.blades.nodes_at": '["damper.flt"]'}, "part.blades.nodes_at: there is no surface 'damper.flt' of a flat_curved part. Did you mean 'damper.flat'?"),
+    (
+        {"part.blades.nodes_at": '["damper.flt"]'},
+        "part.blades.nodes_at: there is no surface 'damper.flt' of a flat_curved part. Did you mean 'damper.flat'?",
+    ),
     ({"part.damper.mass_kg": "0.0"}, "part.damper.mass_kg: must be greater than 0, got 0.0."),
-    ({"material.young_modulus_pa": "210.0"}, "material.young_modulus_pa: no solid has 210 Pa, which is 2.1e+11 Pa if it is in GPa."),
+    (
+        {"material.young_modulus_pa": "210.0"},
+        "material.young_modulus_pa: no solid has 210 Pa, which is 2.1e+11 Pa if it is in GPa.",
+    ),
     ({"output.peak": '"tip1.q"'}, "output.peak: there is no output 'tip1.q'. Did you mean 'tip1.z'?"),
     ({"output.folder": '"../out"'}, "output.folder: must be a folder inside the study's folder"),
-    ({"forced_response.frequency_hz": "[207.0, 185.0]"}, "forced_response.frequency_hz: must be the lower before the higher"),
+    (
+        {"forced_response.frequency_hz": "[207.0, 185.0]"},
+        "forced_response.frequency_hz: must be the lower before the higher",
+    ),
     ({"campbell.speeds_rpm": "[0.0, 1.0]"}, "campbell.engine_orders: is missing. Add it: engine orders"),
-    ({"schema_version": "1"}, "schema_version: this version of stickslip reads 2, got 1. The tables have changed: [blades]"),
+    (
+        {"schema_version": "1"},
+        "schema_version: this version of stickslip reads 2, got 1. The tables have changed: [blades]",
+    ),
     ({"schema_version": "3"}, "Write schema_version = 2, or install the stickslip that the file was written for."),
     ({"load.pull.force_n": "nan"}, "load.pull.force_n: must be a finite number, got nan."),
     ({"materiel.density_kg_per_m3": "1.0"}, "materiel: unknown key 'materiel'. Did you mean 'material'?"),
     ({"part.blades.platform_gap_m": '"1 mm"'}, "part.blades.platform_gap_m: must be a number, got '1 mm'."),
     ({"reduction.fixed_interface_modes": "2.5"}, "reduction.fixed_interface_modes: must be a whole number, got 2.5."),
     ({"forced_response.peak_points": "true"}, "forced_response.peak_points: must be a whole number, got True."),
-    ({"harmonics.selection": '"always_hihg"'}, "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?"),
+    (
+        {"harmonics.selection": '"always_hihg"'},
+        "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?",
+    ),
     ({"solver.evaluator": '"event"'}, "solver.evaluator: is not known, got 'event'. Did you mean 'events'?"),
-    ({"harmonics.low": "7", "harmonics.high": "5"}, "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low."),
-    ({"harmonics.samples": "32", "harmonics.high": "5"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
-    ({"harmonics.low": "9"}, "harmonics.samples: must be at least 8 times low = 9, got 64. Give at least 72, better 128."),
-    ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times the harmonic 5 that high = 'auto' begins with, got 32. Give at least 40, better 64."),
-    ({"forced_response.stability": '"yes"'}, "forced_response.stability: is not known, got 'yes'. Known: all, auto, off, peak. It means: whether a disturbance dies"),
-    ({"harmonics.alert_over": '"contact"'}, "harmonics.alert_over: must be answer, along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?"),
-    ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"}, "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two"),
+    (
+        {"harmonics.low": "7", "harmonics.high": "5"},
+        "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low.",
+    ),
+    (
+        {"harmonics.samples": "32", "harmonics.high": "5"},
+        "harmonics.samples: must be at least 8 times high = 5, got 32.",
+    ),
+    (
+        {"harmonics.low": "9"},
+        "harmonics.samples: must be at least 8 times low = 9, got 64. Give at least 72, better 128.",
+    ),
+    (
+        {"harmonics.samples": "32"},
+        "harmonics.samples: must be at least 8 times the harmonic 5 that high = 'auto' begins with, got 32. Give at least 40, better 64.",
+    ),
+    (
+        {"forced_response.stability": '"yes"'},
+        "forced_response.stability: is not known, got 'yes'. Known: all, auto, off, peak. It means: whether a disturbance dies",
+    ),
+    (
+        {"harmonics.alert_over": '"contact"'},
+        "harmonics.alert_over: must be answer, along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?",
+    ),
+    (
+        {"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"},
+        "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two",
+    ),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6]"}, "part.damper.inertia_kg_m2: has the wrong number of entries"),
-    ({"part.damper.flat_distances_m": "[0.0075, -0.0050]"}, "part.damper.flat_distances_m[1]: must be greater than 0, got -0.005."),
+    (
+        {"part.damper.flat_distances_m": "[0.0075, -0.0050]"},
+        "part.damper.flat_distances_m[1]: must be greater than 0, got -0.005.",
+    ),
     ({"part.blades.pitch_m": "0.009"}, "part.blades.pitch_m: 0.009 m leaves no room for platforms"),
     ({"part.damper.mass_kg": f'"{"9" * 10_000}"'}, "part.damper.mass_kg: must be a number, got '999"),
     ({"vary.load.shaker.ratios": "[1, 2]"}, "vary.load.shaker.ratios: there is no key 'ratios'. Did you mean 'ratio'?"),
-    ({"vary.part.damber.mass_kg": "[1.0]"}, "vary.part.damber.mass_kg: there is no key 'damber'. Did you mean 'damper'?"),
+    (
+        {"vary.part.damber.mass_kg": "[1.0]"},
+        "vary.part.damber.mass_kg: there is no key 'damber'. Did you mean 'damper'?",
+    ),
     ({"vary.part.blades.mass_kg": "[1.0]"}, "vary.part.blades.mass_kg: there is no key 'mass_kg'."),
     ({"vary.load.shaker.ratio": "[20, -1]"}, "vary.load.shaker.ratio: must be greater than 0, got -1."),
     ({"vary.load.shaker.ratio": "20"}, "vary.load.shaker.ratio: must be a list of values, got 20."),
-    ({"vary.contact.flat.friction_coefficient": "[0.1, 0.2]"}, "must be of one length: contact.flat.friction_coefficient has 2, load.shaker.ratio has 1."),
-]  # fmt: skip
+    (
+        {"vary.contact.flat.friction_coefficient": "[0.1, 0.2]"},
+        "must be of one length: contact.flat.friction_coefficient has 2, load.shaker.ratio has 1.",
+    ),
+]
 
 
 @pytest.mark.parametrize("given", [{"high": 41}, {"low": 41}, {"low": [2], "high": [2, 41]}])
 def test_without_samples_the_harmonics_are_named_that_need_more(given):
     key, value = [*given.items()][-1]
     said = f"needs at least 328 samples of a period.*256 where it is not given, got {re.escape(str(value))}"
-    with pytest.raises(
-        ValidationError, match=rf"{said}.*Add samples = 512, or lower {key}"
-    ) as told:
+    with pytest.raises(ValidationError, match=rf"{said}.*Add samples = 512, or lower {key}") as told:
         Harmonics.model_validate(given)
     assert told.value.errors()[0]["ctx"]["key"] == key
     Harmonics.model_validate(given | {"samples": 512})
@@ -364,21 +395,29 @@ def test_what_is_wrong_is_told_with_file_key_value_and_remedy(changes, said, tmp
 
 def test_all_problems_of_a_file_are_told_at_once(tmp_path):
     path = write_two_blades(
-        tmp_path,
-        {"part.damper.mass_kg": "-1.0", "load.pull.force": "1.0", "contact.flat.law": '"x"'},
+        tmp_path, {"part.damper.mass_kg": "-1.0", "load.pull.force": "1.0", "contact.flat.law": '"x"'}
     )
     assert len(refused(path).splitlines()) == 3
 
 
 WHEEL = [
     ({"load.gas.engine_order": "-1"}, "load.gas.engine_order: must be greater than or equal to 0, got -1."),
-    ({"modes.nodal_diameters": "[0, 5]"}, "modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4."),
-    ({"campbell.nodal_diameters": "[0, 1]"}, "campbell.engine_orders: 2 excites the nodal diameter 2, which is not computed."),
+    (
+        {"modes.nodal_diameters": "[0, 5]"},
+        "modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4.",
+    ),
+    (
+        {"campbell.nodal_diameters": "[0, 1]"},
+        "campbell.engine_orders: 2 excites the nodal diameter 2, which is not computed.",
+    ),
     ({"contact.shroud.between": '["blade.shroud_hgh", "next.blade.shroud_low"]'}, "Did you mean 'blade.shroud_high'?"),
-    ({"contact.shroud.between": '["blade.shroud_high", "next.blade.shroud_lw"]'}, "Did you mean 'next.blade.shroud_low'?"),
+    (
+        {"contact.shroud.between": '["blade.shroud_high", "next.blade.shroud_lw"]'},
+        "Did you mean 'next.blade.shroud_low'?",
+    ),
     ({"part.blade.shroud.span": "1.5"}, "part.blade.shroud.span: must be less than or equal to 1, got 1.5."),
     ({"part.blade.shroud.thickness_m": "1.0"}, "part.blade.shroud.span: 1.0 puts the shroud into the blade's foot."),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("changes", "said"), WHEEL, ids=[said[:50] for _, said in WHEEL])
@@ -388,9 +427,7 @@ def test_what_is_wrong_of_a_wheel_is_told(changes, said, tmp_path):
 
 def test_a_wheel_without_engine_order_is_told_to_have_one(tmp_path):
     path = write_shrouded_sector(tmp_path)
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("engine_order = 2\n", ""), encoding="utf-8"
-    )
+    path.write_text(path.read_text(encoding="utf-8").replace("engine_order = 2\n", ""), encoding="utf-8")
     assert "load.gas.engine_order: is missing on a wheel of 8 sectors." in refused(path)
 
 
@@ -401,10 +438,16 @@ def test_a_file_that_is_not_there_is_told_before_anything_is_read(tmp_path):
 
 
 DECK = [
-    ({"part.blade.sectors": "9"}, "part.blade.sectors: is 9, but the deck's cyclic symmetry has 8. Give sectors = 8, or leave it out."),
+    (
+        {"part.blade.sectors": "9"},
+        "part.blade.sectors: is 9, but the deck's cyclic symmetry has 8. Give sectors = 8, or leave it out.",
+    ),
     ({"part.blade.units": '"mm-t-s"'}, "Correct part.blade.units, or give part.blade.plausible = false where"),
-    ({"part.blade.clamped": '["TIPP"]'}, "part.blade.clamped[0]: the file has no set 'TIPP' of free nodes. Did you mean 'TIP'?"),
-]  # fmt: skip
+    (
+        {"part.blade.clamped": '["TIPP"]'},
+        "part.blade.clamped[0]: the file has no set 'TIPP' of free nodes. Did you mean 'TIP'?",
+    ),
+]
 
 
 @pytest.mark.parametrize(("changes", "said"), DECK, ids=[said[:50] for _, said in DECK])
@@ -418,9 +461,7 @@ def test_what_a_deck_contradicts_is_told_with_keys_of_the_study(changes, said, t
 
 def test_a_speed_of_what_no_speed_changes_is_refused(tmp_path):
     path = write_four_masses(tmp_path, {"rotation.speed_rpm": "100.0"})
-    with pytest.raises(
-        InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh or a rigid body"
-    ):
+    with pytest.raises(InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh or a rigid body"):
         read_study(path)
 
 
@@ -445,9 +486,7 @@ def test_modes_of_waves_of_a_large_sector_are_refused_beforehand(tmp_path):
         study.replace(fine | {"limits.work_s": 1e6})
     told = error.value.problem
     nodes = float(told.partition("some ")[2].partition(" nodes")[0])
-    assert float(told.partition("at ")[2].partition(" GB")[0]) == pytest.approx(
-        waves_gb(nodes), rel=0.05
-    )
+    assert float(told.partition("at ")[2].partition(" GB")[0]) == pytest.approx(waves_gb(nodes), rel=0.05)
     assert waves_gb(nodes) > 1.5 * memory_gb(nodes)
     # what was measured
     for nodes, gigabytes in ((37_683, 4.35), (99_500, 14.9)):
@@ -505,9 +544,7 @@ def test_lists_of_one_table_run_together_and_several_tables_multiply(tmp_path):
 
 def test_a_key_may_be_varied_that_the_file_leaves_out(tmp_path):
     path = write_four_masses(tmp_path, {"vary.contact.stop.preload_n": "[0.0, 1.0]"})
-    path.write_text(
-        path.read_text(encoding="utf-8").replace(", gap_m = 1e-3", ""), encoding="utf-8"
-    )
+    path.write_text(path.read_text(encoding="utf-8").replace(", gap_m = 1e-3", ""), encoding="utf-8")
     assert [c.tables.contact["stop"].preload for c in read_file(path).cases] == [0.0, 1.0]
 
 

@@ -70,10 +70,7 @@ def test_a_support_is_the_full_problem_with_rows_and_columns_struck_out(harmonic
 @pytest.mark.kernel
 def test_structured_support_is_solved_by_iteration():
     omega = 2 * np.pi * 161.0
-    few = replace(
-        balance_of(*blades_and_damper(), order=5).with_harmonics((0, 1, 3, 5)),
-        jacobian="structured",
-    )
+    few = replace(balance_of(*blades_and_damper(), order=5).with_harmonics((0, 1, 3, 5)), jacobian="structured")
     start = np.zeros(few.size)
     start[: few.linear.n] = 1e-2
     solutions = [
@@ -90,9 +87,8 @@ def test_odd_harmonics_suffice_where_the_force_is_odd():
     # a Jenkins spring and a harmonic load: even harmonics vanish by symmetry, so leaving them out changes nothing
     system, load = griffin(0.05)
     sweep = Sweep(
-        omega_range=(0.9, 1.3), low=7, high=7, selection="always_low", frequencies=9, peak_points=0,
-        newton=FINE,
-    )  # fmt: skip
+        omega_range=(0.9, 1.3), low=7, high=7, selection="always_low", frequencies=9, peak_points=0, newton=FINE
+    )
     all_seven = list(forced_response(system, load, sweep))
     odd = list(forced_response(system, load, replace(sweep, low=(1, 3, 5, 7), high=(1, 3, 5, 7))))
     balance = forced_problem(system, load, sweep).low

@@ -23,13 +23,7 @@ def response(low, high, selection, span=HERTZ, count=11, **others):
     """Return problem and points of B6 at equally spaced frequencies."""
     system, load = blades_and_damper()
     sweep = ss.Sweep(
-        omega_range=span,
-        low=low,
-        high=high,
-        selection=selection,
-        frequencies=count,
-        peak_points=0,
-        **others,
+        omega_range=span, low=low, high=high, selection=selection, frequencies=count, peak_points=0, **others
     )
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     return ss.response.forced_problem(system, load, sweep), points

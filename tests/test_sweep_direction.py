@@ -79,10 +79,7 @@ def test_the_jump_beside_folds_is_another_one_downward(steps):
     problem, up = solved(replace(BENT, **steps), lifting)
     down = solved(replace(BENT, direction="down", **steps), lifting)[1]
     up, down = accepted_points(up), accepted_points(down)
-    heights = [
-        np.array([problem.amplitude(p) for p in sorted(points, key=lambda p: p.omega)])
-        for points in (up, down)
-    ]
+    heights = [np.array([problem.amplitude(p) for p in sorted(points, key=lambda p: p.omega)]) for points in (up, down)]
     assert all(p.converged for p in (*up, *down))
     differ = np.flatnonzero(np.abs(heights[0] - heights[1]) > 0.2 * heights[1])
     # neighbours of each other, and the same motion outside

@@ -25,9 +25,7 @@ number = 10
 """
 
 
-@pytest.mark.parametrize(
-    ("follows", "leads", "column"), [("FACE_A", "FACE_B", 1), ("FACE_B", "FACE_A", 2)]
-)
+@pytest.mark.parametrize(("follows", "leads", "column"), [("FACE_A", "FACE_B", 1), ("FACE_B", "FACE_A", 2)])
 def test_faces_that_do_not_match_are_tied_as_calculix_ties_them(
     tmp_path: Path, follows: str, leads: str, column: int
 ) -> None:

@@ -21,11 +21,7 @@ from stickslip.model.matrices import lumped
 from stickslip.operators import array_of
 from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.ladder import without_branch
-from stickslip.response.parameter import (
-    Discretisation,
-    branch_in_parameter,
-    parameter_family,
-)
+from stickslip.response.parameter import Discretisation, branch_in_parameter, parameter_family
 from stickslip.response.resonances.tracking import smallest_peak, track_peak
 from stickslip.response.system import System
 from stickslip.solve.continuation import start_point, trace
@@ -48,11 +44,7 @@ def block(preload: float = 1.0, mu: float = 0.5) -> tuple[System, HarmonicLoad]:
     """A mass that moves in three directions on one contact; it slips at resonance, and lifts off under a small preload."""
     stiffness = np.array([[1.0, 0.1, 0.15], [0.1, 1.3, 0.1], [0.15, 0.1, 1.1]])
     law = ElasticCoulomb(k_t=0.4, k_w=0.3, k_n=0.5, mu=mu, preload=preload)
-    system = System(
-        lumped(np.eye(3), stiffness, 0.03 * stiffness),
-        Interface(("c",), (law,), np.eye(3)),
-        np.arange(3),
-    )
+    system = System(lumped(np.eye(3), stiffness, 0.03 * stiffness), Interface(("c",), (law,), np.eye(3)), np.arange(3))
     return system, HarmonicLoad(np.array([0, 0, -0.2]), {1: np.array([0.2, 0.1j, 0.12])})
 
 
@@ -69,9 +61,7 @@ def duffing() -> tuple[System, HarmonicLoad]:
 def member(system, load, parameter, value, how):
     """The periodic problem at one value, the first output retained."""
     dof = system.outputs[:1]
-    return parameter_family(system, load, parameter, value, lambda s, f: how.balance(s, f, dof))(
-        value
-    )
+    return parameter_family(system, load, parameter, value, lambda s, f: how.balance(s, f, dof))(value)
 
 
 def amplitude(balance, dof, x):
@@ -111,26 +101,23 @@ def test_derivatives_of_the_peak_problem(case, condition):
     driven = Driven(0, (1,))
     problem = PeakProblem(law_field(balance, name), condition, driven, 0.3, 1.1, invert)
     x = without_branch(system, balance, FINE, 1.05).x
-    y = np.append(
-        x + 0.05 * np.max(np.abs(x)) * np.random.default_rng(1).standard_normal(x.size), -0.04
-    )
+    y = np.append(x + 0.05 * np.max(np.abs(x)) * np.random.default_rng(1).standard_normal(x.size), -0.04)
     at = problem.linearise(y, value)
     step = 1e-5
     jac = np.array(
         [
-            (problem.linearise(y + step * e, value).residual - problem.linearise(y - step * e, value).residual) / (2 * step)
+            (problem.linearise(y + step * e, value).residual - problem.linearise(y - step * e, value).residual)
+            / (2 * step)
             for e in np.eye(y.size)
         ]
-    ).T  # fmt: skip
+    ).T
     # differences of differences: 1e-6 of noise in J over a step of 1e-5 leaves four digits in the last row
     scale = np.max(np.abs(jac), axis=1)
     away = np.abs(array_of(at.jac) - jac)
     assert np.all(np.max(away, axis=1) < 1e-3 * scale)
     assert np.max(away[:-1]) < 1e-5 * np.max(scale)
     h = 1e-4 * value
-    by_p = (problem.linearise(y, value + h).residual - problem.linearise(y, value - h).residual) / (
-        2 * h
-    )
+    by_p = (problem.linearise(y, value + h).residual - problem.linearise(y, value - h).residual) / (2 * h)
     assert np.max(np.abs(at.jac_p - by_p)) < 1e-4 * max(np.max(np.abs(by_p)), 1e-3)
 
 
@@ -153,11 +140,7 @@ def test_tracked_peak_of_a_damper_is_that_of_a_dense_sweep(limit):
 
 @pytest.mark.parametrize(
     ("parameter", "values"),
-    [
-        ("mu", (0.5, 0.3, 0.15)),
-        ("preload", (1.0, 0.5, 0.2, 0.0, -0.2)),
-        ("excitation", (1.0, 1.5, 2.0)),
-    ],
+    [("mu", (0.5, 0.3, 0.15)), ("preload", (1.0, 0.5, 0.2, 0.0, -0.2)), ("excitation", (1.0, 1.5, 2.0))],
 )
 def test_tracked_peak_of_a_contact_in_three_directions(parameter, values):
     system, load = block()
@@ -181,9 +164,7 @@ def test_tracked_peak_of_a_contact_in_three_directions(parameter, values):
 def test_tracked_peak_of_a_condensed_output_beside_a_fold():
     system, load = duffing()
     how = Discretisation(order=5, samples=64)
-    points = list(
-        track_peak(system, load, "excitation", (1.0, 2.0, 3.0), (0.5, 0.9), discretisation=how)
-    )
+    points = list(track_peak(system, load, "excitation", (1.0, 2.0, 3.0), (0.5, 0.9), discretisation=how))
     assert all(p.converged and p.is_maximum for p in points)
     # hardening: larger peaks lie at higher frequencies
     assert np.all(np.diff([p.omega for p in points]) > 0.0)
@@ -194,9 +175,7 @@ def test_tracked_peak_of_a_condensed_output_beside_a_fold():
     assert points[0].amplitude == pytest.approx(height, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("ratio", "form"), [(0.03, "dense"), (0.01, "structured"), (0.004, "dense")]
-)
+@pytest.mark.parametrize(("ratio", "form"), [(0.03, "dense"), (0.01, "structured"), (0.004, "dense")])
 def test_a_peak_that_almost_is_a_fold_is_tracked(ratio, form, monkeypatch):
     # the lighter the damping, the nearer the fold: by the frequency the response has no slope there, along itself it has
     system, load = duffing()
@@ -225,10 +204,7 @@ def test_samples_leave_a_peak_with_kinks_that_is_found_all_the_same():
     sampled = replace(exact, evaluator="intervals", samples=128)
     values = (0.2, 0.14)
     one, other = (
-        [
-            p.amplitude
-            for p in track_peak(system, load, "limit", values, (0.8, 1.4), discretisation=d)
-        ]
+        [p.amplitude for p in track_peak(system, load, "limit", values, (0.8, 1.4), discretisation=d)]
         for d in (exact, sampled)
     )
     # second order in 1/samples: (2π/128)² / 12 is 2.0e-4
@@ -263,27 +239,21 @@ def test_phase_quadrature_is_in_quadrature_and_near_the_top():
     how = Discretisation(order=3)
     tops = track_peak(system, load, "mu", values, (0.8, 1.6), discretisation=how)
     for top, point in zip(
-        tops,
-        track_peak(system, load, "mu", values, (0.8, 1.6), "phase_quadrature", discretisation=how),
-        strict=True,
+        tops, track_peak(system, load, "mu", values, (0.8, 1.6), "phase_quadrature", discretisation=how), strict=True
     ):
         assert point.phase == pytest.approx(-np.pi / 2, abs=1e-9)
         assert point.amplitude < top.amplitude  # the horizontal tangent is the maximum
         assert point.amplitude == pytest.approx(top.amplitude, rel=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("case", "parameter", "value"), [(damped, "limit", 0.12), (block, "mu", 0.3)]
-)
+@pytest.mark.parametrize(("case", "parameter", "value"), [(damped, "limit", 0.12), (block, "mu", 0.3)])
 def test_phase_quadrature_is_where_a_dense_sweep_crosses_it(case, parameter, value):
     system, load = case()
     how = Discretisation(order=3)
     start = {"limit": 0.2, "mu": 0.5}[parameter]
     point = list(
-        track_peak(
-            system, load, parameter, (start, value), (0.8, 1.6), "phase_quadrature", discretisation=how
-        )
-    )[-1]  # fmt: skip
+        track_peak(system, load, parameter, (start, value), (0.8, 1.6), "phase_quadrature", discretisation=how)
+    )[-1]
     balance = member(system, load, parameter, value, how)
     n, place = balance.linear.n, int(np.searchsorted(balance.linear.retained, system.outputs[0]))
     omegas = point.omega * (1 + np.linspace(-5e-3, 5e-3, 42))  # 42: none is the tracked one
@@ -305,37 +275,25 @@ def test_phase_quadrature_is_where_a_dense_sweep_crosses_it(case, parameter, val
 
 @pytest.mark.parametrize("by", ["horizontal_tangent", "phase_quadrature"])
 @pytest.mark.parametrize(
-    ("case", "parameter", "value"),
-    [(damped, "limit", 0.12), (block, "mu", 0.35), (block, "excitation", 1.3)],
+    ("case", "parameter", "value"), [(damped, "limit", 0.12), (block, "mu", 0.35), (block, "excitation", 1.3)]
 )
 def test_slope_along_the_curve_of_peaks(case, parameter, value, by):
     system, load = case()
     values = value * np.array([0.999, 1.0, 1.001])
-    points = list(
-        track_peak(
-            system, load, parameter, values, (0.8, 1.6), by, discretisation=Discretisation(order=3)
-        )
-    )
+    points = list(track_peak(system, load, parameter, values, (0.8, 1.6), by, discretisation=Discretisation(order=3)))
     difference = (points[2].amplitude - points[0].amplitude) / (points[2].value - points[0].value)
     assert points[1].slope == pytest.approx(difference, rel=1e-4)
 
 
 def test_smallest_peak_is_the_optimum_of_the_damper():
     system, load = damped()
-    best = smallest_peak(
-        system, load, "limit", (0.1, 0.2), (0.8, 1.4), discretisation=Discretisation(order=1)
-    )
+    best = smallest_peak(system, load, "limit", (0.1, 0.2), (0.8, 1.4), discretisation=Discretisation(order=1))
     # literature benchmark B3, to its printed digits
     assert best.value == pytest.approx(0.138956, abs=5e-7)
     assert best.amplitude == pytest.approx(0.5509002, abs=5e-8)
     assert best.omega == pytest.approx(1.118581, abs=5e-7)
     around = track_peak(
-        system,
-        load,
-        "limit",
-        best.value * np.array([0.98, 1.02]),
-        (0.8, 1.4),
-        discretisation=Discretisation(order=1),
+        system, load, "limit", best.value * np.array([0.98, 1.02]), (0.8, 1.4), discretisation=Discretisation(order=1)
     )
     assert all(p.amplitude > best.amplitude for p in around)
 
@@ -343,11 +301,7 @@ def test_smallest_peak_is_the_optimum_of_the_damper():
 def test_tracking_needs_fewer_evaluations_than_sweeping():
     system, load = damped()
     values = np.linspace(0.3, 0.1, 11)
-    points = list(
-        track_peak(
-            system, load, "limit", values, (0.8, 1.4), discretisation=Discretisation(order=3)
-        )
-    )
+    points = list(track_peak(system, load, "limit", values, (0.8, 1.4), discretisation=Discretisation(order=3)))
     sweep = points[0].evaluations
     assert all(p.converged for p in points)
     assert sum(p.evaluations for p in points[1:]) < 0.25 * sweep * (len(points) - 1)
@@ -360,24 +314,25 @@ def test_tracking_needs_fewer_evaluations_than_sweeping():
 @pytest.mark.parametrize(
     ("parameter", "span"),
     [
-        ("excitation", (0.3, 2.0)), ("static_load", (0.0, 1.0)), ("mu", (1.0, 0.1)), ("preload", (2.0, -0.1)),
-        ("k_n", (0.5, 1.5)), ("k_t", (0.1, 1.0)), ("initial_gap", (-2.0, 0.1)),
+        ("excitation", (0.3, 2.0)),
+        ("static_load", (0.0, 1.0)),
+        ("mu", (1.0, 0.1)),
+        ("preload", (2.0, -0.1)),
+        ("k_n", (0.5, 1.5)),
+        ("k_t", (0.1, 1.0)),
+        ("initial_gap", (-2.0, 0.1)),
     ],
-)  # fmt: skip
+)
 def test_branch_ends_where_a_fresh_solution_lies(parameter, span):
     system, load = block()
     how = Discretisation(order=3)
-    points = list(
-        branch_in_parameter(system, load, parameter, span, 0.9, points=8, discretisation=how)
-    )
+    points = list(branch_in_parameter(system, load, parameter, span, 0.9, points=8, discretisation=how))
     assert all(p.converged for p in points)
     assert (points[0].value, points[-1].value) == span
     balance = member(system, load, parameter, span[1], how)
     x = balance.unknowns(points[-1].coefficients[:, balance.linear.retained])
     assert np.max(np.abs(balance.linearise(x, 0.9).residual)) < 1e-9
-    fresh = newton(
-        lambda v: balance.linearise(v, 0.9), without_branch(system, balance, FINE, 0.9).x, FINE
-    )
+    fresh = newton(lambda v: balance.linearise(v, 0.9), without_branch(system, balance, FINE, 0.9).x, FINE)
     assert fresh.status.converged
     bound = unknowns_bound(x, *(balance.linearise(v, 0.9) for v in (fresh.x, x)))
     assert np.max(np.abs(fresh.x - x)) <= bound
@@ -387,9 +342,7 @@ def test_stuck_contact_answers_in_proportion_to_the_excitation():
     system, load = damped(limit=1e3)
     points = list(branch_in_parameter(system, load, "excitation", (0.5, 2.0), 1.1, points=5))
     first = points[0].coefficients[1, 0] / 0.5
-    assert [p.coefficients[1, 0] / p.value for p in points] == pytest.approx(
-        [first] * len(points), rel=1e-9
-    )
+    assert [p.coefficients[1, 0] / p.value for p in points] == pytest.approx([first] * len(points), rel=1e-9)
 
 
 @pytest.mark.parametrize("first", [0.2, 2.5])
@@ -397,20 +350,14 @@ def test_branch_in_the_excitation_goes_round_folds(first):
     system, load = duffing()
     # above the linear resonance the amplitude over the excitation is S-shaped
     how = Discretisation(order=3, samples=64)
-    points = list(
-        branch_in_parameter(
-            system, load, "excitation", (first, 6.0), 0.72, points=30, discretisation=how
-        )
-    )
+    points = list(branch_in_parameter(system, load, "excitation", (first, 6.0), 0.72, points=30, discretisation=how))
     assert all(p.converged for p in points)
     assert points[-1].value == 6.0
     assert {p.forward for p in points} == {True, False}
     values = np.array([p.value for p in points])
     turns = np.flatnonzero(np.diff(np.sign(np.diff(values))))
     assert turns.size == 2
-    assert (
-        min(values) < 1.6
-    )  # the second fold, which the branch goes back to from wherever it begins
+    assert min(values) < 1.6  # the second fold, which the branch goes back to from wherever it begins
     heights = np.array([abs(p.coefficients[1, 1]) for p in points])
     assert heights[-1] > 3 * heights[0]
 
@@ -422,9 +369,7 @@ def test_a_function_of_the_user_may_vary_anything():
         return block(mu=mu)
 
     ends = [
-        list(branch_in_parameter(system, load, parameter, (0.5, 0.2), 1.0, points=4))[
-            -1
-        ].coefficients
+        list(branch_in_parameter(system, load, parameter, (0.5, 0.2), 1.0, points=4))[-1].coefficients
         for parameter in ("mu", softer)
     ]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)

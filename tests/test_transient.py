@@ -14,44 +14,31 @@ from stickslip.model.matrices import lumped
 from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import LONGEST_MEMORY, remaining_change
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
-from stickslip.response.time.transient import (
-    TimeStepping,
-    TransientResult,
-    integrate,
-)
+from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 
 def griffin(omega: float, stepping: TimeStepping) -> TransientResult:
     law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
     structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
     gap = np.array([[1.0], [0.0], [0.0]])
-    return integrate(
-        structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping
-    )
+    return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
 
 
 def test_linear_response_with_coupled_damping_and_a_stiff_mode_is_exact_at_a_coarse_step() -> None:
     # 50 cycles of the stiff mode fit into one step; its damping settles it within the run.
-    mass, damping = (
-        np.diag([1.0, 2.0, 0.5]),
-        np.array([[0.3, -0.1, 0], [-0.1, 0.4, 0], [0, 0, 60.0]]),
-    )
+    mass, damping = (np.diag([1.0, 2.0, 0.5]), np.array([[0.3, -0.1, 0], [-0.1, 0.4, 0], [0, 0, 60.0]]))
     stiffness = np.array([[3.0, -1.0, 0], [-1.0, 2.0, -0.5], [0, -0.5, 1e8 / 2]])
     structure, omega = structure_of(mass, damping, stiffness), 1.3
     load = load_of(3, {1: [1.0, 0.5j, 0.2], 3: [0.1, 0, -0.3j]}, [0.7, 0, 0.1])
     stepping = TimeStepping(steps_per_period=16, tolerance=1e-11, harmonics=3)
-    result = integrate(
-        structure, np.zeros((0, 3)), [], load, omega, np.arange(3), stepping=stepping
-    )
+    result = integrate(structure, np.zeros((0, 3)), [], load, omega, np.arange(3), stepping=stepping)
     assert result.settled
     assert result.drifting == ()
     for h in range(4):
         force = load.coefficients(3)[h]
         dynamic = stiffness - (h * omega) ** 2 * mass + 1j * h * omega * damping
         # The stiff coordinate answers 1e-8 of the others: hence the absolute tolerance, rounding of the largest one.
-        np.testing.assert_allclose(
-            result.harmonics[h], np.linalg.solve(dynamic, force), rtol=1e-9, atol=1e-12
-        )
+        np.testing.assert_allclose(result.harmonics[h], np.linalg.solve(dynamic, force), rtol=1e-9, atol=1e-12)
 
 
 def test_free_rigid_body_follows_newton() -> None:
@@ -81,9 +68,7 @@ def test_error_of_the_contact_force_is_of_second_order_in_the_step() -> None:
     def mean_error(steps: range) -> float:
         stepping = [TimeStepping(steps_per_period=n, tolerance=1e-7) for n in steps]
         errors = [
-            abs(griffin(w, s).harmonics[1, 0]) / exact - 1
-            for s in stepping
-            for w, exact in GRIFFIN_EXACT.items()
+            abs(griffin(w, s).harmonics[1, 0]) / exact - 1 for s in stepping for w, exact in GRIFFIN_EXACT.items()
         ]
         return float(np.sqrt(np.mean(np.square(errors))))
 
@@ -101,9 +86,7 @@ def test_wedge_damper_where_it_sticks(frequency: float, exact: float) -> None:
     structure, gap, laws, load = wedge()
     omega = 2 * np.pi * frequency
     stuck, start = stuck_motion(structure, gap, laws, load, omega)
-    result = integrate(
-        structure, gap, laws, load, omega, np.array([3]), start, TimeStepping(steps_per_period=64)
-    )
+    result = integrate(structure, gap, laws, load, omega, np.array([3]), start, TimeStepping(steps_per_period=64))
     assert result.settled
     assert abs(result.harmonics[1, 0]) == pytest.approx(exact, rel=3e-7)
     # Stuck contacts are part of the exact propagator: only rounding is left, even at 64 steps a period.
@@ -119,14 +102,10 @@ def test_wedge_damper_where_it_sticks(frequency: float, exact: float) -> None:
         (163.0, 2.273072e-4, 5e-5),
     ],
 )
-def test_wedge_damper_with_slip_and_lift_off(
-    frequency: float, exact: float, tolerance: float
-) -> None:
+def test_wedge_damper_with_slip_and_lift_off(frequency: float, exact: float, tolerance: float) -> None:
     structure, gap, laws, load = wedge()
     stepping = TimeStepping(steps_per_period=512, tolerance=1e-6)
-    result = integrate(
-        structure, gap, laws, load, 2 * np.pi * frequency, np.array([3]), stepping=stepping
-    )
+    result = integrate(structure, gap, laws, load, 2 * np.pi * frequency, np.array([3]), stepping=stepping)
     assert result.settled
     assert result.contact_failures == 0
     assert np.any(result.contact_force[:, 0, 2] == 0.0)  # it lifts off
@@ -141,16 +120,10 @@ def test_work_of_the_load_is_what_dashpots_and_friction_dissipate() -> None:
     x = result.harmonics
     work = np.pi * np.sum((load.harmonics[1] * x[1].conj()).imag)
     orders = np.arange(len(x))
-    dashpots = (
-        np.pi
-        * omega
-        * np.sum(orders**2 * np.einsum("hi,ij,hj->h", x.conj(), structure.damping, x).real)
-    )
+    dashpots = np.pi * omega * np.sum(orders**2 * np.einsum("hi,ij,hj->h", x.conj(), structure.damping, x).real)
     closed_gap = np.vstack([result.gap[-1:], result.gap])
     closed_force = np.vstack([result.contact_force[-1:], result.contact_force])
-    contact = np.sum(
-        (closed_force[1:] + closed_force[:-1]) / 2 * np.diff(closed_gap, axis=0), axis=(0, 2)
-    )
+    contact = np.sum((closed_force[1:] + closed_force[:-1]) / 2 * np.diff(closed_gap, axis=0), axis=(0, 2))
     assert np.all(contact > 0.0)
     assert np.sum(contact) > 0.05 * work  # otherwise this would test the dashpots
     # 512 samples: the trapezoidal sums over the corners of the loops are good to about 1e-4.
@@ -182,9 +155,7 @@ def bounce(steps: int) -> float:
     t = period * np.arange(1, steps + 1) / steps
     since = t - flight
     exact = np.where(
-        t < flight,
-        speed * t - gravity * t**2 / 2,
-        -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi),
+        t < flight, speed * t - gravity * t**2 / 2, -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi)
     )
     return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
 
@@ -207,9 +178,7 @@ def test_slider_takes_hold_where_the_gap_closes() -> None:
     load = load_of(2, {1: [0.0, -heavy * omega**2 * a]})
     gap = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     steps = 202  # a quarter of the period is half way between two samples
-    result = integrate(
-        structure, gap, [law], load, omega, np.arange(2), start, TimeStepping(steps, max_periods=2)
-    )
+    result = integrate(structure, gap, [law], load, omega, np.arange(2), start, TimeStepping(steps, max_periods=2))
     phase = 2 * np.pi * np.arange(1, steps + 1) / steps
     normal = np.maximum(0.0, -k_n * a * np.cos(phase))
     traction = np.minimum(k_t * v / omega * (phase - np.pi / 2), mu * normal) * (normal > 0.0)
@@ -218,9 +187,7 @@ def test_slider_takes_hold_where_the_gap_closes() -> None:
     # The gap is not straight within the step of landing: error k v h (ωh)²/..., far below the k v h/2 of a slider
     # that takes hold at a sample.
     step_travel = k_t * v * 2 * np.pi / omega / steps
-    np.testing.assert_allclose(
-        result.contact_force[:, 0, 0], traction, rtol=0, atol=5e-3 * step_travel
-    )
+    np.testing.assert_allclose(result.contact_force[:, 0, 0], traction, rtol=0, atol=5e-3 * step_travel)
     np.testing.assert_allclose(-result.contact_force[:, 0, 2], normal, rtol=0, atol=1e-6 * k_n * a)
 
 
@@ -230,15 +197,7 @@ def test_steady_slide_is_reported_as_drift_with_the_name_of_the_coordinate() -> 
     structure = structure_of(mass * np.eye(1), c * np.eye(1), np.zeros((1, 1)))
     law = ElasticCoulomb(k_t=1e4, k_w=0.0, k_n=0.0, mu=0.5, preload=2 * limit)
     gap, load = np.array([[1.0], [0.0], [0.0]]), load_of(1, {1: [0.5]}, [pull])
-    result = integrate(
-        structure,
-        gap,
-        [law],
-        load,
-        omega,
-        np.array([0]),
-        stepping=TimeStepping(steps_per_period=256),
-    )
+    result = integrate(structure, gap, [law], load, omega, np.array([0]), stepping=TimeStepping(steps_per_period=256))
     assert result.drift[0] == pytest.approx((pull - limit) / c * 2 * np.pi / omega, rel=1e-4)
     assert result.drifting == ("node0.x",)
 
@@ -250,9 +209,7 @@ def test_a_run_goes_on_where_another_ended() -> None:
     first = integrate(*arguments, stepping=TimeStepping(128, max_periods=18))
     second = integrate(*arguments, first.final, TimeStepping(128, max_periods=12))
     # Differences are roundings, which friction does not amplify.
-    np.testing.assert_allclose(
-        second.outputs, once.outputs, rtol=0, atol=1e-10 * np.max(np.abs(once.outputs))
-    )
+    np.testing.assert_allclose(second.outputs, once.outputs, rtol=0, atol=1e-10 * np.max(np.abs(once.outputs)))
     np.testing.assert_allclose(second.final.states, once.final.states, rtol=0, atol=1e-12)
 
 
@@ -263,18 +220,19 @@ def test_random_systems_move_as_the_judge_with_its_own_law_has_them(seed: int) -
     n, contacts = 9, 2 + seed % 2
     stiffness = random.normal(size=(n, n))
     structure = structure_of(
-        np.diag(random.uniform(0.5, 2.0, n)),
-        0.2 * np.eye(n),
-        stiffness @ stiffness.T + 4.0 * np.eye(n),
+        np.diag(random.uniform(0.5, 2.0, n)), 0.2 * np.eye(n), stiffness @ stiffness.T + 4.0 * np.eye(n)
     )
     gap = random.normal(size=(3 * contacts, n))
     laws = [
         ElasticCoulomb(
-            k_t=random.uniform(1, 5), k_w=random.uniform(0, 5), k_n=random.uniform(1, 8), mu=random.uniform(0.1, 0.6),
+            k_t=random.uniform(1, 5),
+            k_w=random.uniform(0, 5),
+            k_n=random.uniform(1, 8),
+            mu=random.uniform(0.1, 0.6),
             preload=random.uniform(-0.2, 0.6),
         )
         for _ in range(contacts)
-    ]  # fmt: skip
+    ]
     load = load_of(n, {1: list(2 * random.normal(size=n)), 3: list(1j * random.normal(size=n))})
     common = (structure, gap, laws, load, 1.7, np.arange(n))
     ours = integrate(*common, stepping=TimeStepping(512, max_periods=6))
@@ -284,16 +242,11 @@ def test_random_systems_move_as_the_judge_with_its_own_law_has_them(seed: int) -
     assert np.any(force[:, :, 2] == 0.0)
     assert np.any(force[:, :, 2] < 0.0)
     np.testing.assert_allclose(force, theirs.contact_force, rtol=0, atol=1e-8 * np.abs(force).max())
-    np.testing.assert_allclose(
-        ours.outputs, theirs.outputs, rtol=0, atol=1e-9 * np.abs(ours.outputs).max()
-    )
+    np.testing.assert_allclose(ours.outputs, theirs.outputs, rtol=0, atol=1e-9 * np.abs(ours.outputs).max())
 
 
 def test_residual_traction_is_the_start_of_the_springs() -> None:
-    laws = [
-        ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5, preload=4.0, residual_traction=m)
-        for m in (None, -0.25)
-    ]
+    laws = [ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5, preload=4.0, residual_traction=m) for m in (None, -0.25)]
     start = rest(3, laws)
     assert start.displacement.shape == start.velocity.shape == (3,)
     gap = np.vstack([np.eye(3), np.eye(3)])
@@ -315,9 +268,7 @@ def test_average_sees_through_a_mode_that_never_stops_ringing() -> None:
     # Two uncoupled oscillators make one output; the undamped one rings at a frequency that fits no period.
     structure = structure_of(np.eye(2), np.diag([0.5, 0.0]), np.diag([4.0, 30.0]))
     turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    mixed = structure_of(
-        *(turn @ m @ turn.T for m in (structure.mass, structure.damping, structure.stiffness))
-    )
+    mixed = structure_of(*(turn @ m @ turn.T for m in (structure.mass, structure.damping, structure.stiffness)))
     force, omega = np.array([1.0, 0.0]), 1.5
     start = TransientStart(turn @ np.array([0.0, 0.3]), np.zeros(2), ())
     load = HarmonicLoad(np.zeros(2), {1: (turn @ force).astype(complex)})
@@ -406,11 +357,7 @@ def test_contact_equations_without_a_solution_are_counted_as_failed() -> None:
     ("field", "value", "message"),
     [
         ("max_periods", -3, r"TimeStepping\.max_periods: must be at least 2, got -3"),
-        (
-            "steps_per_period",
-            4,
-            r"TimeStepping\.steps_per_period: must lie in \[16, 1e\+07\], got 4",
-        ),
+        ("steps_per_period", 4, r"TimeStepping\.steps_per_period: must lie in \[16, 1e\+07\], got 4"),
         ("tolerance", 0.0, r"TimeStepping\.tolerance: must lie in \(0, 1\), got 0\.0"),
         ("harmonics", 600, r"TimeStepping\.harmonics: 600 are too many for 1024 steps a period"),
     ],
@@ -434,22 +381,13 @@ def test_unusable_arguments_are_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"start\.states: hold \[2\] numbers"):
         integrate(structure, gap, laws, load, 1.0, outputs, rest(6, laws[:1]))
     massless = structure_of(np.diag([1, 1, 1, 1, 0.0, 0.1]), structure.damping, structure.stiffness)
-    with pytest.raises(
-        InputError, match=r"Structure\.mass: is not positive definite .* 0 at node4\.x"
-    ):
+    with pytest.raises(InputError, match=r"Structure\.mass: is not positive definite .* 0 at node4\.x"):
         integrate(massless, gap, laws, load, 1.0, outputs)
 
 
 def test_a_start_of_another_kind_and_too_many_steps_are_refused():
     structure = lumped(np.eye(1), np.eye(1))
-    arguments = (
-        structure,
-        np.zeros((0, 1)),
-        [],
-        HarmonicLoad(np.zeros(1), {1: np.ones(1)}),
-        0.5,
-        np.array([0]),
-    )
+    arguments = (structure, np.zeros((0, 1)), [], HarmonicLoad(np.zeros(1), {1: np.ones(1)}), 0.5, np.array([0]))
     with pytest.raises(InputError, match=r"integrate: start: is a str\. Give a TransientStart"):
         integrate(*arguments, "rest")
     with pytest.raises(InputError, match=r"steps_per_period: must lie in \[16, 1e\+07\]"):

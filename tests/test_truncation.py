@@ -20,13 +20,7 @@ from stickslip.model.structure import join
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.truncation import (
-    FrequencyError,
-    FrequencyErrors,
-    ModesBelow,
-    enough_modes,
-    frequency_errors,
-)
+from stickslip.reduction.truncation import FrequencyError, FrequencyErrors, ModesBelow, enough_modes, frequency_errors
 
 
 @pytest.fixture(scope="module")
@@ -165,12 +159,7 @@ def test_an_error_beyond_reach_is_said_early():
     structure = assemble_solid(wedge(8, cells=(5, 3, 2)), Material())
     told = []
     with pytest.raises(InputError, match=r"1e-06 up to 8000 Hz is not met with 200 modes: .*Keep"):
-        craig_bampton(
-            structure,
-            structure.dof_set("tip")[:9],
-            FrequencyError(1e-6, 8000.0, most=200),
-            say=told.append,
-        )
+        craig_bampton(structure, structure.dof_set("tip")[:9], FrequencyError(1e-6, 8000.0, most=200), say=told.append)
     steps = [int(line.split()[0]) for line in told if "asked for" in line]
     assert len(steps) > 2
     assert steps[-1] < 120
@@ -211,9 +200,7 @@ def test_a_frequency_that_is_missing_is_told(form):
     """Of two bodies only one moves the kept dof: no residual shows the other, 0.3 % above, whose mode is left out."""
     one, other = chain(30, 1.0, 1e4), chain(30, 1.0, 1.006e4)
     twins = join(a=one, b=other)
-    twins = replace(
-        twins, **{name: form(getattr(twins, name)) for name in ("mass", "damping", "stiffness")}
-    )
+    twins = replace(twins, **{name: form(getattr(twins, name)) for name in ("mass", "damping", "stiffness")})
     exact = natural_frequencies(twins, 4)
     squares = scipy.linalg.eigh(one.stiffness, one.mass)
     basis = np.zeros((60, 3))

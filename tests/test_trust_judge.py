@@ -14,7 +14,20 @@ ONE = np.ones(1)
 
 def one_mass(contact: Contact, force: float, damping: float = 0.2) -> Machine:
     """Return a mass of 1 kg on a spring of 1 N/m with one contact to the ground."""
-    return Machine(0, "line", np.eye(1), damping * np.eye(1), np.eye(1), (1,), ("x",), (contact,), np.array([force + 0j]), np.zeros(1), 1, (0.1, 0.2))  # fmt: skip
+    return Machine(
+        0,
+        "line",
+        np.eye(1),
+        damping * np.eye(1),
+        np.eye(1),
+        (1,),
+        ("x",),
+        (contact,),
+        np.array([force + 0j]),
+        np.zeros(1),
+        1,
+        (0.1, 0.2),
+    )
 
 
 def test_a_slider_that_sticks_is_a_spring() -> None:
@@ -74,9 +87,7 @@ def test_the_middle_branch_of_a_hardening_oscillator_is_unstable() -> None:
     machine = one_mass(Contact("cubic", ONE, 0 * ONE, stiffness=1.0), 0.3, damping=0.05)
     omega = 1.6
     judge = Judge(machine, omega)
-    roots = np.roots(
-        [(3 / 4) ** 2, 2 * (3 / 4) * (1 - omega**2), (1 - omega**2) ** 2 + (0.05 * omega) ** 2, -(0.3**2)]
-    )  # fmt: skip
+    roots = np.roots([(3 / 4) ** 2, 2 * (3 / 4) * (1 - omega**2), (1 - omega**2) ** 2 + (0.05 * omega) ** 2, -(0.3**2)])
     sizes = np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9].real))
     assert sizes.size == 3
     largest = []
@@ -113,21 +124,35 @@ def lifting_pad(omega: float) -> tuple[Machine, np.ndarray]:
     """Return two coupled dofs on a pad that opens once in a cycle, and the motion that they settle on."""
     stiffness = np.array([[1.0, 0.3], [0.3, 2.0]])
     pad = Contact(
-        "pad", np.array([1.0, 0.0]), np.array([0.0, 1.0]), stiffness=5.0, normal_stiffness=20.0, friction=0.4, preload=0.1,
-    )  # fmt: skip
+        "pad",
+        np.array([1.0, 0.0]),
+        np.array([0.0, 1.0]),
+        stiffness=5.0,
+        normal_stiffness=20.0,
+        friction=0.4,
+        preload=0.1,
+    )
     machine = Machine(
-        0, "pad", np.eye(2), 0.08 * np.eye(2), stiffness, (1, 1), ("x", "z"), (pad,), np.array([0.2 + 0j, 0.3 + 0.1j]),
-        np.array([0.0, 0.1]), 1, (0.9 * omega / (2 * np.pi), 1.1 * omega / (2 * np.pi)),
-    )  # fmt: skip
+        0,
+        "pad",
+        np.eye(2),
+        0.08 * np.eye(2),
+        stiffness,
+        (1, 1),
+        ("x", "z"),
+        (pad,),
+        np.array([0.2 + 0j, 0.3 + 0.1j]),
+        np.array([0.0, 0.1]),
+        1,
+        (0.9 * omega / (2 * np.pi), 1.1 * omega / (2 * np.pi)),
+    )
     judge, state = Judge(machine, omega), np.zeros(5)
     for _ in range(200):
         state, motion, *_ = judge.flow(state, omega, judge.steps)
     return machine, motion
 
 
-def test_a_landing_that_moves_in_time_counts_in_the_multipliers(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_landing_that_moves_in_time_counts_in_the_multipliers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A slider holds where its pad touches: the map of a period knows this from disturbances within a step as from those over many."""
     machine, motion = lifting_pad(1.7)
     narrow = Judge(machine, 1.7).orbit(motion)

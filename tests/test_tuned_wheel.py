@@ -70,12 +70,7 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
     omega = 0.9
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": normal}
     sweep = ss.Sweep(
-        omega_range=(omega, 1.1),
-        low=order,
-        high=order,
-        selection="always_low",
-        frequencies=2,
-        peak_points=0,
+        omega_range=(omega, 1.1), low=order, high=order, selection="always_low", frequencies=2, peak_points=0
     )
 
     def solved(structure, interface, load):
@@ -132,9 +127,8 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
     system = ss.System(wheel, ss.Interface(("shroud",), (law,), operator), np.arange(wheel.n))
     load = ss.HarmonicLoad(wheel.project(static, 0).real, {1: wheel.project(force, 1)})
     sweep = ss.Sweep(
-        omega_range=(omega, 1.0), low=order, high=order, selection="always_low", frequencies=2,
-        peak_points=0,
-    )  # fmt: skip
+        omega_range=(omega, 1.0), low=order, high=order, selection="always_low", frequencies=2, peak_points=0
+    )
     problem = ss.response.forced_problem(system, load, sweep)
     point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     assert point.converged
@@ -152,9 +146,14 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
             mine = whole.dof_set(f"sector{n}.{side}")
             f[0 if side == "left" else 1, mine] += turn @ rows * (1 if side == "left" else phase)
     moved = integrate(
-        whole, pairs.gap_operator, pairs.laws, ss.HarmonicLoad(f[0].real, {1: f[1]}), omega,
-        whole.dof_set("right"), stepping=TimeStepping(max_periods=600, tolerance=1e-6),
-    )  # fmt: skip
+        whole,
+        pairs.gap_operator,
+        pairs.laws,
+        ss.HarmonicLoad(f[0].real, {1: f[1]}),
+        omega,
+        whole.dof_set("right"),
+        stepping=TimeStepping(max_periods=600, tolerance=1e-6),
+    )
     assert moved.settled
     scale = np.abs(moved.harmonics[1]).max()
     for h in range(4):
@@ -195,14 +194,9 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
     sector, (low, high) = shrouded(5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
     gaps = ss.contact.neighbour_gaps(sector.structure, 5, **place)
-    with pytest.raises(
-        ss.InputError, match=r"keep: lacks node\d+.x, on which .* 3 such dofs in all"
-    ):
+    with pytest.raises(ss.InputError, match=r"keep: lacks node\d+.x, on which .* 3 such dofs in all"):
         ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=low, n_modes=5)
-    assert (
-        ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n
-        == 11
-    )
+    assert ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n == 11
     with pytest.raises(ss.InputError, match="three rows"):
         ss.reduction.tuned_wheel(blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
 
@@ -222,17 +216,15 @@ def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
 
     expected = tuned(ss.craig_bampton)
     np.testing.assert_array_equal(tuned(own).waves[2].stiffness, expected.waves[2].stiffness)
-    assert repr(expected) == (
-        "<TunedWheel: 5 sectors; engine order 2; harmonics 0 to 1; waves 0, 2; 11 coordinates>"
-    )
+    assert repr(expected) == ("<TunedWheel: 5 sectors; engine order 2; harmonics 0 to 1; waves 0, 2; 11 coordinates>")
     wrong = {
         "returned NoneType": lambda wave, first, count: None,
         "first coordinates are not the kept dofs": lambda wave, first, count: ss.craig_bampton(
             wave, first[::-1], count
         ),
         "with a basis of shape": lambda wave, first, count: ss.model.chain(11, 1.0, 1.0),
-        "left 10 coordinates of wave 2 and 11 of wave 0": lambda wave, first, count: (
-            ss.craig_bampton(wave, first, count - np.iscomplexobj(wave.stiffness))
+        "left 10 coordinates of wave 2 and 11 of wave 0": lambda wave, first, count: ss.craig_bampton(
+            wave, first, count - np.iscomplexobj(wave.stiffness)
         ),
     }
     for message, reduce in wrong.items():
@@ -243,7 +235,5 @@ def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
     with pytest.raises(ss.InputError, match="tuned_wheel: keep: is a mask"):
         ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.ones(sector.structure.n, dtype=bool))
     wheel = ss.reduction.reduced_wheel(sector, keep, 5)
-    assert repr(wheel).startswith(
-        "<ReducedWheel: 5 sectors of 11 coordinates; <Structure: 55 dofs;"
-    )
+    assert repr(wheel).startswith("<ReducedWheel: 5 sectors of 11 coordinates; <Structure: 55 dofs;")
     assert repr(sector).startswith("<CyclicSector: one of 5; ")

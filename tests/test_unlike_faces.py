@@ -38,10 +38,7 @@ SECTORS = 6
 
 def ring(mesh, sectors=SECTORS, clamped=(), **others):
     return Model(
-        parts={
-            "ring": solid_part(mesh, STEEL, clamped=clamped, sectors=sectors, cyclic=IN_THE_MEAN)
-        },
-        **others,
+        parts={"ring": solid_part(mesh, STEEL, clamped=clamped, sectors=sectors, cyclic=IN_THE_MEAN)}, **others
     )
 
 
@@ -118,9 +115,7 @@ def test_which_face_follows_changes_little():
     sets["cyclic_low"], sets["cyclic_high"] = sets["cyclic_high"], sets["cyclic_low"]
     order = [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]
     mirrored = SolidMesh(mesh.points * [1, -1, 1], mesh.cells[:, order], sets)
-    one, other = (
-        natural_frequencies(ring(m, clamped=("root",)).at(0.0, 2), 5) for m in (mesh, mirrored)
-    )
+    one, other = (natural_frequencies(ring(m, clamped=("root",)).at(0.0, 2), 5) for m in (mesh, mirrored))
     assert 1e-9 < np.abs(one / other - 1).max() < 0.01
 
 
@@ -140,33 +135,36 @@ def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
     order, speed = 2, 300.0
     mesh = unlike_wedge(5, (1, 1), (2, 1), clamp=True)
     rim = mesh.node_sets["rim"]
-    mesh = replace(
-        mesh, node_sets={**mesh.node_sets, "tip": rim[np.abs(mesh.points[rim, 1]) < 1e-9][:1]}
-    )
-    model = ring(mesh, 5, ("root",),
+    mesh = replace(mesh, node_sets={**mesh.node_sets, "tip": rim[np.abs(mesh.points[rim, 1]) < 1e-9][:1]})
+    model = ring(
+        mesh,
+        5,
+        ("root",),
         contacts={"rim": Contact(between=("ring.rim", "ground"), law=law)},
         loads={"gas": Load(on="ring.tip", newton=2.5e5, direction=(0.3, 0.2, 1), engine_order=order)},
-        outputs=(Output(name="tip", on="ring.tip"),), speed=speed, coriolis=True,
-    )  # fmt: skip
+        outputs=(Output(name="tip", on="ring.tip"),),
+        speed=speed,
+        coriolis=True,
+    )
     damped = replace(model.parts["ring"], damping=Damping(ratio=0.003, between_hz=(300, 3000)))
     model = replace(model, parts={"ring": damped})
     found = assemble(model, 3)
 
     full = damped.damping.of_matrices(model.full(speed), damped.structure.stiffness)
     n = full.n
-    sector = model.neighbours.sector(
-        replace(full, basis=scipy.sparse.eye_array(n, format="csr")), model.coordinates
-    )
+    sector = model.neighbours.sector(replace(full, basis=scipy.sparse.eye_array(n, format="csr")), model.coordinates)
     whole = wheel(sector)
     own = [whole.basis[i * n : (i + 1) * n] for i in range(5)]
     steady = full.stiffness @ model.steady["ring"].displacement(damped, speed)
     force = np.zeros(n, dtype=complex)
-    at = [int(np.flatnonzero((full.dofs.node == mesh.node_sets["tip"][0]) & (np.array(full.dofs.component) == c))[0]) for c in "xyz"]  # fmt: skip
+    at = [
+        int(np.flatnonzero((full.dofs.node == mesh.node_sets["tip"][0]) & (np.array(full.dofs.component) == c))[0])
+        for c in "xyz"
+    ]
     force[at] = 2.5e5 * np.array([0.3, 0.2, 1]) / np.linalg.norm([0.3, 0.2, 1])
     phases = np.exp(2j * np.pi * order * np.arange(5) / 5)
     load = HarmonicLoad(
-        sum(m.T @ steady for m in own),
-        {1: sum(p * (m.T @ force) for p, m in zip(phases, own, strict=True))},
+        sum(m.T @ steady for m in own), {1: sum(p * (m.T @ force) for p, m in zip(phases, own, strict=True))}
     )
     gaps = scipy.sparse.vstack([model.pairs.own @ m for m in own], format="csr")
     points = len(model.pairs.names)

@@ -39,9 +39,7 @@ print(np.max(np.abs(period.coefficients - [0.0, 0.0, 3.0])) < 1e-14)
 
 
 def run(script: Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -60,9 +58,7 @@ def test_own_law_agrees_with_the_built_in_one_and_is_compiled_once(tmp_path):
 
 
 def test_a_law_typed_at_a_prompt_works_without_a_file():
-    done = subprocess.run(
-        [sys.executable, "-c", AT_A_PROMPT], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", AT_A_PROMPT], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "True", done.stderr
 
 

@@ -17,7 +17,12 @@ Results = dict[str, Counter[str]]
 @pytest.fixture
 def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Results:
     """Put two parts of small pieces in place of the real ones; return what these give, which a test may change."""
-    given: Results = {"a": Counter(passed=3), "b": Counter(passed=1, failed=1), "c": Counter(passed=2), "ran": Counter()}  # fmt: skip
+    given: Results = {
+        "a": Counter(passed=3),
+        "b": Counter(passed=1, failed=1),
+        "c": Counter(passed=2),
+        "ran": Counter(),
+    }
 
     def piece(name: str) -> Piece:
         def run(workers: int) -> Counter[str]:
@@ -30,7 +35,7 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Results:
 
     pieces = [piece("a"), piece("b")]
     first = Part("one thing", lambda: pieces, whole=True, notes=lambda: ["a remark"])
-    monkeypatch.setattr(parts, "PARTS", {"first": first, "second": Part("another", lambda: [piece("c")])})  # fmt: skip
+    monkeypatch.setattr(parts, "PARTS", {"first": first, "second": Part("another", lambda: [piece("c")])})
     monkeypatch.setattr(parts, "OUT", tmp_path / "out")
     monkeypatch.setattr(parts, "PAGE", tmp_path / "page.md")
     monkeypatch.setattr(parts, "commit", lambda: "0123abcd")
@@ -69,9 +74,7 @@ def test_what_has_failed_or_was_stopped_runs_again_and_nothing_else(results: Res
     assert results["ran"] == {"a1": 2, "b1": 4}
 
 
-@pytest.mark.parametrize(
-    ("what", "value"), [("commit", lambda: "89abcdef"), ("_files", lambda _one: "others")]
-)
+@pytest.mark.parametrize(("what", "value"), [("commit", lambda: "89abcdef"), ("_files", lambda _one: "others")])
 def test_a_piece_runs_again_on_other_files_or_after_changes(
     results: Results, monkeypatch: pytest.MonkeyPatch, what: str, value: Callable[..., str]
 ) -> None:

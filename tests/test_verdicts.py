@@ -45,19 +45,26 @@ def response(attrs: dict[str, object] | None = None, **changes: object) -> xr.Da
     kept = np.zeros((n, 6), dtype=int)
     kept[:, :2] = 1
     plain = {
-        "point_case": np.zeros(n, dtype=int), "frequency_hz": HZ, "status": np.zeros(n, dtype=int),
-        "refinement": np.zeros(n, dtype=int), "own_error_percent": np.full(n, 1.0),
-    }  # fmt: skip
+        "point_case": np.zeros(n, dtype=int),
+        "frequency_hz": HZ,
+        "status": np.zeros(n, dtype=int),
+        "refinement": np.zeros(n, dtype=int),
+        "own_error_percent": np.full(n, 1.0),
+    }
     amplitude = np.array([1.0, 1.3, 1.6, 1.9, 1.5, 1.2])
     case = {
-        "peak_point": [TOP], "excitation_n": [1.0], "retention_peak_shift": [np.nan], "lowest_hz": [np.nan], "highest_hz": [np.nan],
-    }  # fmt: skip
+        "peak_point": [TOP],
+        "excitation_n": [1.0],
+        "retention_peak_shift": [np.nan],
+        "lowest_hz": [np.nan],
+        "highest_hz": [np.nan],
+    }
     rows = {"verify": "check", "stability": "examined"}
     found: dict[str, object] = {
         "harmonic_kept": (("point", "harmonic"), kept),
         "amplitude": (("point", "output"), np.reshape(changes.pop("amplitude", amplitude), (n, 1))),
         "dissipated_energy": (("point", "contact"), np.reshape(changes.pop("loss", amplitude), (n, 1))),
-    }  # fmt: skip
+    }
     for name, value in (plain | case | changes).items():
         word = name.partition("_")[0]
         dims = rows.get(word, "case" if name in (*case, "known_verdicts") else "point")
@@ -83,13 +90,7 @@ def values(at: int, value: float, rest: float = np.nan, n: int = 6) -> np.ndarra
 
 
 def checked(**row: object) -> dict[str, list[object]]:
-    own = {
-        "case": 0,
-        "frequency_hz": 13.0,
-        "settled": 1,
-        "difference_percent": 0.2,
-        "sentence": "13.0 Hz: so.",
-    }
+    own = {"case": 0, "frequency_hz": 13.0, "settled": 1, "difference_percent": 0.2, "sentence": "13.0 Hz: so."}
     return {f"verify_{name}": [value] for name, value in (own | row).items()}
 
 
@@ -130,8 +131,11 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     assert in_lines(given, every=True) == [str(v) for v in worst_first(given)]
     page = concluded(given, "", bad=True)
     assert [(t.verdict.case, t.likewise) for t in page.shown] == [
-        ("k = 2", "Likewise: k = 4 (12.5 Hz)."), ("k = 5", ""), ("k = 6", ""), ("k = 4", "")
-    ]  # fmt: skip
+        ("k = 2", "Likewise: k = 4 (12.5 Hz)."),
+        ("k = 5", ""),
+        ("k = 6", ""),
+        ("k = 4", ""),
+    ]
     assert [t.verdict.case for t in page.good] == ["k = 1", "k = 3"]
     assert page.kind == "bad"
     assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
@@ -144,9 +148,7 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
 def test_what_a_worse_verdict_says_is_not_said_again_as_a_part_of_a_note() -> None:
     march = "multipliers lie outside the unit circle; in time its amplitude goes from 1 to 2 mm"
     doubtful = Verdict("doubtful", "", 11.0, march, "Give it more time.")
-    note = Verdict(
-        "trusted", "", None, f"the largest motion is unstable; {march}", "See the points."
-    )
+    note = Verdict("trusted", "", None, f"the largest motion is unstable; {march}", "See the points.")
     alone = Verdict("trusted", "", None, f"another is; {march}; and this", "See.")
     told = said_once([doubtful, note, alone, doubtful])
     assert told[0] == told[3] == doubtful
@@ -162,160 +164,286 @@ def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> 
     assert case == "trusted"
     assert set(points) == {"trusted"}
     (only,) = found
-    assert only == Verdict(
-        "trusted", "", 13.0, f"peak with H = 1{NO_STABILITY}, predicted error 1 %"
-    )
+    assert only == Verdict("trusted", "", 13.0, f"peak with H = 1{NO_STABILITY}, predicted error 1 %")
     assert not only.told
 
 
 # changes of a good response, the level of the case, those of the points that are not trusted, and words of its verdict
 RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
-    "not converged": (
-        {"status": values(1, 1, 0)}, "doubtful", {1: "wrong"}, "a larger one may stand among them",
-    ),
-    "none converged": (
-        {"status": np.ones(6, dtype=int), "peak_point": [-1]}, "wrong", {}, "there is no peak",
-    ),
+    "not converged": ({"status": values(1, 1, 0)}, "doubtful", {1: "wrong"}, "a larger one may stand among them"),
+    "none converged": ({"status": np.ones(6, dtype=int), "peak_point": [-1]}, "wrong", {}, "there is no peak"),
     "own error at the peak": (
-        {"own_error_percent": values(TOP, 7.0, 1.0)}, "doubtful", {TOP: "doubtful"}, "predicted to change it by 7 %",
+        {"own_error_percent": values(TOP, 7.0, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
+        "predicted to change it by 7 %",
     ),
     "own error beside the peak": (
-        {"own_error_percent": values(0, 250.0, 1.0)}, "trusted", {0: "doubtful"}, "predicted to change it by over 100 %",
+        {"own_error_percent": values(0, 250.0, 1.0)},
+        "trusted",
+        {0: "doubtful"},
+        "predicted to change it by over 100 %",
     ),
     "never judged": (
-        {"own_error_percent": values(TOP, np.nan, 1.0)}, "doubtful", {TOP: "doubtful"}, "were not examined",
+        {"own_error_percent": values(TOP, np.nan, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
+        "were not examined",
     ),
     "judged by an audit": (
-        {"own_error_percent": values(TOP, np.nan, 1.0), "audit_error_percent": values(TOP, 0.3)}, "trusted", {},
+        {"own_error_percent": values(TOP, np.nan, 1.0), "audit_error_percent": values(TOP, 0.3)},
+        "trusted",
+        {},
         "difference from more harmonics 0.3 %",
     ),
-    "audit": (
-        {"audit_error_percent": values(TOP, 8.0)}, "doubtful", {TOP: "doubtful"}, "it differs by 8 %",
-    ),
+    "audit": ({"audit_error_percent": values(TOP, 8.0)}, "doubtful", {TOP: "doubtful"}, "it differs by 8 %"),
     "audit of an output": (
-        {"audit_error_percent": values(TOP, 8.0), "audit_error_of": np.full(6, "damper.rx")}, "doubtful", {TOP: "doubtful"},
+        {"audit_error_percent": values(TOP, 8.0), "audit_error_of": np.full(6, "damper.rx")},
+        "doubtful",
+        {TOP: "doubtful"},
         "it differs by 8 % in damper.rx",
     ),
-    "no audit": (
-        {"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone",
-    ),
+    "no audit": ({"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone"),
     "no audit of points beside the peak": (
-        {"audit_error_percent": np.full(6, np.nan), "harmonic_kept": many((TOP,))}, "trusted", {}, "at 5 points by predictions alone",
+        {"audit_error_percent": np.full(6, np.nan), "harmonic_kept": many((TOP,))},
+        "trusted",
+        {},
+        "at 5 points by predictions alone",
     ),
     "no audit, as nothing acts on what is left out": (
-        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": np.zeros(6)}, "trusted", {},
+        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": np.zeros(6)},
+        "trusted",
+        {},
         f"peak with H = 1{NO_STABILITY}, exact, as no force acts on the harmonics left out",
     ),
     "no audit, where something acts beside the peak": (
-        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": values(0, 1.0, 0.0)}, "trusted", {},
+        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": values(0, 1.0, 0.0)},
+        "trusted",
+        {},
         "at 1 point by predictions alone",
     ),
     "no audit, but twice the harmonics": (
-        {"audit_error_percent": np.full(6, np.nan), "reference_error_percent": np.ones(6)}, "trusted", {}, "peak with H = 1",
+        {"audit_error_percent": np.full(6, np.nan), "reference_error_percent": np.ones(6)},
+        "trusted",
+        {},
+        "peak with H = 1",
     ),
     "no audit, but integrated": (
-        {"audit_error_percent": np.full(6, np.nan)} | checked(motion="attained"), "trusted", {}, "attained in time",
+        {"audit_error_percent": np.full(6, np.nan)} | checked(motion="attained"),
+        "trusted",
+        {},
+        "attained in time",
     ),
     "twice the harmonics": (
-        {"reference_error_percent": values(TOP, 9.0, 1.0)}, "doubtful", {TOP: "doubtful"}, "amplitude or phase, by 9 %",
+        {"reference_error_percent": values(TOP, 9.0, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
+        "amplitude or phase, by 9 %",
     ),
     "amplitude jumps": (
         {"amplitude": [1.0, 1.3, 1.6, 3.9, 3.5, 3.2], "harmonic_kept": many((3, 4, 5)), "loss": np.ones(6)},
-        "doubtful", {2: "doubtful", 3: "doubtful"}, "between 12.00 and 13.00 Hz (amplitude 2.44 times)",
+        "doubtful",
+        {2: "doubtful", 3: "doubtful"},
+        "between 12.00 and 13.00 Hz (amplitude 2.44 times)",
     ),
     "dissipation jumps": (
-        {"loss": [1.0, 250.0, 260.0, 270.0, 260.0, 250.0]}, "trusted", {0: "doubtful", 1: "doubtful"},
+        {"loss": [1.0, 250.0, 260.0, 270.0, 260.0, 250.0]},
+        "trusted",
+        {0: "doubtful", 1: "doubtful"},
         "between 10.00 and 11.00 Hz (dissipation 250 times)",
     ),
     "fold beside the peak": (
-        {"frequency_hz": np.array([10.0, 11.0, 10.5, 13.0, 14.0, 15.0])}, "trusted", {}, "folds between 10.50 and 11.00",
+        {"frequency_hz": np.array([10.0, 11.0, 10.5, 13.0, 14.0, 15.0])},
+        "trusted",
+        {},
+        "folds between 10.50 and 11.00",
     ),
     "fold at the peak": (
-        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 12.0, 15.0])}, "doubtful", {}, "the peak stands among them",
+        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 12.0, 15.0])},
+        "doubtful",
+        {},
+        "the peak stands among them",
     ),
     "peak beyond the range, round a fold": (
-        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 12.5, 12.0]), "lowest_hz": [10.0], "highest_hz": [12.0]}, "doubtful", {},
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 12.5, 12.0]), "lowest_hz": [10.0], "highest_hz": [12.0]},
+        "doubtful",
+        {},
         "stands at 13.00 Hz, beyond what was asked for (10.00 to 12.00 Hz)",
     ),
     "peak at the end of the range, a fold beyond it": (
-        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 13.5, 12.7]), "lowest_hz": [10.0], "highest_hz": [13.0]}, "doubtful", {},
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 13.5, 12.7]), "lowest_hz": [10.0], "highest_hz": [13.0]},
+        "doubtful",
+        {},
         "stands at the end of the sweep (13.00 Hz)",
     ),
     "peak at the end of the range, a smaller one inside": (
-        {"amplitude": [1.0, 2.0, 1.8, 2.4, 2.3, 2.2], "lowest_hz": [10.0], "highest_hz": [13.0]}, "doubtful", {},
+        {"amplitude": [1.0, 2.0, 1.8, 2.4, 2.3, 2.2], "lowest_hz": [10.0], "highest_hz": [13.0]},
+        "doubtful",
+        {},
         "inside the sweep the largest maximum is 2000 mm at 11.00 Hz",
     ),
     "peak within the range, a fold beyond it": (
-        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 14.2, 14.0]), "lowest_hz": [10.0], "highest_hz": [14.0]}, "trusted", {},
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 14.2, 14.0]), "lowest_hz": [10.0], "highest_hz": [14.0]},
+        "trusted",
+        {},
         "folds between 14.00 and 14.20",
     ),
-    "unstable": (examined("unstable"), "wrong", {TOP: "wrong"}, "a machine does not stay there: unstable: the multiplier is 1.2"),
-    "undecided": (examined("undecided"), "doubtful", {TOP: "doubtful"}, "whether it is stable: undecided: the multiplier"),
-    "stable": (examined("stable"), "trusted", {}, "peak with H = 1, stable, predicted error 1 %"),
-    "stability not examined": (
-        examined("not examined"), "trusted", {}, f"{NO_STABILITY[2:]} (the multiplier is 1.2)",
+    "unstable": (
+        examined("unstable"),
+        "wrong",
+        {TOP: "wrong"},
+        "a machine does not stay there: unstable: the multiplier is 1.2",
     ),
-    "unstable beside the peak": (examined("unstable", 11.0), "trusted", {1: "unstable"}, "a machine does not stay there"),
+    "undecided": (
+        examined("undecided"),
+        "doubtful",
+        {TOP: "doubtful"},
+        "whether it is stable: undecided: the multiplier",
+    ),
+    "stable": (examined("stable"), "trusted", {}, "peak with H = 1, stable, predicted error 1 %"),
+    "stability not examined": (examined("not examined"), "trusted", {}, f"{NO_STABILITY[2:]} (the multiplier is 1.2)"),
+    "unstable beside the peak": (
+        examined("unstable", 11.0),
+        "trusted",
+        {1: "unstable"},
+        "a machine does not stay there",
+    ),
     "left": (checked(motion="left"), "wrong", {TOP: "wrong"}, "leaves it for another motion"),
     "not periodic": (checked(motion="not periodic"), "wrong", {TOP: "wrong"}, "is not periodic"),
-    "wanders a little": (checked(motion="not periodic", scatter=0.006), "doubtful", {TOP: "doubtful"}, "it wanders by 0.6 %"),
+    "wanders a little": (
+        checked(motion="not periodic", scatter=0.006),
+        "doubtful",
+        {TOP: "doubtful"},
+        "it wanders by 0.6 %",
+    ),
     "not settled": (checked(settled=0), "doubtful", {TOP: "doubtful"}, "did not settle"),
     "attained": (checked(motion="attained"), "trusted", {}, "attained in time integration"),
     "attained, though something rings": (
-        checked(motion="attained", settled=0), "trusted", {}, "attained in time integration",
+        checked(motion="attained", settled=0),
+        "trusted",
+        {},
+        "attained in time integration",
     ),
     "attained elsewhere": (
-        checked(motion="attained", difference_percent=-1.4), "doubtful", {TOP: "doubtful"}, "differ by -1.4 %",
+        checked(motion="attained", difference_percent=-1.4),
+        "doubtful",
+        {TOP: "doubtful"},
+        "differ by -1.4 %",
     ),
     "never judged, but integrated": (
-        checked(difference_percent=3.0) | {"own_error_percent": values(TOP, np.nan, 1.0)}, "doubtful", {TOP: "doubtful"},
+        checked(difference_percent=3.0) | {"own_error_percent": values(TOP, np.nan, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
         "differ by +3 %",
     ),
     "undecided but attained": (
-        examined("undecided") | checked(motion="attained"), "trusted", {}, "attained in time integration",
+        examined("undecided") | checked(motion="attained"),
+        "trusted",
+        {},
+        "attained in time integration",
     ),
     "predicted to be wrong but attained": (
-        checked(motion="attained") | {"own_error_percent": values(TOP, 70.0, 1.0)}, "trusted", {}, "attained",
+        checked(motion="attained") | {"own_error_percent": values(TOP, 70.0, 1.0)},
+        "trusted",
+        {},
+        "attained",
     ),
     "peak at the end": (
-        {"amplitude": [1.0, 1.1, 1.2, 1.3, 1.4, 1.5], "peak_point": [5]}, "doubtful", {}, "it is no resonance",
+        {"amplitude": [1.0, 1.1, 1.2, 1.3, 1.4, 1.5], "peak_point": [5]},
+        "doubtful",
+        {},
+        "it is no resonance",
     ),
     "output that does not move": ({"amplitude": np.full(6, 1e-20)}, "doubtful", {}, "tip.x does not move"),
     "retention": ({"retention_peak_shift": [-0.2]}, "doubtful", {}, "the peak changes by -20 %"),
     "little retention": ({"retention_peak_shift": [0.005]}, "trusted", {}, "peak with H = 1"),
-    "known to the job": (
-        {"known_verdicts": [to_json([doubt("It may drift.")])]}, "doubtful", {}, "It may drift",
-    ),
-}  # fmt: skip
+    "known to the job": ({"known_verdicts": [to_json([doubt("It may drift.")])]}, "doubtful", {}, "It may drift"),
+}
 
 
 # rows at the limits of rules, and beside them
 OVER = float(np.nextafter(5.0, 6.0))
 LIMITS: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "own error at the limit": ({"own_error_percent": values(TOP, 5.0, 1.0)}, "trusted", {}, "predicted error 5 %"),
-    "own error above it": ({"own_error_percent": values(TOP, OVER, 1.0)}, "doubtful", {TOP: "doubtful"}, "predicted to change it by 5 %"),
-    "audit at the limit": ({"audit_error_percent": values(TOP, 5.0)}, "trusted", {}, "difference from more harmonics 5 %"),
+    "own error above it": (
+        {"own_error_percent": values(TOP, OVER, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
+        "predicted to change it by 5 %",
+    ),
+    "audit at the limit": (
+        {"audit_error_percent": values(TOP, 5.0)},
+        "trusted",
+        {},
+        "difference from more harmonics 5 %",
+    ),
     "audit above it": ({"audit_error_percent": values(TOP, OVER)}, "doubtful", {TOP: "doubtful"}, "it differs by 5 %"),
-    "twice the harmonics at the limit": ({"reference_error_percent": values(TOP, 5.0, 1.0)}, "trusted", {}, "peak with H = 1"),
-    "twice the harmonics above it": ({"reference_error_percent": values(TOP, OVER, 1.0)}, "doubtful", {TOP: "doubtful"}, "amplitude or phase, by 5 %"),
-    "in time at the limit": (checked(motion="attained", difference_percent=-1.0), "trusted", {}, "attained in time integration"),
-    "in time above it": (checked(motion="attained", difference_percent=-1.001), "doubtful", {TOP: "doubtful"}, "differ by -1 %, more than 1 %"),
-    "wanders at the limit": (checked(motion="not periodic", scatter=0.01), "doubtful", {TOP: "doubtful"}, "it wanders by 1 %"),
+    "twice the harmonics at the limit": (
+        {"reference_error_percent": values(TOP, 5.0, 1.0)},
+        "trusted",
+        {},
+        "peak with H = 1",
+    ),
+    "twice the harmonics above it": (
+        {"reference_error_percent": values(TOP, OVER, 1.0)},
+        "doubtful",
+        {TOP: "doubtful"},
+        "amplitude or phase, by 5 %",
+    ),
+    "in time at the limit": (
+        checked(motion="attained", difference_percent=-1.0),
+        "trusted",
+        {},
+        "attained in time integration",
+    ),
+    "in time above it": (
+        checked(motion="attained", difference_percent=-1.001),
+        "doubtful",
+        {TOP: "doubtful"},
+        "differ by -1 %, more than 1 %",
+    ),
+    "wanders at the limit": (
+        checked(motion="not periodic", scatter=0.01),
+        "doubtful",
+        {TOP: "doubtful"},
+        "it wanders by 1 %",
+    ),
     "wanders above it": (checked(motion="not periodic", scatter=0.0101), "wrong", {TOP: "wrong"}, "is not periodic"),
-    "wanders little, elsewhere": (checked(motion="not periodic", scatter=0.005, difference_percent=1.1), "wrong", {TOP: "wrong"}, "is not periodic"),
+    "wanders little, elsewhere": (
+        checked(motion="not periodic", scatter=0.005, difference_percent=1.1),
+        "wrong",
+        {TOP: "wrong"},
+        "is not periodic",
+    ),
     "retention at the limit": ({"retention_peak_shift": [-0.01]}, "trusted", {}, "peak with H = 1"),
     "retention above it": ({"retention_peak_shift": [0.0101]}, "doubtful", {}, "the peak changes by 1.01 %"),
     "output that hardly moves": ({"amplitude": np.full(6, 1e-18)}, "trusted", {}, "peak with H = 1"),
     "output just below it": ({"amplitude": np.full(6, 0.999e-18)}, "doubtful", {}, "tip.x does not move"),
     "peak at the first frequency": (
-        {"amplitude": [1.5, 1.4, 1.3, 1.2, 1.1, 1.0], "peak_point": [0]}, "doubtful", {}, "at the end of the sweep (10.00 Hz)",
+        {"amplitude": [1.5, 1.4, 1.3, 1.2, 1.1, 1.0], "peak_point": [0]},
+        "doubtful",
+        {},
+        "at the end of the sweep (10.00 Hz)",
     ),
-    "peak at the second frequency": ({"amplitude": [1.4, 1.5, 1.3, 1.2, 1.1, 1.0], "peak_point": [1]}, "trusted", {}, "peak with H = 1"),
+    "peak at the second frequency": (
+        {"amplitude": [1.4, 1.5, 1.3, 1.2, 1.1, 1.0], "peak_point": [1]},
+        "trusted",
+        {},
+        "peak with H = 1",
+    ),
     "peak at the lower end of a fold": (
-        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 15.0, 16.0])}, "doubtful", {}, "and the peak stands among them",
+        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 15.0, 16.0])},
+        "doubtful",
+        {},
+        "and the peak stands among them",
     ),
-    "peak below a fold": ({"frequency_hz": np.array([10.0, 11.0, 12.0, 12.9, 14.0, 13.0])}, "trusted", {}, "folds between 13.00 and 14.00"),
-}  # fmt: skip
+    "peak below a fold": (
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 12.9, 14.0, 13.0])},
+        "trusted",
+        {},
+        "folds between 13.00 and 14.00",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", [*RULES, *LIMITS])
@@ -330,23 +458,9 @@ def test_rule(name: str) -> None:
 
 
 def test_a_jump_is_none_where_slip_begins_or_frequencies_are_given() -> None:
-    grows = [
-        1e-9,
-        1.0,
-        12.0,
-        30.0,
-        18.0,
-        1e-9,
-    ]  # slip begins after the first point and ends before the last
+    grows = [1e-9, 1.0, 12.0, 30.0, 18.0, 1e-9]  # slip begins after the first point and ends before the last
     assert set(judged(response(loss=grows))[2]) == {"trusted"}
-    faint = [
-        1e-9,
-        1e-6,
-        1e-6,
-        270.0,
-        250.0,
-        240.0,
-    ]  # a jump of what does not count, then one that does
+    faint = [1e-9, 1e-6, 1e-6, 270.0, 250.0, 240.0]  # a jump of what does not count, then one that does
     assert judged(response(loss=faint))[2][:4] == ["trusted", "trusted", "doubtful", "doubtful"]
     rounding = response(loss=[1e-22, 3e-20, 3e-20, 3e-20, 2e-20, 1e-20])
     shape = (6, 6, 1, 3, 2)
@@ -360,9 +474,7 @@ def test_a_jump_is_none_where_slip_begins_or_frequencies_are_given() -> None:
 
 def test_a_sweep_downwards_does_not_fold() -> None:
     down = {"frequency_hz": HZ[::-1].copy(), "peak_point": [2]}
-    assert not any(
-        "folds" in v.why for v in verdicts(response({"direction": "down"}, **down), [""])
-    )
+    assert not any("folds" in v.why for v in verdicts(response({"direction": "down"}, **down), [""]))
     assert any("folds" in v.why for v in verdicts(response(**down), [""]))
 
 
@@ -370,13 +482,8 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
     errors = np.array([30.0, 1.0, 6.0, 7.0, 8.0, 1.0])
     (found,) = (v for v in verdicts(response(own_error_percent=errors), [""]) if v.rank)
     assert found.frequency_hz == 13.0
-    assert (
-        "by 7 %; the same is said of 4 of 6 points, 10.00 to 14.00 Hz, the most at 10.00 Hz (30 %)"
-        in found.why
-    )
-    (found,) = (
-        v for v in verdicts(response(own_error_percent=values(0, 30.0, 1.0)), [""]) if v.rank
-    )
+    assert "by 7 %; the same is said of 4 of 6 points, 10.00 to 14.00 Hz, the most at 10.00 Hz (30 %)" in found.why
+    (found,) = (v for v in verdicts(response(own_error_percent=values(0, 30.0, 1.0)), [""]) if v.rank)
     assert found.frequency_hz == 10.0
     assert "the like" not in found.why
 
@@ -384,10 +491,7 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
 def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
     for hz, said in (
         (13.0, "--verify integrates in time at the peak, and"),
-        (
-            11.0,
-            "--verify with forced_response.frequencies_hz = [11.00] alone integrates in time there, and",
-        ),
+        (11.0, "--verify with forced_response.frequencies_hz = [11.00] alone integrates in time there, and"),
     ):
         found = [v for v in judged(response(**examined("undecided", hz)))[0] if v.rank]
         assert said in found[0].remedy
@@ -395,8 +499,12 @@ def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
 
 @pytest.mark.parametrize(
     ("cap", "said"),
-    [(41, "Give more forced_response.points"), (5, "raise limits.work_s or limits.memory_gb"), (None, 'Give harmonics.high = "auto"')],
-)  # fmt: skip
+    [
+        (41, "Give more forced_response.points"),
+        (5, "raise limits.work_s or limits.memory_gb"),
+        (None, 'Give harmonics.high = "auto"'),
+    ],
+)
 def test_remedies_name_what_kept_a_point_from_more_harmonics(cap: int | None, said: str) -> None:
     auto = {} if cap is None else {"passages": "auto", "high_order": cap}
     data = response(auto, own_error_percent=values(TOP, 9.0, 1.0), harmonic_kept=many((TOP,)))
@@ -441,9 +549,7 @@ def test_what_holds_for_every_case_is_said_once() -> None:
 
 
 def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
-    data = xr.Dataset(
-        {"case_verdict": ("case", [0, 1, 2]), "case_label": ("case", ["a", "b", "c"])}
-    )
+    data = xr.Dataset({"case_verdict": ("case", [0, 1, 2]), "case_label": ("case", ["a", "b", "c"])})
     waves = xr.Dataset(attrs={"verdicts": to_json([doubt("rough")])})
     tree = xr.DataTree.from_dict({"forced_response": data, "modes": waves})
     assert not_trusted(tree) == (
@@ -451,9 +557,7 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
         "See the verdicts."
     )
     first = data.isel(case=[0]).assign(verdict=("point", [0, 1, 2, 1]))
-    off = data.isel(case=[0, 1]).assign_attrs(
-        verdicts=to_json([Verdict("wrong", "b", 3.0, "it leaves")])
-    )
+    off = data.isel(case=[0, 1]).assign_attrs(verdicts=to_json([Verdict("wrong", "b", 3.0, "it leaves")]))
     assert not_trusted(xr.DataTree.from_dict({"forced_response": off})) == (
         "Not to be trusted as it stands: forced response: wrong at single points of b, 1 of 2 cases doubtful (b). See the verdicts."
     )
@@ -463,18 +567,13 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
         "Every case is trusted; of 4 points 1 wrong, 2 doubtful, none of them the peak of its case."
     )
     good.attrs["complete"] = 0
-    assert (
-        conclusion(good)
-        == "Not to be trusted as it stands: the run is not complete. See the verdicts."
-    )
+    assert conclusion(good) == "Not to be trusted as it stands: the run is not complete. See the verdicts."
     one = xr.DataTree.from_dict({"forced_response": data.isel(case=[2])})
     assert "forced response: wrong. See" in not_trusted(one)
     assert of_tree(tree) == (doubt("rough"),)
 
 
-def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_python(
-    tmp_path: Path,
-) -> None:
+def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_python(tmp_path: Path) -> None:
     # few harmonics everywhere: exact where all sticks, and off by more than a hundredth of a per mille where the brake slips
     changes = {
         "vary.load.shaker.force_n": "[0.01, 8.0]",
@@ -559,9 +658,7 @@ def test_points_that_share_a_frequency_keep_their_own_stability() -> None:
         stability_sentence=said,
     )
     own = Curve(data, 0)
-    found = {
-        point: str(row["stability_verdict"]) for point, row in own.examined("stability_verdict")
-    }
+    found = {point: str(row["stability_verdict"]) for point, row in own.examined("stability_verdict")}
     assert found == {2: "neutral", 3: "stable", 4: "unstable"}
     assert own.peak == TOP == 3
     assert own.peak_stability == "stable"

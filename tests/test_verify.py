@@ -20,14 +20,7 @@ from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.models.study import read_study
 
-CHECK = Check(
-    frequency_hz=180.0,
-    balance=1.02e-3,
-    transient=1.0e-3,
-    settled=True,
-    periods=90,
-    order=5,
-)
+CHECK = Check(frequency_hz=180.0, balance=1.02e-3, transient=1.0e-3, settled=True, periods=90, order=5)
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +51,7 @@ def test_a_run_without_a_peak_has_nothing_to_check(stuck: tuple[Question, Respon
 
 
 def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
-    stuck: tuple[Question, Response],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
+    stuck: tuple[Question, Response], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     asked, response = stuck
     asked = replace(asked, checks=frozenset({"verify"}))
@@ -129,8 +120,7 @@ def test_sentence_tells_what_happened() -> None:
     )
     stays = replace(CHECK, settled=False, scatter=3e-7, motion="attained")
     assert (
-        "periodic but for the scatter after 90 periods: average over the last third, scatter 3e-05 %"
-        in stays.sentence
+        "periodic but for the scatter after 90 periods: average over the last third, scatter 3e-05 %" in stays.sentence
     )
     lost = replace(CHECK, settled=False, transient=float("nan"))
     assert "overflowed after 90 periods" in lost.sentence

@@ -111,18 +111,14 @@ def test_frequencies_are_those_of_the_assembled_wheel(joined: Joined) -> None:
     # the third modes of the diameters lie above the first eight of the wheel
     np.testing.assert_allclose(union[:8], hertz, rtol=1e-8)
     modes = joined[1]["modes"]
-    np.testing.assert_allclose(
-        modes.frequency_hz, data.frequency_hz[modes.wave_number.values], rtol=1e-9
-    )
+    np.testing.assert_allclose(modes.frequency_hz, data.frequency_hz[modes.wave_number.values], rtol=1e-9)
 
 
 def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
     data = joined[1]["campbell"]
     assert data.sizes["crossing"] > 0
     assert float(data.basis_error.max()) < 1e-5
-    np.testing.assert_allclose(
-        data.crossing_frequency_hz, data.crossing_engine_order * data.crossing_speed_rpm / 60
-    )
+    np.testing.assert_allclose(data.crossing_frequency_hz, data.crossing_engine_order * data.crossing_speed_rpm / 60)
     # full modes at the speed of a crossing: no basis, no following
     first = data.isel(crossing=0)
     number = int(data.wave_number[int(first.crossing_wave)])
@@ -134,9 +130,7 @@ def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
     assert list(data.attrs["engine_orders"]) == [2, 6]
 
 
-def test_basis_that_is_too_small_is_told(
-    joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_basis_that_is_too_small_is_told(joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # two modes and none to spare, over a range in which the shapes change
     monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE", 0)
     monkeypatch.setattr("stickslip.study.analyses.waves.doubts.BASIS_ERROR", 1e-9)
@@ -148,11 +142,7 @@ def test_basis_that_is_too_small_is_told(
 
 
 def test_coriolis_forces_part_the_directions(tmp_path: Path) -> None:
-    changes = {
-        "rotation.coriolis": "true",
-        "rotation.speed_rpm": "16000.0",
-        "modes.nodal_diameters": "[2]",
-    }
+    changes = {"rotation.coriolis": "true", "rotation.speed_rpm": "16000.0", "modes.nodal_diameters": "[2]"}
     made = study(tmp_path, changes | {"campbell.engine_orders": "[6]"})
     modes, branches = done(made, "modes"), done(made, "campbell")
     assert "backward" in {row[1] for row in modes.summaries["modes"][0].rows}
@@ -188,9 +178,7 @@ def test_engine_orders_above_the_computed_modes_are_not_called_clear(tmp_path: P
     assert more[1] < 1400 < 1400 * 1.05 < more[-1]
 
 
-def test_resonances_are_the_crossings_of_the_campbell_diagram(
-    joined: Joined, tmp_path: Path
-) -> None:
+def test_resonances_are_the_crossings_of_the_campbell_diagram(joined: Joined, tmp_path: Path) -> None:
     crossed = joined[1]["campbell"]
     i = int(np.argmax(crossed.crossing_speed_rpm.values))
     order, rpm = int(crossed.crossing_engine_order[i]), float(crossed.crossing_speed_rpm[i])
@@ -210,9 +198,7 @@ def test_growth_is_the_slope_of_the_squares_with_coriolis_forces(tmp_path: Path)
     model = study(tmp_path, {"rotation.coriolis": "true"}).model()
     speed, step = 1500.0, 1e-3
     scales = (1.0, 1.0 - step, 1.0 + step)
-    asked = {
-        s: Question(model, "static", Wheel(8, parted=True), (6,), 2, (speed * s,)) for s in scales
-    }
+    asked = {s: Question(model, "static", Wheel(8, parted=True), (6,), 2, (speed * s,)) for s in scales}
     waves = {s: solve_wave(asked[s], 6) for s in scales}
     squares = {s: (2 * np.pi * w.frequencies_hz) ** 2 for s, w in waves.items()}
     by_difference = (squares[1 + step] - squares[1 - step]) / (4 * step * speed**2)
@@ -236,9 +222,7 @@ def test_engine_orders_above_the_followed_modes_are_named(tmp_path: Path) -> Non
     assert hertz[1] == pytest.approx(10 * at[10] / 60, rel=2e-3)
 
 
-def test_static_displacement_is_told_and_doubted_where_it_is_large(
-    joined: Joined, tmp_path: Path
-) -> None:
+def test_static_displacement_is_told_and_doubted_where_it_is_large(joined: Joined, tmp_path: Path) -> None:
     data = joined[1]["modes"]
     assert not stored(data.attrs)
     assert data.attrs["static_rpm"] == pytest.approx(6000.0, rel=1e-14)
@@ -322,10 +306,8 @@ def test_reference_frequencies_are_compared(joined: Joined, tmp_path: Path) -> N
         ("nodal_diameter,mode,frequency_hz\n0,1,-3\n", "line 2: frequency_hz: cannot be read, got '-3'"),
         ("nodal_diameter,mode,frequency_hz\n0,9,3\n", "holds no frequency of the nodal diameters and modes"),
     ],
-)  # fmt: skip
-def test_references_that_cannot_be_compared_are_refused(
-    tmp_path: Path, content: str | None, said: str
-) -> None:
+)
+def test_references_that_cannot_be_compared_are_refused(tmp_path: Path, content: str | None, said: str) -> None:
     if content is not None:
         (tmp_path / "ref.csv").write_text(content)
     made = study(tmp_path, {"modes.reference": '"ref.csv"'})
@@ -342,11 +324,7 @@ def write_deck(path: Path) -> Path:
     points = 0.1 * np.vstack([CUBE, CUBE[[1, 3, 5, 7]] + [1, 0, 0]])
     placed = (f"{i + 1}, {', '.join(map(repr, map(float, p)))}" for i, p in enumerate(points))
     lines = ["*NODE, NSET=ALL", *placed]
-    lines += [
-        "*ELEMENT, TYPE=C3D8, ELSET=E",
-        "1, 1, 2, 4, 3, 5, 6, 8, 7",
-        "2, 2, 9, 10, 4, 6, 11, 12, 8",
-    ]
+    lines += ["*ELEMENT, TYPE=C3D8, ELSET=E", "1, 1, 2, 4, 3, 5, 6, 8, 7", "2, 2, 9, 10, 4, 6, 11, 12, 8"]
     lines += ["*NSET, NSET=FOOT", "1, 3, 5, 7", "*NSET, NSET=TIP", "9, 10, 11, 12"]
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850."]
     lines += ["*SOLID SECTION, ELSET=E, MATERIAL=STEEL"]
@@ -475,9 +453,7 @@ def test_cases_of_different_sizes_stand_behind_each_other(tmp_path: Path) -> Non
     assert [len(table.rows[0]) for table in outcome.summaries["modes"]] == [5, 7]
 
 
-def test_cases_that_differ_in_harmonic_loads_alone_are_computed_and_shown_once(
-    tmp_path: Path,
-) -> None:
+def test_cases_that_differ_in_harmonic_loads_alone_are_computed_and_shown_once(tmp_path: Path) -> None:
     asked = {"modes.number": "3", "vary.load.shaker.force_n": "[5.0, 8.0]"}
     made = read_study(write_four_masses(tmp_path, asked))
     outcome = run_study(made, only=["modes"])
@@ -493,7 +469,7 @@ def test_shapes_of_both_directions_are_conjugates() -> None:
     """A ring of six sectors, of two elements each: nodes of the high face move as much as those of the low one and of the middle."""
     half, n = np.pi / 6, 6
     angles = np.array([-half, 0.0, half])
-    points = np.array([[r * np.cos(a), r * np.sin(a), z] for r in (0.1, 0.13) for a in angles for z in (0.0, 0.02)])  # fmt: skip
+    points = np.array([[r * np.cos(a), r * np.sin(a), z] for r in (0.1, 0.13) for a in angles for z in (0.0, 0.02)])
     at = np.arange(12).reshape(2, 3, 2)
     cells = [
         [*(at[i, j, 0] for i, j in corners), *(at[i, j, 1] for i, j in corners)]
@@ -539,13 +515,11 @@ def growth_by_assembling(asked: Question, number: int) -> np.ndarray:
 
 @pytest.mark.parametrize("coriolis", [False, True])
 @pytest.mark.parametrize("of", ["unlike faces", "joined shrouds", "damper between two blades"])
-def test_growth_is_that_of_matrices_assembled_at_other_speeds(
-    tmp_path: Path, of: str, coriolis: bool
-) -> None:
+def test_growth_is_that_of_matrices_assembled_at_other_speeds(tmp_path: Path, of: str, coriolis: bool) -> None:
     sectors, number = 6, 2
     if of == "unlike faces":
         mesh = unlike_wedge(sectors, (3, 2), (2, 3), clamp=True)
-        ring = solid_part(mesh, Material(), clamped=("root",), sectors=sectors, cyclic="segment_to_segment")  # fmt: skip
+        ring = solid_part(mesh, Material(), clamped=("root",), sectors=sectors, cyclic="segment_to_segment")
         model = Model(parts={"ring": ring}, coriolis=coriolis)
     elif of == "joined shrouds":
         model, sectors = study(tmp_path, {"rotation.coriolis": str(coriolis).lower()}).model(), 8
@@ -560,7 +534,7 @@ def test_growth_is_that_of_matrices_assembled_at_other_speeds(
 def test_a_wave_is_assembled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = unlike_wedge(6, (3, 2), (2, 3), clamp=True)
     ring = solid_part(mesh, Material(), clamped=("root",), sectors=6, cyclic="segment_to_segment")
-    asked = Question(Model(parts={"ring": ring}), "open", Wheel(6, parted=False), (0, 1, 2), 3, (900.0,))  # fmt: skip
+    asked = Question(Model(parts={"ring": ring}), "open", Wheel(6, parted=False), (0, 1, 2), 3, (900.0,))
     assembled = []
     at = Model.at
 

@@ -64,10 +64,7 @@ def test_waves_that_share_their_interior_have_the_same_modes(seventh, contacts, 
     """With springs to the neighbour, whose phase the waves have too."""
     monkeypatch.setattr(wave_family, "LARGE", 100)
     structure = seventh.structure
-    left, right = (
-        scipy.sparse.eye_array(structure.n, format="csr")[structure.dof_set(s)]
-        for s in ("left", "right")
-    )
+    left, right = (scipy.sparse.eye_array(structure.n, format="csr")[structure.dof_set(s)] for s in ("left", "right"))
     springs = np.full(left.shape[0], 3e6)
 
     def at(number):

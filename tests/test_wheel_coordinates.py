@@ -25,9 +25,7 @@ from stickslip.response.system import System
 
 LAW = ElasticCoulomb(k_t=2.0, k_w=1.5, k_n=3.0, mu=0.4, preload=1.0)
 OMEGA, ORDER = 0.9, 3
-SWEEP = Sweep(
-    omega_range=(OMEGA, 1.1), at=(OMEGA,), low=ORDER, high=ORDER, selection="always_low", peak_points=0
-)  # fmt: skip
+SWEEP = Sweep(omega_range=(OMEGA, 1.1), at=(OMEGA,), low=ORDER, high=ORDER, selection="always_low", peak_points=0)
 
 
 def dense(matrix):
@@ -51,9 +49,7 @@ def both(sector, engine_order, gaps, loads, law=LAW, free=(), **how):
     assert np.isrealobj(operator)
     load = HarmonicLoad(tuned.project(static, 0).real, {1: tuned.project(force, 1)})
     own_free = [i for i, label in enumerate(tuned.dofs.labels) if label in free]
-    one = solved(
-        tuned, Interface(names, (law,) * count, operator), load, np.array(own_free, dtype=int)
-    )
+    one = solved(tuned, Interface(names, (law,) * count, operator), load, np.array(own_free, dtype=int))
     assert np.any(one.energy > 1e-4), "nothing slips"
 
     whole = wheel(sector)
@@ -68,10 +64,13 @@ def both(sector, engine_order, gaps, loads, law=LAW, free=(), **how):
     phase = np.exp(2j * math.pi * engine_order * np.arange(sectors) / sectors)
     all_free = [i for i, label in enumerate(whole.dofs.labels) if label.split(".", 1)[-1] in free]
     everything = solved(
-        whole, pairs,
-        HarmonicLoad(sum(m.T @ static for m in maps), {1: sum(p * (m.T @ force) for p, m in zip(phase, maps, strict=True))}),
+        whole,
+        pairs,
+        HarmonicLoad(
+            sum(m.T @ static for m in maps), {1: sum(p * (m.T @ force) for p, m in zip(phase, maps, strict=True))}
+        ),
         np.array(all_free, dtype=int),
-    )  # fmt: skip
+    )
     for h in range(ORDER + 1):
         turned = phase**h
         for name in ("gaps", "forces"):
@@ -96,13 +95,16 @@ def loads_on(sector, low, high):
 def test_shrouds_in_gaps_and_in_nodal_coordinates(engine_order, relative):
     sector, (low, high) = shrouded(5)
     keep = np.concatenate([low, high])
-    gaps = neighbour_gaps(
-        sector.structure, 5, low="left", high="right", axis=TILTED, normal=np.array([0.6, 0.0, 0.8])
-    )
+    gaps = neighbour_gaps(sector.structure, 5, low="left", high="right", axis=TILTED, normal=np.array([0.6, 0.0, 0.8]))
     tuned, operator, _ = both(
-        sector, engine_order, gaps, loads_on(sector, low, high), relative=relative, keep=keep,
+        sector,
+        engine_order,
+        gaps,
+        loads_on(sector, low, high),
+        relative=relative,
+        keep=keep,
         n_modes=sector.independent.size - keep.size,
-    )  # fmt: skip
+    )
     assert tuned.multipliers.size == 0
     touched = np.flatnonzero(np.any(dense(operator), axis=0))
     assert touched.size == (6 if relative is False else 3)
@@ -119,10 +121,9 @@ def test_more_quadrature_points_than_dofs(engine_order):
     gaps = [
         dense(g)
         for g in neighbour_gaps(
-            sector.structure, 5, low="left", high="right", axis=TILTED,
-            normal=np.array([0.6, 0.0, 0.8]),
+            sector.structure, 5, low="left", high="right", axis=TILTED, normal=np.array([0.6, 0.0, 0.8])
         )
-    ]  # fmt: skip
+    ]
     several = tuple(np.vstack([w * g for w in (1.0, 0.7, 0.4)]) for g in gaps)
     how = {"keep": np.concatenate([low, high]), "n_modes": sector.independent.size - 6}
     loads = loads_on(sector, low, high)
@@ -160,9 +161,7 @@ def test_a_node_between_both_neighbours_with_modes():
     sector = some_sector(5)
     node = whole_nodes(sector, 1)
     structure = replace(sector.structure, sets={"left": node, "right": node})
-    gaps = neighbour_gaps(
-        structure, 5, low="left", high="right", axis=TILTED, normal=np.array([0.6, 0.0, 0.8])
-    )
+    gaps = neighbour_gaps(structure, 5, low="left", high="right", axis=TILTED, normal=np.array([0.6, 0.0, 0.8]))
     how = {"keep": node, "n_modes": sector.independent.size - 3}
     for relative in (None, False):
         tuned, _, _ = both(sector, 2, gaps, loads_on(sector, node, node), relative=relative, **how)
@@ -223,18 +222,26 @@ def test_a_sector_joined_with_a_rigid_damper(engine_order, relative):
     static[body[:3]] = 0.02, 0.01, -0.02
     free = tuple(joined.dofs.labels[i] for i in body)
     both(
-        sector, engine_order, (own, following), (0.3 * static, 0.3 * force), relative=relative, keep=keep, free=free,
-        law=LAW, n_modes=sector.independent.size - keep.size,
-    )  # fmt: skip
+        sector,
+        engine_order,
+        (own, following),
+        (0.3 * static, 0.3 * force),
+        relative=relative,
+        keep=keep,
+        free=free,
+        law=LAW,
+        n_modes=sector.independent.size - keep.size,
+    )
 
 
 def test_a_contact_on_the_axis_is_refused_by_name():
     sector = CyclicSector(
-        Structure(
-            np.eye(2), np.zeros((2, 2)), 2 * np.eye(2), Dofs(np.arange(2), ("x", "x"), np.zeros((2, 3)))
-        ),
-        4, np.array([1]), np.array([1]), axis=None,
-    )  # fmt: skip
+        Structure(np.eye(2), np.zeros((2, 2)), 2 * np.eye(2), Dofs(np.arange(2), ("x", "x"), np.zeros((2, 3)))),
+        4,
+        np.array([1]),
+        np.array([1]),
+        axis=None,
+    )
     own = np.zeros((3, 2))
     own[0] = 1.0, -1.0
     with pytest.raises(InputError, match=r"node1\.x lies on the axis"):

@@ -8,14 +8,7 @@ import pytest
 import xarray as xr
 from browser import Browser
 from synthetic_result import provenance, tree_of, write_result
-from synthetic_wheel import (
-    SECTORS,
-    campbell_result,
-    modes_result,
-    safe_result,
-    skin,
-    variable,
-)
+from synthetic_wheel import SECTORS, campbell_result, modes_result, safe_result, skin, variable
 from test_report import marks, needs_browser, open_page, page_text
 
 from stickslip.report.coarse_skin import coarse_skin
@@ -35,12 +28,7 @@ def view(data: xr.Dataset) -> Waves:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("wheel")
-    tree = tree_of(
-        provenance(title=TITLE),
-        modes=modes_result(),
-        campbell=campbell_result(),
-        safe=safe_result(0.1),
-    )
+    tree = tree_of(provenance(title=TITLE), modes=modes_result(), campbell=campbell_result(), safe=safe_result(0.1))
     write_result(tree, made / "result.nc")
     report_file(made)
     return made
@@ -173,15 +161,11 @@ def test_orders_that_leave_the_picture_or_the_modes_are_named() -> None:
 def test_orders_that_are_not_judged_are_crossed_out() -> None:
     data = safe_result(0.1)
     data["pair_judged"] = (data.pair_engine_order != 12).astype(int)
-    data["pair_resonance_rpm"] = variable(
-        "case pair", np.full((1, data.sizes["pair"]), np.inf), "rpm"
-    )
+    data["pair_resonance_rpm"] = variable("case pair", np.full((1, data.sizes["pair"]), np.inf), "rpm")
     result = view(data)
     plot = safe_diagram(result)
     orders = next(t for t in plot.figure.data if t.name == "engine orders asked")
-    crossed = [
-        t.strip() for t, s in zip(orders.text, orders.marker.symbol, strict=True) if "x" in s
-    ]
+    crossed = [t.strip() for t, s in zip(orders.text, orders.marker.symbol, strict=True) if "x" in s]
     assert crossed == ["EO 12"]
     assert "EO 12, above the highest computed mode" in plot.caption
     table = interference(result)

@@ -76,9 +76,14 @@ def blade() -> SolidMesh:
     mesh = brick((0.10, 0.13, 0.18, 0.20), tuple(half), (-0.02, 0.02))
     number = np.arange(32).reshape(4, 4, 2)
     sets = {
-        "root": number[0], "cyclic_low": number[:2, 0], "cyclic_high": number[:2, 3], "tip": number[3, 1:3],
-        "touch_low": number[2:, 0], "touch_high": number[3, 3], "outside": number[3],
-    }  # fmt: skip
+        "root": number[0],
+        "cyclic_low": number[:2, 0],
+        "cyclic_high": number[:2, 3],
+        "tip": number[3, 1:3],
+        "touch_low": number[2:, 0],
+        "touch_high": number[3, 3],
+        "outside": number[3],
+    }
     layers = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2]), np.array([0, 1, 2] * 3)
     cells = mesh.cells[(layers[0] != 1) | (layers[1] == 1)]
     return SolidMesh(mesh.points, cells, {name: own.ravel() for name, own in sets.items()})
@@ -105,9 +110,7 @@ def load(name: str, on: str, force: float, direction: Vector, more: str) -> str:
 
 
 def study(met: str, driven: str, tip: np.ndarray) -> str:
-    parts = "".join(
-        f'[part.{name}]\nfile = "{name}.inp"\nunits = "SI"\n' for name in ("blade", "ring")
-    )
+    parts = "".join(f'[part.{name}]\nfile = "{name}.inp"\nunits = "SI"\n' for name in ("blade", "ring"))
     place = f"[output]\npoints = {{ tip = {{ on = 'blade', near_m = {vector(tip)} }} }}\n"
     return f"schema_version = 2\n{parts}{met}{driven}{REST}{place}"
 
@@ -117,9 +120,7 @@ def write_one_sector(folder: Path) -> Path:
     write_deck(blade(), STEEL, folder / "blade.inp", sectors=SECTORS)
     write_deck(ring(), STEEL, folder / "ring.inp", sectors=SECTORS, clamped=("outside",))
     met = "".join(contact(name, (a, b), *more) for name, (a, b, *more) in CONTACTS.items())
-    driven = "".join(
-        load(f"order{m}", "tip", f, GAS, f"engine_order = {m}") for m, f in ORDERS.items()
-    )
+    driven = "".join(load(f"order{m}", "tip", f, GAS, f"engine_order = {m}") for m, f in ORDERS.items())
     driven += load("steady", "tip", STEADY, LEAN, "harmonic = 0")
     text = study(met, driven, blade().points[blade().node_sets["tip"][0]])
     (folder / "study.toml").write_text(text)
@@ -159,25 +160,23 @@ def test_one_sector_from_a_file_answers_as_all(tmp_path: Path) -> None:
     assert all((point == 1).any() and (point < 2).all() for point in groove)  # slips, pressed
     preload = one["static_force"].isel(case=0).sel(direction="n").values
     assert np.all(preload[2:] < -100.0)
-    _, every, _ = answered(
-        read_study(write_all_sectors(tmp_path / "every") / "study.toml").model(), HERTZ
-    )
+    _, every, _ = answered(read_study(write_all_sectors(tmp_path / "every") / "study.toml").model(), HERTZ)
     pair = one["output_displacement"].isel(point=0).values
     apart = pair[..., 0] + 1j * pair[..., 1] - every.outputs
     assert np.abs(apart).max() < 1e-8 * np.abs(every.outputs).max()
 
 
-def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """More friction, two engine orders, Coriolis forces; the slope along the peaks is that of their difference."""
     found = assemble(read_study(write_one_sector(tmp_path / "one") / "study.toml").model(), H)
     values, span = (0.2, 0.202), (2 * math.pi * 930, 2 * math.pi * 960)
     how = Discretisation(order=H, samples=128)
-    arrays = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
+    arrays = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))
     assert all(point.converged and point.is_maximum for point in arrays)
     krylov = Krylov()
     monkeypatch.setattr(balance_module, "products_pay", lambda _: True)
     how = replace(how, newton=Newton(linear=krylov))
-    products = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
+    products = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))
     assert krylov.counts.products > 0
     for one, other in zip(arrays, products, strict=True):
         assert other.amplitude == pytest.approx(one.amplitude, rel=1e-8)

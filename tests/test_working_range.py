@@ -124,9 +124,7 @@ def test_the_run_says_where_friction_works(brake: ss.Result, tmp_path: Path) -> 
     data = brake["forced_response"]
     (own,) = working_ranges(data)
     stuck, works, gone = range_lines(data)
-    assert stuck.startswith(
-        f"At {KEY} = {own.peaks[0].value:g}, the first value, all contacts stick"
-    )
+    assert stuck.startswith(f"At {KEY} = {own.peaks[0].value:g}, the first value, all contacts stick")
     (only,) = own.of("works")
     assert works.startswith(f"Friction works at {KEY} = {only.value:g}: there the peak per unit")
     assert gone.startswith(f"Out of the working range above {KEY} = {only.value:g}: ")
@@ -164,9 +162,7 @@ def test_without_a_stuck_case_the_range_is_that_around_the_smallest_peak() -> No
     stuck, works, other = range_sentences(own)
     assert stuck.startswith("At no value do all contacts stick at the peak: ")
     assert "within 3 dB of the smallest one, at 10" in works
-    assert other.startswith(
-        "The other end was not reached: at load.shaker.ratio = 5, the last value, "
-    )
+    assert other.startswith("The other end was not reached: at load.shaker.ratio = 5, the last value, ")
 
 
 def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:
@@ -175,8 +171,12 @@ def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:
 
 
 def test_stretches_that_a_hump_parts_are_said_apart() -> None:
-    before = working_range(curve((250, 1.0, STICKS), (100, 0.6, SLIPS), (50, 0.9, SLIPS), (20, 0.4, SLIPS), (5, 0.95, SLIDES)))  # fmt: skip
-    after = working_range(curve((250, 1.0, STICKS), (100, 0.5, SLIPS), (50, 0.8, SLIPS), (20, 0.6, SLIPS), (5, 0.95, SLIDES)))  # fmt: skip
+    before = working_range(
+        curve((250, 1.0, STICKS), (100, 0.6, SLIPS), (50, 0.9, SLIPS), (20, 0.4, SLIPS), (5, 0.95, SLIDES))
+    )
+    after = working_range(
+        curve((250, 1.0, STICKS), (100, 0.5, SLIPS), (50, 0.8, SLIPS), (20, 0.6, SLIPS), (5, 0.95, SLIDES))
+    )
     for own in (before, after):
         assert own is not None
         _, works, gone = range_sentences(own)
@@ -185,7 +185,7 @@ def test_stretches_that_a_hump_parts_are_said_apart() -> None:
 
 
 def test_a_peak_that_never_falls_but_rises_is_not_said_to_stay_near() -> None:
-    own = working_range(curve((250, 1.0, STICKS), (100, 0.8, SLIPS), (50, 2.5, SLIDES), (20, 3.2, SLIDES)))  # fmt: skip
+    own = working_range(curve((250, 1.0, STICKS), (100, 0.8, SLIPS), (50, 2.5, SLIDES), (20, 3.2, SLIDES)))
     assert own is not None
     assert range_sentences(own)[-1] == (
         "At no value does friction take the peak per unit of force 3 dB below that of the stuck system: it is smallest at 100, 80 % of the "
@@ -197,9 +197,7 @@ def test_contacts_that_are_open_all_the_time_do_not_stick() -> None:
     half = ContactsAtPeak(0.5, True, True)
     own = working_range(curve((250, 1.0, half), (100, 0.9, SLIDES), (20, 0.5, SLIDES)))
     assert own is not None
-    assert range_sentences(own)[0].startswith(
-        "At  = 250, the first value, no contact slips, opens or closes"
-    )
+    assert range_sentences(own)[0].startswith("At  = 250, the first value, no contact slips, opens or closes")
 
 
 def test_a_setting_of_the_computation_makes_no_curve() -> None:
@@ -231,7 +229,7 @@ def test_what_has_no_ends_is_not_judged(peaks: list[CurvePeak]) -> None:
 
 def two_blades() -> list[CurvePeak]:
     """Return peaks of two blades with a damper at the ratios 3, 5 and 10, where it lifts off and so sticks longest at 3."""
-    told = [(3, 5.87, 0.81, 8.6e-4, 19.2), (5, 5.95, 0.65, 5.3e-4, 3.56), (10, 10.2, 0.77, 4.5e-4, 1.54)]  # fmt: skip
+    told = [(3, 5.87, 0.81, 8.6e-4, 19.2), (5, 5.95, 0.65, 5.3e-4, 3.56), (10, 10.2, 0.77, 4.5e-4, 1.54)]
     return [
         CurvePeak(v, size, 180.0, ContactsAtPeak(share, False, False), x, per_m * x, force=442 / v)
         for v, size, share, x, per_m in told
@@ -324,7 +322,12 @@ def test_time_integration_of_a_point_beside_the_peak_doubts_that_point_alone() -
     data = synthetic_result(ratios=(5,), n=12)
     peak = int(data["peak_point"][0])
     for at, hit in ((peak + 1, [peak + 1]), (peak, [peak])):
-        row = {"case": 0, "frequency_hz": float(data["frequency_hz"][at]), "sentence": "1 Hz: it rings on", "settled": 0}  # fmt: skip
+        row = {
+            "case": 0,
+            "frequency_hz": float(data["frequency_hz"][at]),
+            "sentence": "1 Hz: it rings on",
+            "settled": 0,
+        }
         told = data.assign({f"not_periodic_{k}": ("not_periodic", [v]) for k, v in row.items()})
         (found,) = not_periodic(Curve(told, 0))
         assert (found.level, list(found.points)) == ("doubtful", hit)

@@ -127,13 +127,7 @@ class ToyStudy:
         build: Callable[[], Any] = partial(self._build, factor)
         values = {"factor": factor}
         return Case(
-            index,
-            f"factor = {factor:g}",
-            values,
-            SimpleNamespace(toy=toy),
-            build,
-            str(factor),
-            self.path.parent,
+            index, f"factor = {factor:g}", values, SimpleNamespace(toy=toy), build, str(factor), self.path.parent
         )
 
     def _build(self, factor: float) -> Any:

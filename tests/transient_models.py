@@ -27,13 +27,9 @@ def structure_of(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -
     )
 
 
-def load_of(
-    n: int, harmonics: dict[int, list[complex]], static: list[float] | None = None
-) -> HarmonicLoad:
+def load_of(n: int, harmonics: dict[int, list[complex]], static: list[float] | None = None) -> HarmonicLoad:
     amplitudes = {h: np.array(f, dtype=complex) for h, f in harmonics.items()}
-    return HarmonicLoad(
-        np.zeros(n) if static is None else np.array(static, dtype=float), amplitudes
-    )
+    return HarmonicLoad(np.zeros(n) if static is None else np.array(static, dtype=float), amplitudes)
 
 
 def wedge() -> tuple[Structure, FloatArray, list[ElasticCoulomb], HarmonicLoad]:
@@ -44,20 +40,14 @@ def wedge() -> tuple[Structure, FloatArray, list[ElasticCoulomb], HarmonicLoad]:
 
 
 def stuck_motion(
-    structure: Structure,
-    gap: FloatArray,
-    laws: list[ElasticCoulomb],
-    load: HarmonicLoad,
-    omega: float,
+    structure: Structure, gap: FloatArray, laws: list[ElasticCoulomb], load: HarmonicLoad, omega: float
 ) -> tuple[ComplexArray, TransientStart]:
     """Static and first-harmonic amplitudes where contacts stick with no mean traction, and the state at t = 0."""
     springs = np.array([[law.k_t, law.k_w, law.k_n] for law in laws])
     stiffness = structure.stiffness + gap.T @ (springs.reshape(-1, 1) * gap)
     dynamic = stiffness - omega**2 * structure.mass + 1j * omega * structure.damping
     normal = gap[2::3]
-    static = np.linalg.solve(
-        structure.stiffness + normal.T @ (springs[:, 2:] * normal), load.static
-    )
+    static = np.linalg.solve(structure.stiffness + normal.T @ (springs[:, 2:] * normal), load.static)
     motion = np.array([static, np.linalg.solve(dynamic, load.harmonics[1])])
     start = start_from_harmonics(motion, omega, gap, laws)
     # their mean stretches no spring: sliders go where the mean has brought them

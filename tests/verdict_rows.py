@@ -21,8 +21,7 @@ def case_of(values: Mapping[str, Any], changes: Mapping[str, Any]) -> Case:
     """Return variables of a case; what is changed to None is not there."""
     every = {name: value for name, value in {**values, **changes}.items() if value is not None}
     return {
-        name: xr.Variable([f"d{k}" for k in range(np.ndim(value))], np.asarray(value))
-        for name, value in every.items()
+        name: xr.Variable([f"d{k}" for k in range(np.ndim(value))], np.asarray(value)) for name, value in every.items()
     }
 
 

@@ -53,9 +53,7 @@ class Comparison:
 
 def main() -> int:
     """Compare, print, and return 0 if nothing differs."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("commit", help="whose sources are compared with those of the working tree")
     parser.add_argument("names", nargs="*", help="of examples; all of them where none is given")
     parser.add_argument("--workers", type=int, default=2)
@@ -69,13 +67,8 @@ def main() -> int:
     for path in oldest_trees(OUT):
         shutil.rmtree(path)
     if trees[0].folder == trees[1].folder:
-        print(
-            f"{asked.commit} and the working tree have the same sources: this shows that two runs agree"
-        )
-    with (
-        TemporaryDirectory(prefix="stickslip-baseline-") as folder,
-        ThreadPoolExecutor(asked.workers) as pool,
-    ):
+        print(f"{asked.commit} and the working tree have the same sources: this shows that two runs agree")
+    with TemporaryDirectory(prefix="stickslip-baseline-") as folder, ThreadPoolExecutor(asked.workers) as pool:
         if not asked.names:
             for ended in [
                 pool.submit(ran, tree, ("compile",), Path(folder), Path(folder) / f"compile-{i}")
@@ -110,10 +103,7 @@ def named(names: Sequence[str]) -> list[Example]:
 def told(one: Comparison) -> Comparison:
     """Print what came of a study."""
     if not one.differences:
-        print(
-            f"{one.name}: {one.compared} variables identical, texts too ({one.seconds:.0f} s)",
-            flush=True,
-        )
+        print(f"{one.name}: {one.compared} variables identical, texts too ({one.seconds:.0f} s)", flush=True)
         return one
     print(f"{one.name}: DIFFERENT", flush=True)
     for line in one.differences:
@@ -158,25 +148,17 @@ def ran(tree: Tree, arguments: tuple[str, ...], folder: Path, terminal: Path) ->
 def differing_folders(old: Path, new: Path) -> tuple[list[str], int]:
     """Return what differs in the results and texts of two folders, and the number of variables."""
     found, count = [], 0
-    files = sorted(
-        {path.relative_to(one) for one in (old, new) for path in one.rglob("*") if path.is_file()}
-    )
+    files = sorted({path.relative_to(one) for one in (old, new) for path in one.rglob("*") if path.is_file()})
     for file in files:
         a, b = old / file, new / file
         if file.suffix == ".nc" and a.exists() and b.exists():
             before, after = read_nodes(a), read_nodes(b)
             count += sum(len(node.variables) for node in before.values())
             lines = differing_results(before, after)
-            found += lines[:MAX_SHOWN] + (
-                [f"... and {len(lines) - MAX_SHOWN} more"] if len(lines) > MAX_SHOWN else []
-            )
+            found += lines[:MAX_SHOWN] + ([f"... and {len(lines) - MAX_SHOWN} more"] if len(lines) > MAX_SHOWN else [])
         elif file.suffix in TEXTS and a.exists() and b.exists():
-            before_text, after_text = (
-                path.read_text(encoding="utf-8", errors="backslashreplace") for path in (a, b)
-            )
-            found += differing_lines(
-                str(file), TEXTS[file.suffix](before_text), TEXTS[file.suffix](after_text)
-            )
+            before_text, after_text = (path.read_text(encoding="utf-8", errors="backslashreplace") for path in (a, b))
+            found += differing_lines(str(file), TEXTS[file.suffix](before_text), TEXTS[file.suffix](after_text))
         elif file.suffix in (".nc", *TEXTS):
             found.append(f"{file}: written by {'the old' if a.exists() else 'the new'} tree alone")
     return found, count

@@ -11,10 +11,7 @@ from evidence.baseline.texts import timeless
 
 TIMES = "seconds"  # in the names of what no two runs share
 TEXTS = "OUS"  # kinds of arrays
-LETTERS_BEFORE, LETTERS_AFTER = (
-    60,
-    100,
-)  # of a text that are printed about the first letter that differs
+LETTERS_BEFORE, LETTERS_AFTER = (60, 100)  # of a text that are printed about the first letter that differs
 OF_THE_RUN = ("created", "wall_seconds", "stickslip_version", "versions")  # attributes of the root
 
 
@@ -76,10 +73,7 @@ def _names(kind: str, where: str, old: Mapping[Any, Any], new: Mapping[Any, Any]
 
 
 def _attributes(where: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    own = [
-        {k: v for k, v in one.items() if k not in OF_THE_RUN and TIMES not in k}
-        for one in (old, new)
-    ]
+    own = [{k: v for k, v in one.items() if k not in OF_THE_RUN and TIMES not in k} for one in (old, new)]
     yield from _names("attribute", f"{where}@", *own)
     for name in (name for name in own[0] if name in own[1]):
         a, b = (xr.Variable([f"i{k}" for k in range(np.ndim(one[name]))], one[name]) for one in own)
@@ -91,8 +85,6 @@ def _shown(old: Any, new: Any) -> str:
     if isinstance(old, np.generic):
         return f"{old.item()!r}, now {new.item()!r}"
     a, b = _text(old), _text(new)
-    at = next(
-        (i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b))
-    )
+    at = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     start = max(at - LETTERS_BEFORE, 0)
     return f"{a[start : at + LETTERS_AFTER]!r}, now {b[start : at + LETTERS_AFTER]!r}"

@@ -38,9 +38,7 @@ class Example:
 
     def write(self, folder: Path) -> None:
         """Write the study and the files that it reads into a folder."""
-        shutil.copytree(
-            EXAMPLES / self.name, folder, ignore=shutil.ignore_patterns("results", "__pycache__")
-        )
+        shutil.copytree(EXAMPLES / self.name, folder, ignore=shutil.ignore_patterns("results", "__pycache__"))
         path = folder / "study.toml"
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
         path.write_text(toml_text(changed(tables, self.settings)), encoding="utf-8")
@@ -51,83 +49,42 @@ COARSE_BLADES = {
     "part.blades.platform_size_m": 0.012,
     "part.blades.foot_size_m": 0.016,
 }
-COARSE_SECTOR = {
-    "part.blade.disk_size_m": 0.04,
-    "part.blade.platform_size_m": 0.03,
-    "part.blade.airfoil_size_m": 0.03,
-}
+COARSE_SECTOR = {"part.blade.disk_size_m": 0.04, "part.blade.platform_size_m": 0.03, "part.blade.airfoil_size_m": 0.03}
 SMALL = {
     one.name: one
     for one in (
         Example(
             "two_blades",
             COARSE_BLADES
-            | {
-                "vary.load.shaker.ratio": [250, 4],
-                "forced_response.points": 10,
-                "forced_response.peak_points": 4,
-            },
+            | {"vary.load.shaker.ratio": [250, 4], "forced_response.points": 10, "forced_response.peak_points": 4},
             seconds=40,
         ),
         Example(
             "second_bending",
             COARSE_BLADES
-            | {
-                "vary.load.shaker.ratio": [100, 5],
-                "forced_response.points": 8,
-                "forced_response.peak_points": 4,
-            },
+            | {"vary.load.shaker.ratio": [100, 5], "forced_response.points": 8, "forced_response.peak_points": 4},
             seconds=40,
         ),
-        Example(
-            "friction_ring", {"vary.contact.groove.slip_limit_n": [1.0, 2.9, 20.0]}, seconds=40
-        ),
-        Example(
-            "mistuned_wheel",
-            {"vary.contact.damper.slip_limit_n": [2.0], "forced_response.points": 8},
-            seconds=40,
-        ),
+        Example("friction_ring", {"vary.contact.groove.slip_limit_n": [1.0, 2.9, 20.0]}, seconds=40),
+        Example("mistuned_wheel", {"vary.contact.damper.slip_limit_n": [2.0], "forced_response.points": 8}, seconds=40),
         Example(
             "shrouded_sector",
-            COARSE_SECTOR
-            | {"forced_response.points": 6, "campbell.points": 3, "safe.engine_orders": [4, 6, 12]},
+            COARSE_SECTOR | {"forced_response.points": 6, "campbell.points": 3, "safe.engine_orders": [4, 6, 12]},
             seconds=40,
         ),
         Example(
             "platform_damper",
-            {
-                "vary.load.gas.force_n": [3.0],
-                "forced_response.points": 6,
-                "part.blade.disk_size_m": 0.04,
-            },
+            {"vary.load.gas.force_n": [3.0], "forced_response.points": 6, "part.blade.disk_size_m": 0.04},
             seconds=40,
         ),
-        Example(
-            "own_blades", {"vary.load.shaker.ratio": [500], "forced_response.points": 8}, seconds=40
-        ),
-        Example(
-            "calculix_wheel",
-            {"vary.load.gas.force_n": [2.0], "forced_response.points": 6},
-            seconds=40,
-        ),
+        Example("own_blades", {"vary.load.shaker.ratio": [500], "forced_response.points": 8}, seconds=40),
+        Example("calculix_wheel", {"vary.load.gas.force_n": [2.0], "forced_response.points": 6}, seconds=40),
         Example("sector_deck", {}, seconds=40),
-        Example(
-            "run_up",
-            {"part.blade.disk_size_m": 0.04, "run_up.points": 6, "run_up.peak_points": 2},
-            seconds=40,
-        ),
-        Example(
-            "root_joint",
-            {"vary.load.shaker.force_n": [20.0], "forced_response.points": 6},
-            seconds=40,
-        ),
+        Example("run_up", {"part.blade.disk_size_m": 0.04, "run_up.points": 6, "run_up.peak_points": 2}, seconds=40),
+        Example("root_joint", {"vary.load.shaker.force_n": [20.0], "forced_response.points": 6}, seconds=40),
         Example(
             "rubbing_beam",
-            {
-                "vary.load.side.force_n": [1.0],
-                "vary.load.up.force_n": [1.0],
-                "forced_response.points": 10,
-            },
+            {"vary.load.side.force_n": [1.0], "vary.load.up.force_n": [1.0], "forced_response.points": 10},
             seconds=40,
         ),
         Example("two_tones", {"quasi_periodic.points": 3}, seconds=20),

@@ -13,9 +13,7 @@ MAX_LETTERS = 240  # of a line that is printed
 _SECONDS = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+-]?\d+)? (?:s|ms|min|hours|days)\b")
 _STAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\+00:00|Z)?")
 _VERSION = re.compile(r"(stickslip )\d+(?:\.\d+)+[\w.+]*")
-_SHARES = re.compile(
-    r"(: )[\d.]+ % in the contact laws, [\d.]+ % in linear algebra, [\d.]+ % in the rest"
-)
+_SHARES = re.compile(r"(: )[\d.]+ % in the contact laws, [\d.]+ % in linear algebra, [\d.]+ % in the rest")
 _COMPILED = re.compile(r"compil(?:ing|ed) (?:the )?contact laws")
 _PROGRESS = re.compile(r"^  .* \d+ %$")  # a line a minute of a job that lasts
 # the heads of columns that hold such times
@@ -36,9 +34,7 @@ def terminal_lines(text: str) -> list[str]:
     The width of a time changes those of the other columns, and so where they are broken. Hence the rows of such a table
     are put together again, one a line.
     """
-    kept = [
-        line for line in text.splitlines() if not (_COMPILED.search(line) or _PROGRESS.match(line))
-    ]
+    kept = [line for line in text.splitlines() if not (_COMPILED.search(line) or _PROGRESS.match(line))]
     lines: list[str] = []
     for kind, group in groupby(kept, _kind_of_line):
         own = list(group)
@@ -102,9 +98,7 @@ def _markup(html: str) -> list[str]:
 
 def _without_times(table: str) -> str:
     rows = _HTML_ROW.findall(table)
-    heads = (
-        [_HTML_TAG.sub("", cell[1]).strip() for cell in _HTML_CELL.findall(rows[0])] if rows else []
-    )
+    heads = [_HTML_TAG.sub("", cell[1]).strip() for cell in _HTML_CELL.findall(rows[0])] if rows else []
     timed = {i for i, head in enumerate(heads) if _TIMED.match(head)}
     if not timed:
         return table
@@ -136,10 +130,7 @@ def _brought_near(diff: Iterable[str]) -> list[str]:
     lines = list(diff)
     for i, (first, second) in enumerate(pairwise(lines)):
         if first[:1] == "-" and second[:1] == "+" and min(len(first), len(second)) > MAX_LETTERS:
-            same = next(
-                (k for k, (a, b) in enumerate(zip(first[1:], second[1:], strict=False)) if a != b),
-                0,
-            )
+            same = next((k for k, (a, b) in enumerate(zip(first[1:], second[1:], strict=False)) if a != b), 0)
             start = max(same - MAX_LETTERS // 4, 0)
             lines[i], lines[i + 1] = (f"{one[0]}...{one[1 + start :]}" for one in (first, second))
     return lines

@@ -14,9 +14,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "src/stickslip"
 MAX_KEPT_TREES = 4  # folders of sources and compiled functions, some 60 MB each
 DIGITS = 16  # of the digest in a folder's name
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 @dataclass(frozen=True)
@@ -36,16 +34,8 @@ class Tree:
 
     def environment(self) -> dict[str, str]:
         """Return the variables of a process that imports this tree, with one thread."""
-        kept = {
-            k: v
-            for k, v in os.environ.items()
-            if k not in ("PYTHONDONTWRITEBYTECODE", "NUMBA_CACHE_DIR")
-        }
-        return (
-            kept
-            | ONE_THREAD
-            | {"PYTHONPATH": str(self.folder / "src"), "PYTHONHASHSEED": "0", "NO_COLOR": "1"}
-        )
+        kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONDONTWRITEBYTECODE", "NUMBA_CACHE_DIR")}
+        return kept | ONE_THREAD | {"PYTHONPATH": str(self.folder / "src"), "PYTHONHASHSEED": "0", "NO_COLOR": "1"}
 
     def command(self, arguments: tuple[str, ...]) -> list[str]:
         """Return the command line of ``stickslip`` with these arguments."""

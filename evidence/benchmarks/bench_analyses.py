@@ -83,8 +83,12 @@ def first_frequency(plates: Plates) -> float:
     """Return the first natural frequency with all contacts stuck, rad/s."""
     stuck = plates.system.stuck_structure()
     square = scipy.sparse.linalg.eigsh(
-        scipy.sparse.csc_array(stuck.stiffness), 1, scipy.sparse.csc_array(stuck.mass), sigma=0.0, return_eigenvectors=False,
-    )[0]  # fmt: skip
+        scipy.sparse.csc_array(stuck.stiffness),
+        1,
+        scipy.sparse.csc_array(stuck.mass),
+        sigma=0.0,
+        return_eigenvectors=False,
+    )[0]
     return float(np.sqrt(square))
 
 
@@ -142,9 +146,15 @@ def wheel_with(contacts: int, order: int) -> Rubbing:
 def _swept(task: Task, system: System, load: HarmonicLoad, middle: float) -> np.ndarray:
     how = task.how
     sweep = Sweep(
-        omega_range=task.around(middle), selection="always_high", low=how.order, high=how.order,
-        points=task.points, peak_points=0, samples=how.samples, newton=how.newton,
-    )  # fmt: skip
+        omega_range=task.around(middle),
+        selection="always_high",
+        low=how.order,
+        high=how.order,
+        points=task.points,
+        peak_points=0,
+        samples=how.samples,
+        newton=how.newton,
+    )
     found = accepted_points(list(forced_response(system, load, sweep)))
     _all_found(p.converged for p in found)
     return np.ravel(found[-1].coefficients)
@@ -166,7 +176,7 @@ def level(task: Task) -> np.ndarray:
     span = (1.0, 1.3) if task.short else (0.5, 4.0)
     omega = (1.0 - 0.5 * FAR) * task.resonance
     system = task.plates.system
-    found = list(branch_in_parameter(system, task.load, "excitation", span, omega, task.points, task.how))  # fmt: skip
+    found = list(branch_in_parameter(system, task.load, "excitation", span, omega, task.points, task.how))
     _all_found(p.converged for p in found)
     return np.ravel(found[-1].coefficients)
 
@@ -175,7 +185,7 @@ def peak(task: Task) -> np.ndarray:
     """Return amplitudes of a peak tracked through levels of the load."""
     values = (1.0, 1.05) if task.short else (1.0, 1.3)
     around = task.around(task.resonance)
-    found = list(track_peak(task.plates.system, task.load, "excitation", values, around, discretisation=task.how))  # fmt: skip
+    found = list(track_peak(task.plates.system, task.load, "excitation", values, around, discretisation=task.how))
     _all_found(p.converged for p in found)
     return np.array([p.amplitude for p in found])
 
@@ -229,16 +239,18 @@ CASES = {
 def measured(name: str, contacts: int, order: int) -> dict[str, Any]:
     """Compare the three ways of one analysis of one size."""
     told, analysis, same = CASES[name]
-    ways = {"auto": (Krylov(), nullcontext), "anew": (Krylov(memory=Forgetful()), nullcontext), "arrays": (Krylov(), arrays)}  # fmt: skip
+    ways = {
+        "auto": (Krylov(), nullcontext),
+        "anew": (Krylov(memory=Forgetful()), nullcontext),
+        "arrays": (Krylov(), arrays),
+    }
     spent, answers = dict[str, float](), dict[str, np.ndarray]()
     for way, (krylov, form) in ways.items():
         newton = Newton(linear=Automatic(krylov=krylov))
         how = Discretisation(order=order, samples=max(SAMPLES, 8 * order), newton=newton)
         task = Task(contacts, how, order > LONG)
         if not spent:
-            analysis(
-                replace(task, how=replace(how, newton=Newton()))
-            )  # kernels, tables and models are there for all
+            analysis(replace(task, how=replace(how, newton=Newton())))  # kernels, tables and models are there for all
         start = process_time()
         with form():
             answers[way] = analysis(task)
@@ -249,12 +261,14 @@ def measured(name: str, contacts: int, order: int) -> dict[str, Any]:
     kept, anew = (ways[way][0].counts for way in ("auto", "anew"))
     unknowns = 3 * contacts * (2 * order + 1)
     return {
-        "name": f"krylov/{name}_{unknowns}", "value": ratio, "goal": f">= {GOAL:g}",
+        "name": f"krylov/{name}_{unknowns}",
+        "value": ratio,
+        "goal": f">= {GOAL:g}",
         "holds": bool(ratio >= GOAL and max(off.values()) <= same),
         "note": f"{told}, {contacts} contacts, H = {order}: {spent['arrays']:.2f} s with arrays over {spent['auto']:.2f} s by default; {kept.systems} systems, "
         f"{kept.products} products, {kept.preconditioners} preconditioners; with none kept {anew.systems} systems, {anew.products} products, {anew.preconditioners} "
         f"preconditioners, {spent['anew']:.2f} s: keeping saves {saved:.1f} times; answers differ by {off['arrays']:.1e} and {off['anew']:.1e}",
-    }  # fmt: skip
+    }
 
 
 def run() -> list[dict[str, Any]]:

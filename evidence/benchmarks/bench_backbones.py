@@ -33,9 +33,7 @@ def run() -> list[dict[str, Any]]:
     mode = max(modes, key=lambda m: abs(np.vdot(m.shape, load.harmonics[1])) / m.omega**2)
     how = Discretisation(order=ORDER, samples=blades.sweep.samples)
     along = ModeSweep(points=POINTS, to_gross_slip=True)
-    swept = replace(
-        blades.sweep, low=ORDER, high=ORDER, selection="always_high", points=POINTS, peak_points=0
-    )
+    swept = replace(blades.sweep, low=ORDER, high=ORDER, selection="always_high", points=POINTS, peak_points=0)
     own, found, others = list[float](), None, {ratio: list[float]() for ratio in RATIOS}
     counts = dict[float, int]()
     for _ in range(REPEATS):

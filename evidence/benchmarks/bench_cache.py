@@ -108,9 +108,7 @@ print(json.dumps({
 def first_call(script: Path, cache: str) -> dict[str, Any]:
     """Return CPU seconds, functions compiled and functions loaded in a new process that keeps kernels in `cache`."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": cache, "NUMBA_NUM_THREADS": "2"}
-    out = subprocess.run(
-        [sys.executable, str(script)], env=environment, capture_output=True, text=True, check=True
-    )
+    out = subprocess.run([sys.executable, str(script)], env=environment, capture_output=True, text=True, check=True)
     found: dict[str, Any] = json.loads(out.stdout.splitlines()[-1])
     return found
 

@@ -41,15 +41,9 @@ STEP = 0.2  # rad/s between points
 LOAD_SHARES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)  # of a load that is ramped up
 HYBRID = {
     "solver": "scipyroot",
-    "solver_options": {
-        "residual_tolerance": 1e-8,
-        "root": {"method": "hybr", "options": {"xtol": 1e-10}},
-    },
+    "solver_options": {"residual_tolerance": 1e-8, "root": {"method": "hybr", "options": {"xtol": 1e-10}}},
 }
-NEWTON_RAPHSON = {
-    "solver": "NewtonRaphson",
-    "solver_options": {"tol_residual": 1e-9, "max_iter": 30},
-}
+NEWTON_RAPHSON = {"solver": "NewtonRaphson", "solver_options": {"tol_residual": 1e-9, "max_iter": 30}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,14 +96,26 @@ class Chain:
 
 CASES = {
     "small": (
-        Chain(masses=20, mass=1.0, stiffness=1e4, elements=6, k_t=2e3, limit=10.0, omega_range=(6.0, 12.0), points=32, rival_runs=3),
+        Chain(
+            masses=20,
+            mass=1.0,
+            stiffness=1e4,
+            elements=6,
+            k_t=2e3,
+            limit=10.0,
+            omega_range=(6.0, 12.0),
+            points=32,
+            rival_runs=3,
+        ),
         80.0,
     ),
     "big": (
-        Chain(masses=100, mass=0.2, stiffness=5e4, elements=60, k_t=200.0, limit=1.0, omega_range=(8.0, 14.0), points=32),
+        Chain(
+            masses=100, mass=0.2, stiffness=5e4, elements=60, k_t=200.0, limit=1.0, omega_range=(8.0, 14.0), points=32
+        ),
         90.0,
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +140,7 @@ def rival(python: str, case: Chain, method: dict[str, Any]) -> Rival:
     options = {"step": STEP, "corrector": "arc_length", "reductor": "noreductor", **method}
     with tempfile.TemporaryDirectory() as folder:  # pyHarm leaves a folder where it runs
         run = subprocess.run(
-            [
-                python,
-                str(HERE / "rival_pyharm.py"),
-                json.dumps(asdict(case) | {"options": options}),
-            ],
+            [python, str(HERE / "rival_pyharm.py"), json.dumps(asdict(case) | {"options": options})],
             capture_output=True,
             text=True,
             check=True,
@@ -182,7 +184,7 @@ def split(case: Chain, points: list[ForcedPoint], seconds: float) -> str:
     array = isinstance(at.jac, np.ndarray)
 
     def solve() -> None:  # an array is overwritten
-        linear.solve(at.jac.copy(order="K") if isinstance(at.jac, np.ndarray) else at.jac, at.residual)  # fmt: skip
+        linear.solve(at.jac.copy(order="K") if isinstance(at.jac, np.ndarray) else at.jac, at.residual)
 
     contacts, residual, jacobian, slope, factors, condensed = medians(
         [

@@ -43,7 +43,7 @@ def random_structure(interior: int, proportional: bool) -> Case:
     stiffness = np.diag(springs + np.append(springs[1:], 1e5))
     stiffness -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
     near, far = np.arange(n - STRIDE), np.arange(STRIDE, n)
-    for rows, columns, value in ((near, near, 2e5), (far, far, 2e5), (near, far, -2e5), (far, near, -2e5)):  # fmt: skip
+    for rows, columns, value in ((near, near, 2e5), (far, far, 2e5), (near, far, -2e5), (far, near, -2e5)):
         stiffness[rows, columns] += value
     damping = 1e-5 * stiffness
     if not proportional:
@@ -54,9 +54,7 @@ def random_structure(interior: int, proportional: bool) -> Case:
     return Case(lumped(mass, stiffness, damping), retained, load)
 
 
-def schur(
-    case: Case, omega: float, harmonic: int
-) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+def schur(case: Case, omega: float, harmonic: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
     """Return Z, F and their ω-derivatives of one harmonic by one factorisation of the interior."""
     structure, kept = case.structure, case.retained
     inner = np.setdiff1d(np.arange(structure.n), kept)
@@ -64,25 +62,19 @@ def schur(
 
     def block(rows: IntArray, columns: IntArray) -> tuple[ComplexArray, ComplexArray]:
         parts: list[FloatArray] = [
-            np.asarray(a)[np.ix_(rows, columns)]
-            for a in (structure.stiffness, structure.damping, structure.mass)
+            np.asarray(a)[np.ix_(rows, columns)] for a in (structure.stiffness, structure.damping, structure.mass)
         ]
         k, c, m = parts
         return k + p * c + p * p * m, c + 2.0 * p * m
 
-    (d_nn, s_nn), (d_nl, s_nl), (d_ll, s_ll) = block(kept, kept), block(kept, inner), block(inner, inner)  # fmt: skip
+    (d_nn, s_nn), (d_nl, s_nl), (d_ll, s_ll) = block(kept, kept), block(kept, inner), block(inner, inner)
     f = case.load.coefficients(HARMONICS)[harmonic]
     moved = np.linalg.solve(d_ll, np.column_stack([d_nl.T, f[inner]]))
     x, load = moved[:, :-1], moved[:, -1]
     turned = x.T @ s_ll - s_nl
     slope = s_nn - x.T @ s_nl.T + turned @ x
     by_omega = 1j * harmonic
-    return (
-        d_nn - d_nl @ x,
-        f[kept] - d_nl @ load,
-        by_omega * slope,
-        by_omega * (turned @ load),
-    )
+    return (d_nn - d_nl @ x, f[kept] - d_nl @ load, by_omega * slope, by_omega * (turned @ load))
 
 
 def timed(action: Callable[[], object], times: int = 1) -> float:

@@ -50,10 +50,7 @@ def contacts(order: int, n: int = CONTACTS) -> Contacts:
     decay = np.repeat(1.0 / np.maximum(np.arange(order + 1), 1) ** 1.5, 2)[1:, None, None]
     gap = 1e-5 * decay * rng.standard_normal((2 * order + 1, n, 3))
     gap[:, :, :2] *= 10.0 ** rng.uniform(-0.5, 1.0, (n, 2))
-    laws = [
-        ElasticCoulomb(k_t=1e7, k_w=1.5e7, k_n=2e7, mu=0.5, preload=200.0 * p)
-        for p in rng.uniform(0.0, 4.0, n)
-    ]
+    laws = [ElasticCoulomb(k_t=1e7, k_w=1.5e7, k_n=2e7, mu=0.5, preload=200.0 * p) for p in rng.uniform(0.0, 4.0, n)]
     return Contacts(laws, gap.reshape(2 * order + 1, 3 * n))
 
 
@@ -221,9 +218,7 @@ def by_numpy(case: Contacts, samples: int) -> Callable[[], Blocks]:
             moved = stick == 0.0
             slider = np.where(moved, x - f / k, slider)
             slider_rows[:, :, 0] = np.where(moved[:, :, None], b, slider_rows[:, :, 0])
-            slider_rows[:, :, 1] = np.where(
-                moved[:, :, None], -(slope / k)[:, :, None] * b, slider_rows[:, :, 1]
-            )
+            slider_rows[:, :, 1] = np.where(moved[:, :, None], -(slope / k)[:, :, None] * b, slider_rows[:, :, 1])
             force[i, :, :2] = f
         blocks = np.empty((n, 5, m, m))
         tangents = analysis.T @ rows.reshape(samples, -1)
@@ -284,15 +279,13 @@ def ratios(order: int, samples: int, goals: dict[str, float]) -> list[dict[str, 
     seconds = medians(actions, ROUNDS)
     slow = medians({"numpy": twin, "march": actions["march"]}, NUMPY_ROUNDS)
     state = contact_forces(case.gap, case.compiled("intervals"), samples).state
-    shares = ", ".join(
-        f"{np.mean(state == s):.0%} {word}" for s, word in enumerate(("stuck", "slipping", "open"))
-    )
+    shares = ", ".join(f"{np.mean(state == s):.0%} {word}" for s, word in enumerate(("stuck", "slipping", "open")))
     where = f"{CONTACTS} contacts, H = {order}, {samples} samples, {shares}"
     took = ", ".join(f"{name} {1e3 * t:.2f}" for name, t in seconds.items())
     own = min(seconds["loop"], seconds["blas"])
     records = []
     for name, goal in goals.items():
-        for rival, label in (("march", "march"), ("loop", "loop_by_hand"), ("blas", "blas_by_hand")):  # fmt: skip
+        for rival, label in (("march", "march"), ("loop", "loop_by_hand"), ("blas", "blas_by_hand")):
             ratio = seconds[rival] / seconds[name]
             records.append(
                 {
@@ -338,9 +331,7 @@ def convergence(order: int = 5) -> list[dict[str, Any]]:
     exact = evaluated(case, 8, "events")()
     states = contact_forces(case.gap, case.compiled("events"), 4096).state
     lifts = np.any(states == OPEN, axis=(1, 2))
-    errors = np.array(
-        [_errors(case, n, exact, chosen) for n in SAMPLES for chosen in (~lifts, lifts)]
-    )
+    errors = np.array([_errors(case, n, exact, chosen) for n in SAMPLES for chosen in (~lifts, lifts)])
     slopes = -np.polyfit(np.log(SAMPLES), np.log(errors.reshape(len(SAMPLES), 4)), 1)[0]
     records = []
     for j, (what, wanted) in enumerate(
@@ -364,10 +355,7 @@ def _errors(case: Contacts, samples: int, exact: Blocks, chosen: Any) -> list[fl
     """Return the relative root mean square distance of coefficients and blocks of some contacts from `exact`."""
     coefficients, blocks = evaluated(case, samples, "intervals")()
     directions = np.repeat(chosen, 3)
-    pairs = (
-        (coefficients[:, directions], exact[0][:, directions]),
-        (blocks[chosen], exact[1][chosen]),
-    )
+    pairs = ((coefficients[:, directions], exact[0][:, directions]), (blocks[chosen], exact[1][chosen]))
     return [float(np.linalg.norm(found - want) / np.linalg.norm(want)) for found, want in pairs]
 
 

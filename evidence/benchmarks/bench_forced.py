@@ -13,10 +13,7 @@ from evidence.models.two_blades import two_blades
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_points
 
 REPEATS = 2
-HERTZ = (
-    165.0,
-    184.0,
-)  # from the free blades to beyond the stuck ones, as the paper's 165 to 188 Hz
+HERTZ = (165.0, 184.0)  # from the free blades to beyond the stuck ones, as the paper's 165 to 188 Hz
 # F_CL/F_HE: fully stuck; slip near resonance; slip at most frequencies of the peak
 STUCK, WEAK, STRONG = (250.0, 100.0, 20.0)
 LOADS = (STUCK, WEAK, 50.0, STRONG, 10.0, 5.0)
@@ -40,10 +37,7 @@ class Timed:
     def split(self) -> str:
         """Shares of the time, and counts."""
         total = sum(p.seconds_total for p in self.points)
-        contact, linear = (
-            sum(getattr(p, name) for p in self.points)
-            for name in ("seconds_contact", "seconds_linear")
-        )
+        contact, linear = (sum(getattr(p, name) for p in self.points) for name in ("seconds_contact", "seconds_linear"))
         high = sum(p.order == self.problem.high.order for p in self.points)
         steps = sum(p.iterations for p in self.points)
         return (
@@ -53,9 +47,7 @@ class Timed:
 
     def amplitudes(self) -> dict[float, float]:
         """Amplitude of the first output at each frequency that was solved."""
-        return {
-            p.omega: self.problem.amplitude(p) for p in accepted_points(self.points) if p.converged
-        }
+        return {p.omega: self.problem.amplitude(p) for p in accepted_points(self.points) if p.converged}
 
 
 def timed(ratio: float, selection: str, repeats: int = REPEATS) -> Timed:
@@ -99,9 +91,7 @@ def alert_record(ratio: float, everywhere: Timed, alert: Timed) -> dict[str, Any
         "name": f"forced/high_everywhere_over_alert/ratio_{ratio:g}",
         "value": gain,
         "goal": f"> {PAPER}",
-        "holds": bool(
-            gain > PAPER and off <= threshold and everywhere.failed == 0 and alert.failed == 0
-        ),
+        "holds": bool(gain > PAPER and off <= threshold and everywhere.failed == 0 and alert.failed == 0),
         "note": (
             f"largest difference of amplitude {off:.1e} of the peak; H = 5 everywhere {everywhere.seconds:.2f} s "
             f"({everywhere.split}); alert {alert.seconds:.2f} s ({alert.split})"
@@ -115,14 +105,8 @@ def run() -> list[dict[str, Any]]:
     timed(WEAK, "jacobian_alert", repeats=1)  # compiles
     everywhere = {ratio: timed(ratio, "always_high") for ratio in LOADS}
     records = [
-        twenty_step_record(
-            f"forced/twenty_steps_{name}_cpu_seconds", everywhere[ratio], ratio, goal
-        )
-        for name, ratio, goal in (
-            ("weak", WEAK, 1.0),
-            ("nearly_stuck", STUCK, None),
-            ("strong", STRONG, None),
-        )
+        twenty_step_record(f"forced/twenty_steps_{name}_cpu_seconds", everywhere[ratio], ratio, goal)
+        for name, ratio, goal in (("weak", WEAK, 1.0), ("nearly_stuck", STUCK, None), ("strong", STRONG, None))
     ]
     alerts = {ratio: timed(ratio, "jacobian_alert") for ratio in LOADS}
     gains = [alert_record(ratio, everywhere[ratio], alerts[ratio]) for ratio in LOADS]
@@ -132,9 +116,7 @@ def run() -> list[dict[str, Any]]:
         "name": "forced/high_everywhere_over_alert",
         "value": seconds[0] / seconds[1],
         "goal": f"> {PAPER}",
-        "holds": bool(
-            seconds[0] / seconds[1] > PAPER and all(not r.failed for r in alerts.values())
-        ),
+        "holds": bool(seconds[0] / seconds[1] > PAPER and all(not r.failed for r in alerts.values())),
         "note": (
             f"all loads together, F_CL/F_HE = {', '.join(f'{r:g}' for r in LOADS)}; largest difference of amplitude "
             f"{off:.1e} of the peak; the gain is large where the alert is silent and lost where it repeats most frequencies"

@@ -47,9 +47,7 @@ TOLERANCE, SAME = 1e-8, 1e-6  # residual of a solution; relative difference of t
 GROSS_SLIP = 0.2  # share of the preload: nearly all contacts slip in the resonance
 MICRO_SLIP = 0.4
 GROSS = 0.9  # share of contacts that slip at some time of the period
-TWO_CORES = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "2"
-)
+TWO_CORES = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "2")
 
 # SuperLU's calls are small: a second thread of the BLAS waits for the first one
 CONTACTS_ON_TWO = {**ONE_THREAD, "NUMBA_NUM_THREADS": "2"}
@@ -96,9 +94,21 @@ def newton_records(points: int, median: float, worst: float, whole: bool) -> lis
     how = "" if whole else f"; LU: {lu_one:.1f} s a step times the steps that exact solutions take"
     note = f"{points} contacts, H = {ORDER}, from the bonded vibration to {TOLERANCE:g}: {'; '.join(notes)}{how}; answers differ by {same:.1e}"
     return [
-        record(f"krylov/newton_over_lu_{points}_median", float(np.median(ratios)), median, note, np.median(ratios) >= median and same <= SAME),
-        record(f"krylov/newton_over_lu_{points}_worst", min(ratios), worst, "slowest of the four states", min(ratios) >= worst),
-    ]  # fmt: skip
+        record(
+            f"krylov/newton_over_lu_{points}_median",
+            float(np.median(ratios)),
+            median,
+            note,
+            np.median(ratios) >= median and same <= SAME,
+        ),
+        record(
+            f"krylov/newton_over_lu_{points}_worst",
+            min(ratios),
+            worst,
+            "slowest of the four states",
+            min(ratios) >= worst,
+        ),
+    ]
 
 
 def gross_slip_record(*, unreduced: bool) -> dict[str, Any]:
@@ -111,7 +121,9 @@ def gross_slip_record(*, unreduced: bool) -> dict[str, Any]:
         if unreduced
         else f"the model and its reduction took {found['build']:.0f} s more"
     )
-    holds = minutes <= 10.0 and found["gib"] <= 4.0 and found["converged"] == found["points"] and found["slipping"] >= GROSS  # fmt: skip
+    holds = (
+        minutes <= 10.0 and found["gib"] <= 4.0 and found["converged"] == found["points"] and found["slipping"] >= GROSS
+    )
     return record(
         "many/thousand_contacts_unreduced_minutes" if unreduced else "many/thousand_contacts_gross_slip_minutes",
         minutes,
@@ -120,7 +132,7 @@ def gross_slip_record(*, unreduced: bool) -> dict[str, Any]:
         f"{found['cpu']:.0f} s of CPU; {found['slipping']:.0%} of the contacts slip within the period where it is most, {found['opening']:.0%} open; {found['steps']} Newton steps, "
         f"{found['products']} products, {found['preconditioners']} factors; {found['gib']:.1f} GiB with the model; {model}",
         holds,
-    )  # fmt: skip
+    )
 
 
 def step_record(contacts: str, seconds: float, gib: float) -> dict[str, Any]:
@@ -135,8 +147,11 @@ def step_record(contacts: str, seconds: float, gib: float) -> dict[str, Any]:
         f"{found['gib']:.1f} GiB with the model, whose assembly and bonded vibration took {found['build']:.0f} s more; at {LOW / (2 * np.pi):.0f} Hz from the bonded vibration to a residual of {found['residual']:.0e} in "
         f"{found['steps']} steps, {found['all_products']} products and {found['factors']} factors, {found['whole']:.0f} s ({found['whole_cpu']:.0f} s of CPU), "
         f"{found['whole_gib']:.1f} GiB",
-        found["seconds"] <= seconds and found["whole_gib"] <= gib and found["left"] <= INEXACT and found["residual"] <= TOLERANCE,
-    )  # fmt: skip
+        found["seconds"] <= seconds
+        and found["whole_gib"] <= gib
+        and found["left"] <= INEXACT
+        and found["residual"] <= TOLERANCE,
+    )
 
 
 def unreduced_record(contacts: int) -> dict[str, Any]:
@@ -152,7 +167,7 @@ def unreduced_record(contacts: int) -> dict[str, Any]:
         f"{sparse['kept']:.2f} and {dense['kept']:.2f} s; assembly with bonded vibration, and reduction, {sparse['build']:.1f} and {dense['build']:.1f} s; "
         f"amplitudes of the corner after the step differ by {found['difference']:.1e}, by the modes that the reduction leaves out",
         sparse["left"] <= INEXACT and dense["left"] <= INEXACT,
-    )  # fmt: skip
+    )
 
 
 def run() -> list[dict[str, Any]]:
@@ -179,9 +194,7 @@ def _solved(balance: HarmonicBalance, x: np.ndarray, linear: Any) -> tuple[Solut
 # ---- in processes of their own ----------------------------------------------------------------------------------------------------
 
 
-def gross_slip_in_here(
-    contacts: int = 1000, made: Callable[[int], Plates] = two_plates
-) -> dict[str, Any]:
+def gross_slip_in_here(contacts: int = 1000, made: Callable[[int], Plates] = two_plates) -> dict[str, Any]:
     """Forced response through the resonance under a load that makes nearly all contacts slip."""
     start = perf_counter()
     plates = made(contacts)
@@ -189,22 +202,33 @@ def gross_slip_in_here(
     first = np.sqrt(normal_modes(plates.system.stuck_structure(), 1).squares[0])
     krylov = Krylov()
     sweep = Sweep(
-        omega_range=(0.8 * first, 1.1 * first), selection="always_high", high=ORDER, samples=SAMPLES,
-        evaluator="intervals", frequencies=30, peak_points=0,
+        omega_range=(0.8 * first, 1.1 * first),
+        selection="always_high",
+        high=ORDER,
+        samples=SAMPLES,
+        evaluator="intervals",
+        frequencies=30,
+        peak_points=0,
         newton=Newton(tolerance=TOLERANCE, linear=Automatic(krylov=krylov)),
-    )  # fmt: skip
+    )
     start, cpu = perf_counter(), process_time()
     points = list(forced_response(plates.system, plates.load(GROSS_SLIP, "slide"), sweep))
     spent, cpu = perf_counter() - start, process_time() - cpu
     balance, _ = balance_of(plates, "slide", GROSS_SLIP, omega=first)
     states = [balance.contacts(balance.unknowns(p.coefficients), p.omega).state for p in points]
     return {
-        "minutes": spent / 60.0, "cpu": cpu, "gib": _peak(), "points": len(points), "converged": sum(p.converged for p in points),
-        "steps": sum(p.iterations for p in points), "products": krylov.counts.products,
-        "preconditioners": krylov.counts.preconditioners, "build": build,
+        "minutes": spent / 60.0,
+        "cpu": cpu,
+        "gib": _peak(),
+        "points": len(points),
+        "converged": sum(p.converged for p in points),
+        "steps": sum(p.iterations for p in points),
+        "products": krylov.counts.products,
+        "preconditioners": krylov.counts.preconditioners,
+        "build": build,
         "slipping": max(float(np.mean((s == 1).any(axis=(1, 2)))) for s in states),
         "opening": max(float(np.mean((s == 2).any(axis=(1, 2)))) for s in states),
-    }  # fmt: skip
+    }
 
 
 def step_in_here(contacts: int, made: Callable[[int], Plates]) -> tuple[dict[str, Any], float]:
@@ -226,9 +250,17 @@ def step_in_here(contacts: int, made: Callable[[int], Plates]) -> tuple[dict[str
     state = balance.contacts(x, OMEGA).state
     corner = balance.linear.recover(OMEGA, balance.coefficients(x + step))[1, plates.system.outputs]
     found = {
-        "points": contacts, "seconds": spent, "cpu": cpu, "kept": process_time() - again, "build": build, "gib": _peak(),
-        "unknowns": balance.size, "products": products, "left": float(left), "slip": float(np.mean(state == 1)),
-    }  # fmt: skip
+        "points": contacts,
+        "seconds": spent,
+        "cpu": cpu,
+        "kept": process_time() - again,
+        "build": build,
+        "gib": _peak(),
+        "unknowns": balance.size,
+        "products": products,
+        "left": float(left),
+        "slip": float(np.mean(state == 1)),
+    }
     return found, float(np.linalg.norm(corner))
 
 
@@ -246,9 +278,14 @@ def unreduced_in_here(contacts: int) -> dict[str, Any]:
     solution = newton(lambda v: balance.linearise(v, LOW), x, options)
     return found | {
         "build": build + found["build"],
-        "whole": perf_counter() - start, "whole_cpu": process_time() - cpu, "steps": solution.iterations, "residual": solution.residual_norm,
-        "all_products": krylov.counts.products, "factors": krylov.counts.preconditioners, "whole_gib": _peak(),
-    }  # fmt: skip
+        "whole": perf_counter() - start,
+        "whole_cpu": process_time() - cpu,
+        "steps": solution.iterations,
+        "residual": solution.residual_norm,
+        "all_products": krylov.counts.products,
+        "factors": krylov.counts.preconditioners,
+        "whole_gib": _peak(),
+    }
 
 
 def both_in_here(contacts: int) -> dict[str, Any]:

@@ -17,12 +17,7 @@ import numpy as np
 
 from evidence.models.many_contacts import two_plates
 from stickslip.response.forced.from_time import marched_of
-from stickslip.response.forced.response import (
-    ForcedPoint,
-    Sweep,
-    accepted_points,
-    forced_response,
-)
+from stickslip.response.forced.response import ForcedPoint, Sweep, accepted_points, forced_response
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Rung, Status
 
@@ -36,14 +31,18 @@ def sweep_over(hertz: tuple[float, ...], order: int = ORDER) -> Sweep:
     """Return what is asked for."""
     omegas = tuple(2.0 * np.pi * f for f in hertz)
     return Sweep(
-        omega_range=(omegas[0], max(omegas[-1], 1.001 * omegas[0])), at=omegas, low=order, high=order, selection="always_high", peak_points=0,
-        rescue="in_time", newton=Newton(max_iterations=PATIENCE),
-    )  # fmt: skip
+        omega_range=(omegas[0], max(omegas[-1], 1.001 * omegas[0])),
+        at=omegas,
+        low=order,
+        high=order,
+        selection="always_high",
+        peak_points=0,
+        rescue="in_time",
+        newton=Newton(max_iterations=PATIENCE),
+    )
 
 
-def sweep_records(
-    contacts: int, share: float, hertz: tuple[float, ...] = HERTZ
-) -> Iterator[dict[str, Any]]:
+def sweep_records(contacts: int, share: float, hertz: tuple[float, ...] = HERTZ) -> Iterator[dict[str, Any]]:
     """Yield a record for each frequency: 1 where it ends with a motion or a verdict, 0 where it does not."""
     plates, spent = two_plates(contacts), dict.fromkeys(hertz, (0, 0.0))
     points, began = [], process_time()
@@ -52,7 +51,11 @@ def sweep_records(
         now = process_time()
         steps, seconds = spent[_hertz(point)]
         spent[_hertz(point)] = steps + point.iterations, seconds + now - began
-        print(f"{contacts} contacts, share {share:g}, {_hertz(point):.0f} Hz, {point.stage}, {now - began:.0f} s: {told(point)}", file=sys.stderr, flush=True)  # fmt: skip
+        print(
+            f"{contacts} contacts, share {share:g}, {_hertz(point):.0f} Hz, {point.stage}, {now - began:.0f} s: {told(point)}",
+            file=sys.stderr,
+            flush=True,
+        )
         began = now
     for point in accepted_points(points):
         steps, seconds = spent[_hertz(point)]

@@ -51,19 +51,7 @@ EXACT, INEXACT = 1e-8, 1e-2  # residual that a step leaves; the second is what N
 SAME = 1e-6  # relative difference of two answers
 THOUSAND = 0.01  # share of the preload: at resonance the corner opens
 # contacts and harmonics around the crossover, and far beyond it
-CROSSING = (
-    (8, 3),
-    (12, 3),
-    (8, 7),
-    (12, 5),
-    (24, 3),
-    (8, 13),
-    (24, 5),
-    (12, 13),
-    (50, 3),
-    (24, 7),
-    (12, 21),
-)
+CROSSING = ((8, 3), (12, 3), (8, 7), (12, 5), (24, 3), (8, 13), (24, 5), (12, 13), (50, 3), (24, 7), (12, 21))
 CROSSING_STATES = {
     "stick": ("slide", 0.003),
     "micro-slip": ("slide", 0.1),
@@ -72,9 +60,7 @@ CROSSING_STATES = {
 }
 LONG = 1.0  # s, beyond which nothing is measured again
 GIGABYTE = 2.0**30
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 def balance_of(
@@ -83,9 +69,7 @@ def balance_of(
     """Return the problem under a load, its Jacobian known by products, and the bonded vibration."""
     system = plates.system
     linear = system.condensed(plates.load(share, pull), order)
-    balance = harmonic_balance(
-        linear, system.interface, order, max(SAMPLES, 8 * order), jacobian="structured"
-    )
+    balance = harmonic_balance(linear, system.interface, order, max(SAMPLES, 8 * order), jacobian="structured")
     return balance, bonded_start(balance, omega, system)
 
 
@@ -139,9 +123,7 @@ def step_record(points: int, goal: float, checked: tuple[str, ...]) -> list[dict
             f"{name} ({np.mean(state == 1):.0%} slip, {np.mean(state == 2):.0%} open): {1e3 * both[0]:.0f} and {1e3 * both[1]:.0f} ms"
         )
     dense = min(lu)
-    tail = (
-        f"{points} contacts, {balance.size} unknowns, H = {ORDER}; LU {dense:.3g} s a step, assembly included; by state: {'; '.join(notes)}"
-    )  # fmt: skip
+    tail = f"{points} contacts, {balance.size} unknowns, H = {ORDER}; LU {dense:.3g} s a step, assembly included; by state: {'; '.join(notes)}"
     return [
         record(
             f"many/krylov_step_over_lu_{points}",
@@ -195,10 +177,7 @@ def crossover_records() -> list[dict[str, Any]]:
                 off.append(_costs_off(balance, x))
     by_size = ", ".join(f"{s}: {r:.2f}" for s, r in zip(sizes, products, strict=True))
     median, worst = float(np.median(ratios)), max(ratios)
-    named = {
-        what: ", ".join(f"{s}: {o[what]:.2f}" for s, o in zip(sizes, off, strict=True))
-        for what in off[0]
-    }
+    named = {what: ", ".join(f"{s}: {o[what]:.2f}" for s, o in zip(sizes, off, strict=True)) for what in off[0]}
     most = max(max(value, 1.0 / value) for o in off for value in o.values())
     return [
         record(
@@ -258,8 +237,7 @@ def _costs_off(balance: HarmonicBalance, x: np.ndarray) -> dict[str, float]:
         "without what rests": (without_resting, reduced_cost(n, counts, known=False)),
     }
     return {
-        name: min(seconds(lambda a=action: [a() for _ in range(10)]) for _ in range(7))
-        / (10 * expected)  # type: ignore[misc]
+        name: min(seconds(lambda a=action: [a() for _ in range(10)]) for _ in range(7)) / (10 * expected)  # type: ignore[misc]
         for name, (action, expected) in actions.items()
     }
 
@@ -278,15 +256,21 @@ def growth_records() -> list[dict[str, Any]]:
     ]
     return [
         record(
-            "many/growth_with_harmonics", harmonics, "< 1.3",
-            f"exponent of a Newton step's time at 100 contacts in micro-slip, by H: {spelled[0]}", harmonics < 1.3,
+            "many/growth_with_harmonics",
+            harmonics,
+            "< 1.3",
+            f"exponent of a Newton step's time at 100 contacts in micro-slip, by H: {spelled[0]}",
+            harmonics < 1.3,
         ),
         record(
-            "many/growth_with_contacts", contacts, "< 1.3",
+            "many/growth_with_contacts",
+            contacts,
+            "< 1.3",
             f"exponent of a Newton step's time at H = {ORDER} in micro-slip, by contacts: {spelled[1]}; factors of full matrices grow with "
-            "the cube, so that this one cannot hold for ever", contacts < 1.3,
+            "the cube, so that this one cannot hold for ever",
+            contacts < 1.3,
         ),
-    ]  # fmt: skip
+    ]
 
 
 def thousand_record() -> dict[str, Any]:
@@ -338,9 +322,7 @@ def _solved(balance: HarmonicBalance, x: np.ndarray, form: str) -> tuple[Solutio
     return _newton(made, x, Automatic())
 
 
-def _newton(
-    balance: HarmonicBalance, x: np.ndarray, linear: LinearSolver
-) -> tuple[Solution, float]:
+def _newton(balance: HarmonicBalance, x: np.ndarray, linear: LinearSolver) -> tuple[Solution, float]:
     """Solve from a start; return the solution and CPU seconds."""
     start = process_time()
     solution = newton(lambda v: balance.linearise(v, OMEGA), x, Newton(linear=linear))
@@ -388,17 +370,18 @@ def thousand() -> dict[str, Any]:
     plates = two_plates(1000)
     build = process_time() - start
     stuck = plates.system.stuck_structure()
-    first = np.sqrt(
-        scipy.sparse.linalg.eigsh(
-            stuck.stiffness, 1, stuck.mass, sigma=0.0, return_eigenvectors=False
-        )[0]
-    )
+    first = np.sqrt(scipy.sparse.linalg.eigsh(stuck.stiffness, 1, stuck.mass, sigma=0.0, return_eigenvectors=False)[0])
     krylov = Krylov()
     sweep = Sweep(
-        omega_range=(0.94 * first, 1.04 * first), selection="always_high", high=ORDER, samples=SAMPLES,
-        evaluator="intervals", frequencies=4, peak_points=0,
+        omega_range=(0.94 * first, 1.04 * first),
+        selection="always_high",
+        high=ORDER,
+        samples=SAMPLES,
+        evaluator="intervals",
+        frequencies=4,
+        peak_points=0,
         newton=Newton(tolerance=1e-8, linear=Automatic(krylov=krylov)),
-    )  # fmt: skip
+    )
     start = process_time()
     points = list(forced_response(plates.system, plates.load(THOUSAND), sweep))
     spent = process_time() - start
@@ -408,11 +391,19 @@ def thousand() -> dict[str, Any]:
     size = [float(np.max(np.abs(p.coefficients[1]))) for p in points]
     return {
         "gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / GIGABYTE,
-        "unknowns": balance.size, "points": len(points), "converged": sum(p.converged for p in points), "steps": steps,
-        "seconds": spent, "per_step": spent / max(steps, 1), "build": build, "products": krylov.counts.products,
-        "preconditioners": krylov.counts.preconditioners, "rises": 0 < int(np.argmax(size)) < len(size) - 1,
-        "slip": max(float(np.mean(s == 1)) for s in states), "open": max(float(np.mean(s == 2)) for s in states),
-    }  # fmt: skip
+        "unknowns": balance.size,
+        "points": len(points),
+        "converged": sum(p.converged for p in points),
+        "steps": steps,
+        "seconds": spent,
+        "per_step": spent / max(steps, 1),
+        "build": build,
+        "products": krylov.counts.products,
+        "preconditioners": krylov.counts.preconditioners,
+        "rises": 0 < int(np.argmax(size)) < len(size) - 1,
+        "slip": max(float(np.mean(s == 1)) for s in states),
+        "open": max(float(np.mean(s == 2)) for s in states),
+    }
 
 
 def threads() -> dict[str, Any]:
@@ -425,9 +416,16 @@ def threads() -> dict[str, Any]:
     basis, cos, sin = prefix_sums(ORDER, SAMPLES)
     gap = np.ascontiguousarray((basis @ coefficients).T).reshape(contacts, 3, SAMPLES)
     arrays = (
-        gap, compiled.elements, compiled.first, basis, cos, sin, np.empty_like(gap),
-        np.empty((contacts, 2, SAMPLES), dtype=np.int64), np.empty((contacts, compiled.pairs, m, m)),
-    )  # fmt: skip
+        gap,
+        compiled.elements,
+        compiled.first,
+        basis,
+        cos,
+        sin,
+        np.empty_like(gap),
+        np.empty((contacts, 2, SAMPLES), dtype=np.int64),
+        np.empty((contacts, compiled.pairs, m, m)),
+    )
     actions: dict[str, tuple[int, Callable[[], object]]] = {
         "one": (1, lambda: contact_period(*arrays)),
         "two": (2, lambda: contact_period_threads(thread_shares(contacts), *arrays)),

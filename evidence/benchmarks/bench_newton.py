@@ -40,9 +40,7 @@ def five_harmonics() -> tuple[HarmonicBalance, np.ndarray, float]:
     case = two_blades()
     load = case.load(RATIO)
     linear = condense(case.system.structure, case.system.retained, load)
-    balance = harmonic_balance(
-        linear, case.system.interface, 5, case.sweep.samples, jacobian="dense"
-    )
+    balance = harmonic_balance(linear, case.system.interface, 5, case.sweep.samples, jacobian="dense")
     omega = 0.5 * sum(case.sweep.omega_range)
     guess = balance.coefficients(bonded_start(balance, omega, case.system))
     guess[0] = preload(case.system, load.static)
@@ -86,16 +84,20 @@ def run() -> list[dict[str, Any]]:
 
     full, _, bare, contact, linearise, condensed, same, new = medians(
         [
-            iteration, refill, lapack, contacts, assembly, condensation,
-            lambda: default(omega), lambda: default(omega * (1.0 + 1e-9 * next(step))),
+            iteration,
+            refill,
+            lapack,
+            contacts,
+            assembly,
+            condensation,
+            lambda: default(omega),
+            lambda: default(omega * (1.0 + 1e-9 * next(step))),
         ]
-    )  # fmt: skip
+    )
     left = chosen.linearise(x, omega).jac.eliminated()
     ratio = full / bare
     where = f"{n} unknowns, {balance.interface.n_contacts} contacts, {balance.samples} samples, {100 * slipping:.0f} % of them slipping"
-    micro = [
-        f"{1e6 * t:.0f}" for t in (contact, linearise - contact, full - linearise, bare, condensed)
-    ]
+    micro = [f"{1e6 * t:.0f}" for t in (contact, linearise - contact, full - linearise, bare, condensed)]
     note = (
         f"median CPU time of {ROUNDS} interleaved; {where}; us: contacts {micro[0]}, assembly {micro[1]}, factorise and solve "
         f"{micro[2]}, bare dgetrf {micro[3]}; a new frequency adds {micro[4]} for the condensation"

@@ -25,23 +25,15 @@ CLOSE, LIFTED = 1e-8, 1e-6  # distance from the judge while N stays above 1 % of
 
 def planar(case: Contacts) -> list[CoupledCoulomb]:
     """Return the laws of `case` with the stiffness along t in every direction of the plane."""
-    return [
-        CoupledCoulomb(k_t=law.k_t, k_n=law.k_n, mu=law.mu, preload=law.preload)
-        for law in case.laws
-    ]
+    return [CoupledCoulomb(k_t=law.k_t, k_n=law.k_n, mu=law.mu, preload=law.preload) for law in case.laws]
 
 
 def springs(case: Contacts) -> list[ElasticCoulomb]:
     """Return the laws of `case` with the stiffness along t in both directions."""
-    return [
-        ElasticCoulomb(k_t=law.k_t, k_w=law.k_t, k_n=law.k_n, mu=law.mu, preload=law.preload)
-        for law in case.laws
-    ]
+    return [ElasticCoulomb(k_t=law.k_t, k_w=law.k_t, k_n=law.k_n, mu=law.mu, preload=law.preload) for law in case.laws]
 
 
-def evaluated(
-    case: Contacts, laws: Any, samples: int, evaluator: Any = "events"
-) -> Callable[[], Any]:
+def evaluated(case: Contacts, laws: Any, samples: int, evaluator: Any = "events") -> Callable[[], Any]:
     """Return the evaluation as Newton's method calls it."""
     compiled = compile_contacts(laws, evaluator=evaluator)
     return lambda: contact_forces(case.gap, compiled, samples, history=False)
@@ -52,17 +44,12 @@ def costs(order: int, samples: int) -> list[dict[str, Any]]:
     case = contacts(order)
     plane = planar(case)
     seconds = medians(
-        {
-            "two springs": evaluated(case, springs(case), samples),
-            "planar": evaluated(case, plane, samples),
-        },
-        ROUNDS,
+        {"two springs": evaluated(case, springs(case), samples), "planar": evaluated(case, plane, samples)}, ROUNDS
     )
     slow = medians({"march": evaluated(case, plane, samples, "march")}, 3)
     period = contact_forces(case.gap, compile_contacts(plane, evaluator="events"), samples)
     shares = ", ".join(
-        f"{np.mean(period.state == s):.0%} {word}"
-        for s, word in enumerate(("stuck", "slipping", "open"))
+        f"{np.mean(period.state == s):.0%} {word}" for s, word in enumerate(("stuck", "slipping", "open"))
     )
     where = f"{len(plane)} contacts, H = {order}, {shares}, {period.unsettled} unsettled"
     over, march = seconds["planar"] / seconds["two springs"], slow["march"] / seconds["planar"]
@@ -88,9 +75,7 @@ def distances(order: int) -> list[dict[str, Any]]:
     """Compare forces with those of an independent integration with located events."""
     case = contacts(order)
     laws = planar(case)[:JUDGED]
-    found = contact_forces(
-        case.gap[:, : 3 * JUDGED], compile_contacts(laws, evaluator="events"), 0, history=False
-    )
+    found = contact_forces(case.gap[:, : 3 * JUDGED], compile_contacts(laws, evaluator="events"), 0, history=False)
     off: dict[bool, list[float]] = {False: [], True: []}
     for c, law in enumerate(laws):
         gaps = case.gap[:, 3 * c : 3 * c + 3]
@@ -98,9 +83,7 @@ def distances(order: int) -> list[dict[str, Any]]:
         want = judged(gaps, contact).coefficients
         tau = np.linspace(0.0, 2.0 * np.pi, 4096)
         angles = np.outer(tau, np.arange(1, order + 1))
-        normal = law.preload - law.k_n * (
-            gaps[0, 2] + np.cos(angles) @ gaps[1::2, 2] + np.sin(angles) @ gaps[2::2, 2]
-        )
+        normal = law.preload - law.k_n * (gaps[0, 2] + np.cos(angles) @ gaps[1::2, 2] + np.sin(angles) @ gaps[2::2, 2])
         if normal.max() <= 0.0:
             continue
         error = np.max(np.abs(found.coefficients[:, 3 * c : 3 * c + 2] - want[:, :2]))
@@ -114,7 +97,7 @@ def distances(order: int) -> list[dict[str, Any]]:
             "note": f"largest distance of force coefficients from the judge in evidence/judges, of the largest limit; {len(off[lifted])} contacts",
         }
         for lifted, name, goal in ((False, "off_judge", CLOSE), (True, "off_judge_with_lift_off", LIFTED))
-    ]  # fmt: skip
+    ]
 
 
 def run() -> list[dict[str, Any]]:

@@ -95,11 +95,14 @@ def first_stuck(plates: Plates) -> float:
     return float(
         np.sqrt(
             scipy.sparse.linalg.eigsh(
-                scipy.sparse.csc_array(bonded.stiffness), 1, scipy.sparse.csc_array(bonded.mass), sigma=0.0,
+                scipy.sparse.csc_array(bonded.stiffness),
+                1,
+                scipy.sparse.csc_array(bonded.mass),
+                sigma=0.0,
                 return_eigenvectors=False,
             )[0]
         )
-    )  # fmt: skip
+    )
 
 
 def sweep_record(points: int, state: str) -> dict[str, Any]:
@@ -109,17 +112,14 @@ def sweep_record(points: int, state: str) -> dict[str, Any]:
     load = plates.load(STATES[points][state], "slide")
     both = _in_turns(lambda: swept(plates, load, omegas))
     whole, less = (min(runs, key=lambda s: s.seconds) for runs in both)
-    apart = max(
-        float(np.abs(a - b).max() / np.abs(a).max())
-        for a, b in zip(whole.found, less.found, strict=True)
-    )
+    apart = max(float(np.abs(a - b).max() / np.abs(a).max()) for a, b in zip(whole.found, less.found, strict=True))
     resting, left = _at_rest(less, omegas)
     by_lu = less.steps * lu_seconds(less, float(omegas[-1]))
     note = (
         f"{resting:.0%} of the contacts rest, {left:.0%} of {less.balance.size} unknowns are left; all: {_told(whole)}; without: {_told(less)}; "
         f"LU of whole arrays {by_lu:.2f} s = {by_lu / less.seconds:.1f} times as long; answers differ by {apart:.1e}"
     )
-    return _record(f"many/resting_{points}_{state}", whole.seconds / less.seconds, points, state, note)  # fmt: skip
+    return _record(f"many/resting_{points}_{state}", whole.seconds / less.seconds, points, state, note)
 
 
 def _at_rest(run: Swept, omegas: FloatArray) -> tuple[float, float]:
@@ -138,9 +138,14 @@ def response_record(points: int, state: str) -> dict[str, Any]:
     first = first_stuck(plates)
     load = plates.load(STATES[points][state], "slide")
     sweep = Sweep(
-        omega_range=(RANGE[0] * first, RANGE[1] * first), selection="always_high", high=ORDER, samples=16 * ORDER,
-        evaluator="intervals", peak_points=0, newton=Newton(tolerance=TOLERANCE, linear=Automatic()),
-    )  # fmt: skip
+        omega_range=(RANGE[0] * first, RANGE[1] * first),
+        selection="always_high",
+        high=ORDER,
+        samples=16 * ORDER,
+        evaluator="intervals",
+        peak_points=0,
+        newton=Newton(tolerance=TOLERANCE, linear=Automatic()),
+    )
 
     def followed() -> tuple[int, float]:
         start = process_time()
@@ -150,7 +155,7 @@ def response_record(points: int, state: str) -> dict[str, Any]:
 
     whole, less = (min(runs, key=lambda r: r[1]) for runs in _in_turns(followed))
     note = f"forced_response by arc length: {whole[0]} points in {whole[1]:.3f} s with all, {less[0]} in {less[1]:.3f} s without what rests"
-    return _record(f"many/resting_{points}_{state}_arc_length", whole[1] / less[1], points, state, note)  # fmt: skip
+    return _record(f"many/resting_{points}_{state}_arc_length", whole[1] / less[1], points, state, note)
 
 
 def _in_turns(action: Any) -> tuple[list[Any], list[Any]]:
@@ -172,13 +177,7 @@ def _told(s: Swept) -> str:
 
 def _record(name: str, ratio: float, points: int, state: str, note: str) -> dict[str, Any]:
     goal = GAIN if points <= FEW and state in ("stick", "micro-slip") else LOSS
-    return {
-        "name": name.replace(" ", "_"),
-        "value": ratio,
-        "goal": f">= {goal}",
-        "holds": ratio >= goal,
-        "note": note,
-    }
+    return {"name": name.replace(" ", "_"), "value": ratio, "goal": f">= {goal}", "holds": ratio >= goal, "note": note}
 
 
 def run() -> list[dict[str, Any]]:

@@ -28,10 +28,7 @@ NODES, MODES = 100, 50
 def sector(fineness: float) -> Structure:
     """Return the default sector, with the element sizes times `fineness`."""
     plain = ss.BladedSector(sectors=SECTORS)
-    sizes = {
-        name: fineness * getattr(plain, name)
-        for name in ("disk_size", "platform_size", "airfoil_size")
-    }
+    sizes = {name: fineness * getattr(plain, name) for name in ("disk_size", "platform_size", "airfoil_size")}
     mesh = ss.model.mesh_sector(ss.BladedSector(sectors=SECTORS, **sizes))
     return ss.model.assemble_solid(mesh, ss.Material())
 
@@ -62,10 +59,7 @@ def reduce(fineness: float, wave: int | None) -> dict[str, Any]:
         "dofs": structure.n,
         "reduced": reduced.n,
         "frequencies_hz": ss.model.natural_frequencies(reduced, 3).tolist(),
-        "steps": [
-            {"step": a[0], "cpu": b[1] - a[1], "wall": b[2] - a[2], "peak_gb": b[3]}
-            for a, b in pairwise(steps)
-        ],
+        "steps": [{"step": a[0], "cpu": b[1] - a[1], "wall": b[2] - a[2], "peak_gb": b[3]} for a, b in pairwise(steps)],
     }
 
 

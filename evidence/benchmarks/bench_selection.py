@@ -60,9 +60,7 @@ def against_high(name: str, found: Case) -> dict[str, Any]:
         "name": f"selection/{name}_over_high/ratio_{found.ratio:g}",
         "value": share,
         "goal": f"<= {MOST:g}, aim {AIM:g}" if strong else "none",
-        "holds": bool(
-            solved and off <= run.problem.sweep.threshold and (share <= MOST or not strong)
-        ),
+        "holds": bool(solved and off <= run.problem.sweep.threshold and (share <= MOST or not strong)),
         "note": (
             f"{found.repeated[name]} of 20 frequencies repeated; largest difference of amplitude {off:.1e} of the peak; "
             f"{run.seconds:.3f} s ({run.split}) against {high.seconds:.3f} s ({high.split}); "

@@ -83,9 +83,7 @@ def _times(case: _Case) -> tuple[FloatArray, bool] | None:
 
     far = balance.unknowns(case.before.coefficients)
     near = solved(balance.unknowns(point.coefficients), omega - DENSE)
-    if not near.status.converged or not all(
-        solved(start, omega).status.converged for start in (far, near.x)
-    ):
+    if not near.status.converged or not all(solved(start, omega).status.converged for start in (far, near.x)):
         return None
     structure, interface = problem.system.structure, problem.system.interface
     real = to_real(gaps)
@@ -116,13 +114,7 @@ def _rows(regime: str, cases: list[_Case]) -> list[dict[str, Any]]:
     note = (
         "{} points with {} to {} transitions; medians in ms: Newton from 1 Hz away {:.1f}, from 0.05 Hz away {:.1f}, fold {:.1f}, "
         "multipliers {:.1f}, verdict {:.1f}, exponents {:.0f}; exponents counted at {}"
-    ).format(
-        len(timed),
-        min(transitions),
-        max(transitions),
-        *milliseconds,
-        sum(made[1] for _, made in timed),
-    )
+    ).format(len(timed), min(transitions), max(transitions), *milliseconds, sum(made[1] for _, made in timed))
     rows = []
     for column, (kind, goal) in enumerate(GOALS.items(), start=2):
         for of, spacing in enumerate(SPACINGS):
@@ -143,6 +135,4 @@ def run() -> list[dict[str, Any]]:
     """Compare in every regime."""
     blades = two_blades()
     cases = [case for ratio in RATIOS for case in _cases(blades, ratio)]
-    return [
-        row for regime in REGIMES for row in _rows(regime, [c for c in cases if c.regime == regime])
-    ]
+    return [row for regime in REGIMES for row in _rows(regime, [c for c in cases if c.regime == regime])]

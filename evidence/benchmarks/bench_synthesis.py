@@ -14,12 +14,7 @@ from evidence.models.two_blades import two_blades
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.isolated import (
-    isolation,
-    other_modes,
-    peak_with_others,
-    with_others,
-)
+from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, peak_with_others, with_others
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.synthesis import synthesise
@@ -68,7 +63,7 @@ def run() -> list[dict[str, Any]]:
     for ratio in RATIOS:
         balance = how.balance(system, model.load(float(ratio)), np.array([dof]))
         began = process_time()
-        points = [p for p in plain_sweep(system, balance, AROUND, POINTS, how.newton) if p.converged]  # fmt: skip
+        points = [p for p in plain_sweep(system, balance, AROUND, POINTS, how.newton) if p.converged]
         slow += process_time() - began
         motions = [balance.linear.recover(p.p, balance.coefficients(p.point.x)) for p in points]
         peaks.append(_top([abs(m[1, dof]) for m in motions]))
@@ -77,9 +72,7 @@ def run() -> list[dict[str, Any]]:
     kept, shown = foreign <= TRUSTED, foreign <= DOUBTFUL
     faster, whole = slow / quick, slow / (quick + followed)
     told = f"{np.count_nonzero(kept)} of {RATIOS.size} levels trusted, {np.count_nonzero(shown & ~kept)} doubtful, {np.count_nonzero(~shown)} refused"
-    off = [
-        100 * float(np.max(np.abs(error[w]), initial=0.0)) for w in (kept, shown & ~kept, ~shown)
-    ]
+    off = [100 * float(np.max(np.abs(error[w]), initial=0.0)) for w in (kept, shown & ~kept, ~shown)]
     return [
         {
             "name": "synthesis/two_blades_20_levels",

@@ -40,11 +40,7 @@ from stickslip.response.time.period_map import period_map
 from stickslip.response.time.settling import period_harmonics
 from stickslip.response.time.shooting import ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, start_from_harmonics
-from stickslip.response.time.transient import (
-    TimeStepping,
-    TransientResult,
-    integrate,
-)
+from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 HERTZ = (165.0, 184.0)
 RATIOS = (20.0, 5.0)
@@ -181,11 +177,26 @@ def records(ratio: float) -> list[dict[str, Any]]:
     costs = f"a frequency by balance {everywhere:.4f} s with H = 5, {alert:.4f} s with the alert, by integration {integration:.2f} s"
     return [
         entry(f"time/integration_over_balance_h5/{where}", integration / everywhere, GOAL, f"{costs}; {note}"),
-        entry(f"time/integration_over_balance_h5_in_hindsight/{where}", hindsight / everywhere, GOAL, f"integration {hindsight:.2f} s"),
+        entry(
+            f"time/integration_over_balance_h5_in_hindsight/{where}",
+            hindsight / everywhere,
+            GOAL,
+            f"integration {hindsight:.2f} s",
+        ),
         entry(f"time/integration_over_alert/{where}", integration / alert, GOAL, costs),
-        entry(f"time/integration_over_shooting/{where}", integration / shooting, None, f"shooting {shooting:.2f} s a frequency"),
-        entry(f"time/shooting_over_balance_h5/{where}", shooting / everywhere, None, f"shooting {shooting:.2f} s a frequency"),
-    ]  # fmt: skip
+        entry(
+            f"time/integration_over_shooting/{where}",
+            integration / shooting,
+            None,
+            f"shooting {shooting:.2f} s a frequency",
+        ),
+        entry(
+            f"time/shooting_over_balance_h5/{where}",
+            shooting / everywhere,
+            None,
+            f"shooting {shooting:.2f} s a frequency",
+        ),
+    ]
 
 
 def along(ratio: float) -> list[dict[str, Any]]:
@@ -201,25 +212,28 @@ def along(ratio: float) -> list[dict[str, Any]]:
         clock = process_time()
         for point in points:
             shots.append(
-                shoot(case.system.plain_structure, interface.gap_operator, interface.laws, load, point.omega, case.system.outputs, begin, stepping)
-            )  # fmt: skip
+                shoot(
+                    case.system.plain_structure,
+                    interface.gap_operator,
+                    interface.laws,
+                    load,
+                    point.omega,
+                    case.system.outputs,
+                    begin,
+                    stepping,
+                )
+            )
             begin = shots[-1].final
         seconds = (process_time() - clock) / len(points)
         coarse = sum(not shot.converged for shot in shots)
-        off = max(
-            abs(problem.amplitude(p) / abs(s.harmonics[1, 0]) - 1.0)
-            for p, s in zip(points, shots, strict=True)
-        )
+        off = max(abs(problem.amplitude(p) / abs(s.harmonics[1, 0]) - 1.0) for p, s in zip(points, shots, strict=True))
         note = (
             f"{seconds:.3f} s a frequency, {np.mean([s.periods for s in shots]):.1f} periods and {np.mean([s.corrections for s in shots]):.1f} corrections; "
             f"error of the step up to {100 * max(s.step_error for s in shots):.2g} %, {coarse} of {len(shots)} not converged; H = 5 off by up to {100 * off:.2g} %"
         )
         rows.append(
             entry(
-                f"time/shooting_along_over_balance_h5/ratio_{ratio:g}/steps_{steps}",
-                seconds / everywhere,
-                None,
-                note,
+                f"time/shooting_along_over_balance_h5/ratio_{ratio:g}/steps_{steps}", seconds / everywhere, None, note
             )
         )
     return rows
@@ -228,9 +242,7 @@ def along(ratio: float) -> list[dict[str, Any]]:
 def other_laws() -> dict[str, Callable[[ElasticCoulomb], ContactLaw]]:
     """Return laws with the stiffnesses of the example's, by name; two of them without unloading of the normal direction."""
     return {
-        "coupled_coulomb": lambda c: CoupledCoulomb(
-            k_t=c.k_t, k_n=c.k_n, mu=c.mu, preload=c.preload
-        ),
+        "coupled_coulomb": lambda c: CoupledCoulomb(k_t=c.k_t, k_n=c.k_n, mu=c.mu, preload=c.preload),
         "iwan": lambda c: Iwan(k_t=c.k_t, k_w=c.k_w, k_n=c.k_n, limit=LIMIT),
         "bouc_wen": lambda c: BoucWen(
             k_t=c.k_t, k_w=c.k_w, k_n=c.k_n, beta=0.5 * c.k_t / LIMIT, gamma=0.5 * c.k_t / LIMIT
@@ -241,15 +253,18 @@ def other_laws() -> dict[str, Callable[[ElasticCoulomb], ContactLaw]]:
 def other(name: str, law: Callable[[ElasticCoulomb], ContactLaw]) -> dict[str, Any]:
     """Shoot from the balance with H = 5 at one frequency of the two blades with another law, after a first time that compiles."""
     case = two_blades()
-    contacts = replace(
-        case.system.interface, laws=tuple(law(c) for c in case.system.interface.laws)
-    )
+    contacts = replace(case.system.interface, laws=tuple(law(c) for c in case.system.interface.laws))
     system, load = replace(case.system, interface=contacts), case.load(RATIOS[0])
     low, high = (2 * np.pi * hertz for hertz in BESIDE)
     sweep = Sweep(
-        omega_range=(low, high), low=5, high=5, samples=case.sweep.samples, selection="always_high",
-        frequencies=FEW, peak_points=0,
-    )  # fmt: skip
+        omega_range=(low, high),
+        low=5,
+        high=5,
+        samples=case.sweep.samples,
+        selection="always_high",
+        frequencies=FEW,
+        peak_points=0,
+    )
     seconds, shooting, shot = np.inf, np.inf, None
     problem = forced_problem(system, load, sweep)
     for _ in range(2):
@@ -261,8 +276,15 @@ def other(name: str, law: Callable[[ElasticCoulomb], ContactLaw]) -> dict[str, A
         start = start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws)
         clock = process_time()
         shot = shoot(
-            system.plain_structure, contacts.gap_operator, contacts.laws, load, point.omega, system.outputs, start, STEPPING
-        )  # fmt: skip
+            system.plain_structure,
+            contacts.gap_operator,
+            contacts.laws,
+            load,
+            point.omega,
+            system.outputs,
+            start,
+            STEPPING,
+        )
         shooting = min(shooting, process_time() - clock)
     note = f"{BESIDE[1]:g} Hz, {shot.status} after {shot.periods} periods and {shot.corrections} corrections, {shooting:.2f} s; balance {seconds:.4f} s"
     return entry(f"time/shooting_over_balance_h5/{name}", shooting / seconds, None, note)
@@ -278,16 +300,10 @@ def compilation() -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
         told = subprocess.run(
-            [sys.executable, "-c", program],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
         )
     seconds = float(told.stdout.split()[-1])
-    record = entry(
-        "time/first_compilation_seconds", seconds, None, "CPU seconds of one process; goal below 10"
-    )
+    record = entry("time/first_compilation_seconds", seconds, None, "CPU seconds of one process; goal below 10")
     return record | {"goal": "< 10", "holds": seconds < 10.0}
 
 

@@ -8,25 +8,14 @@ from typing import Any
 import numpy as np
 
 from evidence.benchmarks.trust import TRUTHS, Trial, said, trial, truth
-from evidence.strategies.cases import (
-    SelectionCase,
-    chain,
-    friction_ring,
-    two_blades_strong,
-    two_blades_stuck,
-)
+from evidence.strategies.cases import SelectionCase, chain, friction_ring, two_blades_strong, two_blades_stuck
 from stickslip.response.forced.choices import RUNGS
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.study.analyses.forced.points import collect
 
 SYSTEMS, SEED = 12, 7
 THRESHOLD = 0.05
-CASES: tuple[Callable[[], SelectionCase], ...] = (
-    two_blades_strong,
-    two_blades_stuck,
-    friction_ring,
-    chain,
-)
+CASES: tuple[Callable[[], SelectionCase], ...] = (two_blades_strong, two_blades_stuck, friction_ring, chain)
 EVERY = 4  # points of which one is judged
 
 

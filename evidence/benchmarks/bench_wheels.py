@@ -34,35 +34,38 @@ H, SAMPLES, FREQUENCIES, ORDERS = 3, 128, 30, 10
 AROUND = 0.93, 1.05  # of the first resonance with all contacts stuck
 SECTORS = 36
 GIBIBYTE = 2.0**30
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 def first_stuck(rubbing: Rubbing, number: int | None = None) -> float:
     """Return the first natural frequency with all contacts stuck, rad/s; of a wave of a wheel."""
     side = rubbing.system.structure
     structure = side.of_harmonic(1) if number is None else side.waves[number]
-    stuck = with_springs(
-        structure, rubbing.system.interface.gap_operator, rubbing.system.springs.stuck_stiffness()
-    )
+    stuck = with_springs(structure, rubbing.system.interface.gap_operator, rubbing.system.springs.stuck_stiffness())
     return float(np.sqrt(normal_modes(stuck, 1).squares[0]))
 
 
 def swept(rubbing: Rubbing, middle: float, frequencies: int = FREQUENCIES) -> dict[str, Any]:
     """Sweep around a frequency with all harmonics and return CPU seconds, Newton steps and how much slips at most."""
     sweep = Sweep(
-        omega_range=(AROUND[0] * middle, AROUND[1] * middle), selection="always_high", low=H, high=H,
-        frequencies=frequencies, peak_points=0, samples=SAMPLES,
-    )  # fmt: skip
+        omega_range=(AROUND[0] * middle, AROUND[1] * middle),
+        selection="always_high",
+        low=H,
+        high=H,
+        frequencies=frequencies,
+        peak_points=0,
+        samples=SAMPLES,
+    )
     start = process_time()
     points = list(forced_response(rubbing.system, rubbing.load, sweep))
     seconds = process_time() - start
     kept = accepted_points(points)
     return {
-        "seconds": seconds, "frequencies": len(kept), "steps": sum(p.iterations for p in points),
+        "seconds": seconds,
+        "frequencies": len(kept),
+        "steps": sum(p.iterations for p in points),
         "converged": all(p.converged for p in kept),
-    }  # fmt: skip
+    }
 
 
 def sectors_record() -> dict[str, Any]:
@@ -77,16 +80,16 @@ def sectors_record() -> dict[str, Any]:
             middle = first_stuck(wheel, excited_wave(3, sectors))
             found = swept(wheel, middle)
             seconds.append(process_time() - start)
-            told[sectors] = (
-                f"{sectors}: {found['steps']} Newton steps, {found['seconds']:.1f} s of {min(seconds):.1f}"
-            )
+            told[sectors] = f"{sectors}: {found['steps']} Newton steps, {found['seconds']:.1f} s of {min(seconds):.1f}"
     few, many = (min(seconds) for seconds in wheels.values())
     ratio = many / few
     return _record(
-        "wheels/120_over_24_sectors", ratio, "1.0 ± 0.1",
+        "wheels/120_over_24_sectors",
+        ratio,
+        "1.0 ± 0.1",
         f"engine order 3, H = {H}, 100 contacts, {FREQUENCIES} frequencies, waves and reduction included, best of three in turns; {'; '.join(told.values())}",
         abs(ratio - 1.0) <= 0.1,
-    )  # fmt: skip
+    )
 
 
 def orders(first: int, last: int) -> dict[str, Any]:
@@ -97,15 +100,15 @@ def orders(first: int, last: int) -> dict[str, Any]:
     for order in range(first, last + 1):
         wheel = rubbing_wheel(24, order, H)
         found = swept(wheel, first_stuck(wheel, excited_wave(order, 24)))
-        points, steps, good = (
-            points + found["frequencies"],
-            steps + found["steps"],
-            good and found["converged"],
-        )
+        points, steps, good = (points + found["frequencies"], steps + found["steps"], good and found["converged"])
     return {
-        "wall": perf_counter() - start, "cpu": process_time() - cpu, "points": points, "steps": steps, "converged": good,
+        "wall": perf_counter() - start,
+        "cpu": process_time() - cpu,
+        "points": points,
+        "steps": steps,
+        "converged": good,
         "gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / GIBIBYTE,
-    }  # fmt: skip
+    }
 
 
 def orders_record() -> list[dict[str, Any]]:
@@ -125,7 +128,7 @@ def orders_record() -> list[dict[str, Any]]:
     return [
         _record("wheels/ten_orders_seconds", wall, "<= 300 s", note, wall <= 300 and good),
         _record("wheels/ten_orders_gib", memory, "<= 4", "both processes together, interpreter included", memory <= 4),
-    ]  # fmt: skip
+    ]
 
 
 def pair_record() -> dict[str, Any]:
@@ -140,9 +143,12 @@ def pair_record() -> dict[str, Any]:
             told[i] = f"{name} {1e3 * best[i]:.0f} ms with {found['steps']} Newton steps"
     ratio = best[0] / best[1]
     return _record(
-        "wheels/frequency_over_two_blades", ratio, "<= 2",
-        f"{FREQUENCIES} frequencies around the first stuck resonance, best of three in turns: {'; '.join(told)}", ratio <= 2,
-    )  # fmt: skip
+        "wheels/frequency_over_two_blades",
+        ratio,
+        "<= 2",
+        f"{FREQUENCIES} frequencies around the first stuck resonance, best of three in turns: {'; '.join(told)}",
+        ratio <= 2,
+    )
 
 
 def mistuned_record() -> dict[str, Any]:
@@ -155,9 +161,14 @@ def mistuned_record() -> dict[str, Any]:
     first = 2 * np.pi * found.frequencies.stuck_reduced[0]
     spacing = (AROUND[1] - AROUND[0]) * first / 60
     sweep = Sweep(
-        omega_range=(first, first + 9 * spacing), selection="always_high", low=H, high=H,
-        frequencies=10, peak_points=0, samples=SAMPLES,
-    )  # fmt: skip
+        omega_range=(first, first + 9 * spacing),
+        selection="always_high",
+        low=H,
+        high=H,
+        frequencies=10,
+        peak_points=0,
+        samples=SAMPLES,
+    )
     start = process_time()
     points = list(forced_response(found.system, found.load, sweep))
     each = (process_time() - start) / 10
@@ -165,19 +176,20 @@ def mistuned_record() -> dict[str, Any]:
     problem = forced_problem(found.system, found.load, sweep)
     dense, by_lu = replace(problem.high, jacobian="dense"), replace(sweep.newton, linear=Dense())
     begin = process_time()
-    other = newton(
-        lambda x: dense.linearise(x, kept[1].omega), dense.unknowns(kept[0].coefficients), by_lu
-    )
+    other = newton(lambda x: dense.linearise(x, kept[1].omega), dense.unknowns(kept[0].coefficients), by_lu)
     seconds = process_time() - begin
     off = float(np.abs(dense.coefficients(other.x) - kept[1].coefficients).max())
     off /= float(np.abs(kept[1].coefficients).max())
     ratio = seconds / each
     return _record(
-        "wheels/mistuned_lu_over_default", ratio, ">= 20",
+        "wheels/mistuned_lu_over_default",
+        ratio,
+        ">= 20",
         f"{SECTORS} sectors of 20 modes and 9 contacts, H = {H}, {dense.size} unknowns; ten of sixty frequencies, all converged: "
         f"{all(p.converged for p in kept)}, {sum(p.iterations for p in points)} Newton steps, start included, {1e3 * each:.0f} ms each; one by LU "
-        f"{other.iterations} steps, {seconds:.1f} s, converged: {other.status.converged}, gaps differ by {off:.1e}", ratio >= 20 and off <= 1e-6,
-    )  # fmt: skip
+        f"{other.iterations} steps, {seconds:.1f} s, converged: {other.status.converged}, gaps differ by {off:.1e}",
+        ratio >= 20 and off <= 1e-6,
+    )
 
 
 def flutter_record() -> dict[str, Any]:
@@ -187,28 +199,24 @@ def flutter_record() -> dict[str, Any]:
     bare = replace(structure, damping=0.0 * structure.damping)
     modes = normal_modes(bare, 3)
     rng = np.random.default_rng(3)
-    square = (
-        1e-4 * modes.squares[0]
-    )  # small, so that the next power of the difference does not count
+    square = 1e-4 * modes.squares[0]  # small, so that the next power of the difference does not count
     one = square * (rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3)))
 
     def difference(strength: float) -> np.ndarray:
-        influence = InfluenceCoefficients(
-            np.array([0]), strength * one.reshape(1, 1, 1, 3, 3), np.array([1.0])
-        )
-        feedback = Feedback(
-            bare.mass @ modes.shapes, 0.0, influence, float(np.sqrt(modes.squares[0]))
-        )
+        influence = InfluenceCoefficients(np.array([0]), strength * one.reshape(1, 1, 1, 3, 3), np.array([1.0]))
+        feedback = Feedback(bare.mass @ modes.shapes, 0.0, influence, float(np.sqrt(modes.squares[0])))
         found = flutter_of_wave(bare, feedback, 3)
         return np.abs(found.by_energy - found.by_eigenvalue)
 
     whole, half = difference(1.0), difference(0.5)
     ratio = float(np.median(whole / half))
     return _record(
-        "wheels/energy_against_eigenvalue", ratio, "4 ± 0.2",
+        "wheels/energy_against_eigenvalue",
+        ratio,
+        "4 ± 0.2",
         f"difference of the damping ratios of three modes over that with halved coefficients: {', '.join(f'{r:.3f}' for r in whole / half)}",
         bool(np.all(np.abs(whole / half - 4) <= 0.4)) and abs(ratio - 4) <= 0.2,
-    )  # fmt: skip
+    )
 
 
 def run() -> list[dict[str, Any]]:

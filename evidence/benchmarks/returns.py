@@ -47,7 +47,7 @@ class Section:
         """(TURNS,) largest and least distance of states so many periods apart, of their size."""
         later = self.later
         size = np.linalg.norm(later, axis=1).max()
-        apart = [np.linalg.norm(later[m:] - later[:-m], axis=1) for m in range(1, min(TURNS, len(later) // 2) + 1)]  # fmt: skip
+        apart = [np.linalg.norm(later[m:] - later[:-m], axis=1) for m in range(1, min(TURNS, len(later) // 2) + 1)]
         return np.array([(a.max(), a.min()) for a in apart]) / size
 
     @property
@@ -60,13 +60,17 @@ def marcher_of(plates: Plates, share: float, hertz: float, steps: int) -> Marche
     """Return what marches."""
     contacts = plates.system.interface
     return prepared(
-        plates.system.structure, contacts.gap_operator, contacts.laws, plates.load(share), 2.0 * np.pi * hertz, steps, contacts.weights
-    )  # fmt: skip
+        plates.system.structure,
+        contacts.gap_operator,
+        contacts.laws,
+        plates.load(share),
+        2.0 * np.pi * hertz,
+        steps,
+        contacts.weights,
+    )
 
 
-def section(
-    plates: Plates, share: float, hertz: float, steps: int, start: TransientStart, periods: int
-) -> Section:
+def section(plates: Plates, share: float, hertz: float, steps: int, start: TransientStart, periods: int) -> Section:
     """March so many periods."""
     marcher = marcher_of(plates, share, hertz, steps)
     state, record = marcher.begun(start), marcher.record()
@@ -80,9 +84,7 @@ def section(
     return Section(np.array(states), np.array(first))
 
 
-def returning(
-    contacts: int, share: float, hertz: float, steps: int, periods: int = PERIODS
-) -> dict[str, Any]:
+def returning(contacts: int, share: float, hertz: float, steps: int, periods: int = PERIODS) -> dict[str, Any]:
     """Return how near the motion from rest comes to itself again."""
     plates, began = two_plates(contacts), process_time()
     start = rest(plates.system.structure.n, plates.system.interface.laws)
@@ -90,29 +92,39 @@ def returning(
     far, near = found.returns.T
     best = int(far.argmin())
     return {
-        "contacts": contacts, "share": share, "hertz": hertz, "steps": steps, "periods": periods,
-        "always_within": float(far[best]), "after": best + 1, "after_one": float(far[0]), "nearest": float(near.min()),
-        "mean_m": float(found.amplitude.mean()), "spread": float(found.amplitude.std() / found.amplitude.mean()),
+        "contacts": contacts,
+        "share": share,
+        "hertz": hertz,
+        "steps": steps,
+        "periods": periods,
+        "always_within": float(far[best]),
+        "after": best + 1,
+        "after_one": float(far[0]),
+        "nearest": float(near.min()),
+        "mean_m": float(found.amplitude.mean()),
+        "spread": float(found.amplitude.std() / found.amplitude.mean()),
         "cpu_s": round(process_time() - began, 1),
-    }  # fmt: skip
+    }
 
 
 def verdict(contacts: int, share: float, hertz: float, steps: int) -> dict[str, Any]:
     """Return what is told of a frequency if the march begins with so many steps, and looks again with twice as many."""
     plates, began, omega = two_plates(contacts), process_time(), 2.0 * np.pi * hertz
     system = plates.system
-    seen = repetition(system.structure, system.interface, plates.load(share), omega, system.outputs, ORDER, steps)  # fmt: skip
+    seen = repetition(system.structure, system.interface, plates.load(share), omega, system.outputs, ORDER, steps)
     both = [seen, *([] if seen.finer is None else [seen.finer])]
     return {
-        "contacts": contacts, "share": share, "hertz": hertz, "verdict": seen.verdict, "every": seen.every,
+        "contacts": contacts,
+        "share": share,
+        "hertz": hertz,
+        "verdict": seen.verdict,
+        "every": seen.every,
         "marches": [(s.steps, s.periods, round(s.angle, 3), round(s.wander, 4), round(s.growth, 3)) for s in both],
         "cpu_s": round(process_time() - began, 1),
-    }  # fmt: skip
+    }
 
 
-def staying(
-    contacts: int, share: float, hertz: tuple[float, ...], periods: int = 48
-) -> Iterator[dict[str, Any]]:
+def staying(contacts: int, share: float, hertz: tuple[float, ...], periods: int = 48) -> Iterator[dict[str, Any]]:
     """Yield how far the motion that begins on a balance is from it after so many periods."""
     plates = two_plates(contacts)
     system, load = plates.system, plates.load(share)
@@ -124,17 +136,21 @@ def staying(
             continue
         own = point.omega / (2.0 * np.pi)
         motion = linear.recover(point.omega, point.coefficients)
-        start = start_from_harmonics(
-            motion, point.omega, system.interface.gap_operator, system.interface.laws
-        )
+        start = start_from_harmonics(motion, point.omega, system.interface.gap_operator, system.interface.laws)
         found = section(plates, share, own, 1024, start, periods)
         balance = motion[1, system.outputs]
         off = np.linalg.norm(found.first - balance, axis=1) / np.linalg.norm(balance)
         yield {
-            "contacts": contacts, "share": share, "hertz": round(own, 1), "rescue": int(point.rescue), "order": point.order,
-            "off_after_2": float(off[1]), "off_at_end": float(off[-1]), "periods": periods,
+            "contacts": contacts,
+            "share": share,
+            "hertz": round(own, 1),
+            "rescue": int(point.rescue),
+            "order": point.order,
+            "off_after_2": float(off[1]),
+            "off_at_end": float(off[-1]),
+            "periods": periods,
             "last_change": float(found.returns[0, 0]),
-        }  # fmt: skip
+        }
 
 
 if __name__ == "__main__":

@@ -29,14 +29,16 @@ def description(case: dict, options: dict) -> dict:
     }
     connectors = {
         f"jenkins{i}": {
-            "type": "Jenkins", "connect": {"chain": [i]}, "dirs": [0],
-            "mu": 1.0, "N0": case["limit"], "k": case["k_t"],
+            "type": "Jenkins",
+            "connect": {"chain": [i]},
+            "dirs": [0],
+            "mu": 1.0,
+            "N0": case["limit"],
+            "k": case["k_t"],
         }
         for i in range(case["elements"])
-    }  # fmt: skip
-    connectors["force"] = {
-        "type": "CosinusForcing", "connect": {"chain": [n - 1]}, "dirs": [0], "amp": case["force"],
-    }  # fmt: skip
+    }
+    connectors["force"] = {"type": "CosinusForcing", "connect": {"chain": [n - 1]}, "dirs": [0], "amp": case["force"]}
     first, last = case["omega_range"]
     analysis = {
         "study": "frf",

@@ -32,12 +32,7 @@ import numpy as np
 from evidence.benchmarks.robustness_judge import Judgement, judge
 from evidence.models.random_machines import MANY, Drawn, draw, draw_many, has_planes
 from stickslip.errors import StickslipError
-from stickslip.response.forced.response import (
-    ForcedPoint,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import ForcedPoint, accepted_points, forced_problem, forced_response
 
 CPU_SECONDS = 20.0  # of a sweep
 TENTH = 10
@@ -116,11 +111,7 @@ def outcome(seed: int, number: int, *, planar: bool = False) -> Outcome:
         reasons[early] += unsolved
     low = [p for p in accepted if p.order <= drawn.sweep.supports[0][-1]]
     high = [p for p in accepted if p.order > drawn.sweep.supports[0][-1]]
-    judged = (
-        not planar
-        and number >= 0
-        and np.random.default_rng([seed, number, TENTH]).integers(TENTH) == 0
-    )
+    judged = not planar and number >= 0 and np.random.default_rng([seed, number, TENTH]).integers(TENTH) == 0
     judgements = []
     if judged and any(p.converged for p in accepted):
         problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
@@ -160,16 +151,16 @@ def missing(drawn: Drawn, points: list[ForcedPoint]) -> int:
     reach = max((p.omega for p in points if p.converged), default=first)
     steps = round(drawn.sweep.points * (last - reach) / (last - first))
     tried = {p.index for p in points if p.stage == "high"}
-    asked = {
-        p.index for p in points if p.stage == "low" and p.predicted_error > drawn.sweep.threshold
-    }
+    asked = {p.index for p in points if p.stage == "low" and p.predicted_error > drawn.sweep.threshold}
     return max(1, steps + len(asked - tried))
 
 
 def show(outcomes: list[Outcome], seed: int) -> None:
     """Print shares, failures, rescues and judgements."""
-    print(f"\nseed {seed}; {sum(o.seconds for o in outcomes):.0f} CPU seconds in sweeps, "
-          f"the slowest {max(o.seconds for o in outcomes):.1f} s")  # fmt: skip
+    print(
+        f"\nseed {seed}; {sum(o.seconds for o in outcomes):.0f} CPU seconds in sweeps, "
+        f"the slowest {max(o.seconds for o in outcomes):.1f} s"
+    )
     print(
         f"{'family':10} {'systems':>8} {'clean':>8} {'points':>8} {'converged':>10} {'few harmonics':>14} {'more':>10}"
     )
@@ -177,8 +168,10 @@ def show(outcomes: list[Outcome], seed: int) -> None:
     for family in families:
         own = [o for o in outcomes if family in ("all", o.family)]
         points, failed = sum(o.points for o in own), sum(o.failed for o in own)
-        shares = [share(sum(o.few[1] for o in own), sum(o.few[0] for o in own)),
-                  share(sum(o.many[1] for o in own), sum(o.many[0] for o in own))]  # fmt: skip
+        shares = [
+            share(sum(o.few[1] for o in own), sum(o.few[0] for o in own)),
+            share(sum(o.many[1] for o in own), sum(o.many[0] for o in own)),
+        ]
         clean = sum(o.failed == 0 for o in own)
         print(
             f"{family:10} {len(own):8} {clean:8} {points:8} {share(failed, points):>10} {shares[0]:>14} {shares[1]:>10}"
@@ -189,23 +182,21 @@ def show(outcomes: list[Outcome], seed: int) -> None:
     failures = sorted((o for o in outcomes if o.failed), key=lambda o: -o.failed)
     print(f"\n{len(failures)} systems with failures, each again by --seed {seed} --only NUMBER:")
     for o in failures:
-        print(
-            f"{o.number:5} {o.failed:4} of {o.points:4}  {o.seconds:5.1f} s  {o.reasons}  {o.family}: {o.note}"
-        )
+        print(f"{o.number:5} {o.failed:4} of {o.points:4}  {o.seconds:5.1f} s  {o.reasons}  {o.family}: {o.note}")
 
 
 def show_judgements(outcomes: list[Outcome]) -> None:
     """Print how balance and time integration agree."""
     judged = [(o, j) for o in outcomes for j in o.judgements]
-    print(
-        f"\n{len(judged)} points of {sum(bool(o.judgements) for o in outcomes)} systems against time integration:"
-    )
+    print(f"\n{len(judged)} points of {sum(bool(o.judgements) for o in outcomes)} systems against time integration:")
     for verdict, times in Counter(j.verdict for _, j in judged).most_common():
         print(f"{times:5} {verdict}")
     off = [j.default_off for _, j in judged if j.verdict == "agrees"]
     if off:
-        print(f"of those that agree, the default orders differ from the integration by {np.median(off):.1e} in the median, "
-              f"{np.quantile(off, 0.9):.1e} in nine of ten, {max(off):.1e} at most")  # fmt: skip
+        print(
+            f"of those that agree, the default orders differ from the integration by {np.median(off):.1e} in the median, "
+            f"{np.quantile(off, 0.9):.1e} in nine of ten, {max(off):.1e} at most"
+        )
     for o, j in judged:
         if j.verdict != "agrees":
             print(f"{o.number:5} {j.sentence}  ({o.family}: {o.note})")
@@ -216,9 +207,7 @@ def share(failed: int, of: int) -> str:
     return f"{100 * (1 - failed / of):.2f} %" if of else "-"
 
 
-def run(
-    numbers: list[int], seed: int, workers: int, laws: Sequence[bool] = (False,)
-) -> list[Outcome]:
+def run(numbers: list[int], seed: int, workers: int, laws: Sequence[bool] = (False,)) -> list[Outcome]:
     """Solve the systems of the given numbers, planar (True) or with two springs; each is told as it is done."""
     asked = [(n, planar) for n in numbers for planar in laws]
     one = partial(_one, seed)
@@ -235,8 +224,11 @@ def _one(seed: int, asked: tuple[int, bool]) -> Outcome:
 def told(done: Outcome) -> Outcome:
     """Print one line, so that a run that is ended leaves what it found."""
     law = "planar" if done.planar else "springs"
-    print(f"{done.number:5} {done.family:8} {law:8} {done.failed:4} of {done.points:4} failed "
-          f"{done.seconds:5.1f} s  {done.reasons}", flush=True)  # fmt: skip
+    print(
+        f"{done.number:5} {done.family:8} {law:8} {done.failed:4} of {done.points:4} failed "
+        f"{done.seconds:5.1f} s  {done.reasons}",
+        flush=True,
+    )
     return done
 
 
@@ -259,9 +251,7 @@ def main() -> int:
     parser.add_argument("--only", type=int)
     parser.add_argument("--planar", action="store_true", help="friction coupled in the plane")
     parser.add_argument(
-        "--planes",
-        action="store_true",
-        help="the systems of --planar with two springs; with --planar: both ways",
+        "--planes", action="store_true", help="the systems of --planar with two springs; with --planar: both ways"
     )
     asked = parser.parse_args()
     if asked.only is None:
@@ -277,8 +267,10 @@ def main() -> int:
     problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
     for p in points:
         rescue = getattr(p, "rescue", 0)
-        print(f"{p.stage:6} {p.index:4} {p.omega / 2 / np.pi:12.6f} Hz  {problem.amplitude(p):.4e} m  H = {p.order}  "
-              f"{p.status.name.lower():20} {p.iterations:4}  {rescue}")  # fmt: skip
+        print(
+            f"{p.stage:6} {p.index:4} {p.omega / 2 / np.pi:12.6f} Hz  {problem.amplitude(p):.4e} m  H = {p.order}  "
+            f"{p.status.name.lower():20} {p.iterations:4}  {rescue}"
+        )
     show([outcome(asked.seed, asked.only, planar=asked.planar)], asked.seed)
     return 0
 

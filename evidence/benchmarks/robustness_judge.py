@@ -52,10 +52,7 @@ class Judgement:
 
 
 def judge(
-    problem: ForcedProblem,
-    load: HarmonicLoad,
-    accepted: list[ForcedPoint],
-    rng: np.random.Generator,
+    problem: ForcedProblem, load: HarmonicLoad, accepted: list[ForcedPoint], rng: np.random.Generator
 ) -> list[Judgement]:
     """Judge the highest point and one at random."""
     top = max(accepted, key=problem.amplitude)
@@ -78,15 +75,12 @@ def judged(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) -> Ju
     start = start_along(motion, point.omega, gaps, laws)
     common = (system.structure, gaps, laws, load, point.omega, outputs)
     once = one_period(common, start)
-    found = integrate_refined(
-        *common, start=start, stepping=TimeStepping(steps_per_period=STEPS, max_periods=PERIODS)
-    )
+    found = integrate_refined(*common, start=start, stepping=TimeStepping(steps_per_period=STEPS, max_periods=PERIODS))
     true = complex(found.first_harmonic[0])
     if not np.isfinite(true):
         return replace(begin, verdict="integration overflowed")
     ours, accepted, fewer = (
-        complex(problem.low.linear.recover(point.omega, q)[1, outputs[0]])
-        for q in (many, point.coefficients, before)
+        complex(problem.low.linear.recover(point.omega, q)[1, outputs[0]]) for q in (many, point.coefficients, before)
     )
     size = abs(true)
     explained = max(AGREES, SURE * (found.error + abs(ours - fewer) / size))
@@ -115,9 +109,7 @@ def with_many(problem: ForcedProblem, point: ForcedPoint) -> tuple[np.ndarray, n
     for order in ORDERS:
         balance = replace(problem.high, samples=SAMPLES).with_order(order)
         solution = newton(
-            lambda v, b=balance: b.linearise(v, point.omega),
-            balance.unknowns(known),
-            Newton(max_iterations=60),
+            lambda v, b=balance: b.linearise(v, point.omega), balance.unknowns(known), Newton(max_iterations=60)
         )
         if not solution.status.converged:
             return None

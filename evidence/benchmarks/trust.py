@@ -96,9 +96,7 @@ def trial(seed: int, family: str, number: int) -> Trial:
         judged.append(Judged(a.point.omega, a.point.order, said(a), truth(problem, a.point)))
     unknowns = sum(p.coefficients.shape[1] * (2 * p.harmonics.size - 1) for p in points)
     failed = len(found) - len(solved) + unsolved
-    return Trial(
-        number, drawn.note, len(found) + unsolved, failed, seconds, unknowns, tuple(judged)
-    )
+    return Trial(number, drawn.note, len(found) + unsolved, failed, seconds, unknowns, tuple(judged))
 
 
 def by_default(drawn: Drawn) -> Drawn:
@@ -122,10 +120,7 @@ def truth(problem: ForcedProblem, point: ForcedPoint) -> float:
         if solution.status.converged:
             exact = many.coefficients(solution.x)
             rows = min(len(exact), len(point.coefficients))
-            one, other = (
-                problem.low.linear.recover(point.omega, q[:rows])
-                for q in (point.coefficients, exact)
-            )
+            one, other = (problem.low.linear.recover(point.omega, q[:rows]) for q in (point.coefficients, exact))
             return problem.measure.change(one, other - one)[0]
     return float("nan")
 
@@ -139,16 +134,18 @@ def show(trials: Sequence[Trial], threshold: float = 0.05) -> None:
     wrong = [j for j in trusted if j.true > threshold]
     doubted = [j for j in known if not j.said <= threshold]
     false = [j for j in doubted if j.true <= threshold]
-    print(
-        f"{len(trials)} systems: {points - failed} of {points} points converged, {100 * (1 - failed / points):.2f} %"
-    )
+    print(f"{len(trials)} systems: {points - failed} of {points} points converged, {100 * (1 - failed / points):.2f} %")
     print(
         f"{len(judged)} points judged, {len(judged) - len(known)} without a truth; trusted {len(trusted)}, of these wrong {len(wrong)}; "
         f"doubted {len(doubted)}, of these right {len(false)}"
     )
     print("orders", dict(sorted(Counter(j.order for j in judged).items())))
     for t in trials:
-        told = [f"{j.omega:.5g} H={j.order} said {j.said:.3g} true {j.true:.3g}" for j in t.judged if j.said <= threshold < j.true]  # fmt: skip
+        told = [
+            f"{j.omega:.5g} H={j.order} said {j.said:.3g} true {j.true:.3g}"
+            for j in t.judged
+            if j.said <= threshold < j.true
+        ]
         if t.failed or told or t.seconds > CPU_SECONDS / 2:
             print(t.number, t.note, f"{t.failed} of {t.points} failed, {t.seconds:.1f} s", *told)
 
@@ -167,7 +164,11 @@ def main() -> int:
     with get_context("spawn").Pool(asked.workers) as pool:
         for made in pool.imap(partial(trial, asked.seed, asked.family), numbers):
             trials.append(made)
-            print(f"{made.number}: {made.failed} of {made.points} failed, {made.seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
+            print(
+                f"{made.number}: {made.failed} of {made.points} failed, {made.seconds:.1f} s",
+                file=sys.stderr,
+                flush=True,
+            )
     show(trials)
     return 0
 

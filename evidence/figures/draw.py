@@ -48,12 +48,8 @@ def block_norms(evidence: Evidence) -> Figure:
     """Draw fig. 1: how strongly harmonics are coupled."""
     found = evidence.norms
     figure, axes = plt.subplots(1, 4, figsize=(15.5, 4.0), layout="constrained")
-    titles = (
-        "a) J, full stick", "a) the same, frozen sliders", "b) J, weak coupling", "c) ΔJ, strong coupling",
-    )  # fmt: skip
-    for axis, matrix, title in zip(
-        axes, (found.stuck, found.frozen, found.weak, found.missing), titles, strict=True
-    ):
+    titles = ("a) J, full stick", "a) the same, frozen sliders", "b) J, weak coupling", "c) ΔJ, strong coupling")
+    for axis, matrix, title in zip(axes, (found.stuck, found.frozen, found.weak, found.missing), titles, strict=True):
         shown = np.log10(np.where(matrix > 0.0, np.maximum(matrix, 1e-4), np.nan))
         image = axis.imshow(shown, cmap="viridis", vmin=-4, vmax=0.5)
         for (row, column), value in np.ndenumerate(matrix):
@@ -71,9 +67,7 @@ def forced_responses(evidence: Evidence) -> Figure:
     plan = evidence.plan
     figure, rows = plt.subplots(2, 2, figsize=(11, 7.4), layout="constrained")
     timed = evidence.in_time
-    for row, ratio, markers in zip(
-        rows, (timed.ratio, plan.weak), (timed.markers, evidence.weak_markers), strict=True
-    ):
+    for row, ratio, markers in zip(rows, (timed.ratio, plan.weak), (timed.markers, evidence.weak_markers), strict=True):
         peaks = evidence.at(ratio)
         _both(row[0], peaks)
         _markers(row[0], markers)
@@ -82,12 +76,11 @@ def forced_responses(evidence: Evidence) -> Figure:
         centre = peaks.high.hertz[np.argmax(peaks.high.amplitudes)]
         for axis, letter in zip(row, "ab", strict=True):
             axis.set(
-                xlim=(
-                    max(centre - 14, plan.branch_hertz[0]), min(centre + 9, plan.branch_hertz[1]),
-                ),
+                xlim=(max(centre - 14, plan.branch_hertz[0]), min(centre + 9, plan.branch_hertz[1])),
                 title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
-                xlabel="frequency, Hz", ylabel="tip amplitude, µm",
-            )  # fmt: skip
+                xlabel="frequency, Hz",
+                ylabel="tip amplitude, µm",
+            )
             axis.legend(fontsize=8)
             axis.grid(alpha=0.3)
     return figure
@@ -104,16 +97,18 @@ def _both(axis: Axes, peaks: Peaks) -> None:
 
 
 def _markers(axis: Axes, markers: list[Marker]) -> None:
-    for found, face, label in (
-        (True, TIME, "time integration"),
-        (False, "none", "the same, not periodic"),
-    ):
+    for found, face, label in ((True, TIME, "time integration"), (False, "none", "the same, not periodic")):
         some = [m.orbit for m in markers if m.orbit.found == found]
         if some:
             axis.plot(
-                [o.hertz for o in some], [MICRO * o.amplitude for o in some], "o", ms=5,
-                color=TIME, mfc=face, label=label,
-            )  # fmt: skip
+                [o.hertz for o in some],
+                [MICRO * o.amplitude for o in some],
+                "o",
+                ms=5,
+                color=TIME,
+                mfc=face,
+                label=label,
+            )
 
 
 def _alert(axis: Axes, response: Curve) -> None:
@@ -122,10 +117,14 @@ def _alert(axis: Axes, response: Curve) -> None:
         chosen = [i for i, p in enumerate(response.points) if (p.order > few) == many]
         if chosen:
             axis.plot(
-                response.hertz[chosen], MICRO * response.amplitudes[chosen], marker, ms=4,
-                color=ALERT, mfc=ALERT if many else "none",
+                response.hertz[chosen],
+                MICRO * response.amplitudes[chosen],
+                marker,
+                ms=4,
+                color=ALERT,
+                mfc=ALERT if many else "none",
                 label=f"alert: H = {response.points[chosen[0]].order}",
-            )  # fmt: skip
+            )
 
 
 def time_and_cycles(evidence: Evidence) -> Figure:
@@ -140,17 +139,22 @@ def time_and_cycles(evidence: Evidence) -> Figure:
     axis.plot(phase, 1e3 * orbit.rotation, ":", color=TIME, lw=2, label="time integration")
     axis.set(
         title=f"a) {pair.hertz:.2f} Hz, $F_{{CL}}/F_{{HE}}$ = {pair.ratio:g}",
-        xlabel="time / period", ylabel="damper rotation, mrad",
-    )  # fmt: skip
+        xlabel="time / period",
+        ylabel="damper rotation, mrad",
+    )
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
     names = evidence.model.system.interface.names
     for axis, contact, letter in zip(axes.flat[1:], _middle(evidence.model), "bcd", strict=False):
         _cycles(axis, pair, contact)
         axis.plot(
-            MICRO * _closed(orbit.gap[:, contact, 0]), _closed(orbit.force[:, contact, 0]), ":",
-            color=TIME, lw=2, label="time integration",
-        )  # fmt: skip
+            MICRO * _closed(orbit.gap[:, contact, 0]),
+            _closed(orbit.force[:, contact, 0]),
+            ":",
+            color=TIME,
+            lw=2,
+            label="time integration",
+        )
         axis.set_title(f"{letter}) contact point {names[contact]}")
         axis.legend(fontsize=8)
     return figure
@@ -171,9 +175,13 @@ def _cycles(axis: Axes, pair: Pair, contact: int) -> None:
     for point, colour, style in ((pair.low, LOW, "--"), (pair.high, HIGH, "-")):
         found = signals(pair.problem, point)
         axis.plot(
-            MICRO * _closed(found.gap[contact, 0]), _closed(found.force[contact, 0]), style,
-            color=colour, lw=1.3, label=f"H = {point.order}",
-        )  # fmt: skip
+            MICRO * _closed(found.gap[contact, 0]),
+            _closed(found.force[contact, 0]),
+            style,
+            color=colour,
+            lw=1.3,
+            label=f"H = {point.order}",
+        )
     axis.set(xlabel="tangential displacement, µm", ylabel="tangential force, N")
     axis.grid(alpha=0.3)
 
@@ -182,9 +190,7 @@ def errors_by_frequency(evidence: Evidence) -> Figure:
     """Draw fig. 6: predicted and actual error against frequency."""
     plan = evidence.plan
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.0), layout="constrained")
-    for axis, ratio, letter in zip(
-        axes, (plan.weak, plan.strong, plan.strongest), "abc", strict=True
-    ):
+    for axis, ratio, letter in zip(axes, (plan.weak, plan.strong, plan.strongest), "abc", strict=True):
         found = evidence.pairs[ratio]
         hertz = [p.hertz for p in found]
         for name, colour, style in (("predicted", ALERT, "-"), ("real", HIGH, "--")):
@@ -194,9 +200,12 @@ def errors_by_frequency(evidence: Evidence) -> Figure:
         for lost in evidence.unsolved[ratio]:
             axis.axvline(lost, color="grey", lw=0.6, ls=":")
         axis.set(
-            xlim=plan.hertz, yscale="log", title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
-            xlabel="frequency, Hz", ylabel=f"error, % (at least {SMALLEST:g})",
-        )  # fmt: skip
+            xlim=plan.hertz,
+            yscale="log",
+            title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
+            xlabel="frequency, Hz",
+            ylabel=f"error, % (at least {SMALLEST:g})",
+        )
         axis.legend(fontsize=8)
         axis.grid(alpha=0.3)
     return figure
@@ -208,19 +217,22 @@ def errors_and_times(evidence: Evidence) -> Figure:
     colours = mpl.colormaps["plasma"](np.linspace(0.0, 0.9, len(evidence.pairs)))
     for (ratio, found), colour in zip(evidence.pairs.items(), colours, strict=True):
         some = [p for p in found if p.predicted > 0.0]
-        x, y = (
-            np.maximum([100 * getattr(p, name) for p in some], SMALLEST)
-            for name in ("predicted", "real")
-        )
+        x, y = (np.maximum([100 * getattr(p, name) for p in some], SMALLEST) for name in ("predicted", "real"))
         left.plot(x, y, "o", ms=4, color=colour, alpha=0.8, label=f"{ratio:g}")
     ends = np.array([SMALLEST, 1e3])
     left.plot(ends, ends, "k-", lw=0.8)
     left.axvline(THRESHOLD, color="grey", lw=0.8)
     left.axhline(THRESHOLD, color="grey", lw=0.8)
     left.set(
-        xscale="log", yscale="log", xlim=ends, ylim=ends, aspect="equal",
-        title="a) every frequency that slips", xlabel="predicted error, %", ylabel="actual error, %",
-    )  # fmt: skip
+        xscale="log",
+        yscale="log",
+        xlim=ends,
+        ylim=ends,
+        aspect="equal",
+        title="a) every frequency that slips",
+        xlabel="predicted error, %",
+        ylabel="actual error, %",
+    )
     left.legend(title="$F_{CL}/F_{HE}$", fontsize=7, loc="lower right")
     left.grid(alpha=0.3)
     _times(right, evidence)
@@ -229,8 +241,10 @@ def errors_and_times(evidence: Evidence) -> Figure:
 
 def _times(axis: Axes, evidence: Evidence) -> None:
     for name, colour, style, label in (
-        ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, "-D", "alert"),
-    ):  # fmt: skip
+        ("low", LOW, "--o", "H = 1"),
+        ("high", HIGH, "-s", "H = 5"),
+        ("alert", ALERT, "-D", "alert"),
+    ):
         some = [t for t in evidence.timing if np.isfinite(t.reference)]
         x = [t.median(name) for t in some]
         ends = np.array([np.quantile(t.seconds[name], (0.25, 0.75)) for t in some]).reshape(-1, 2)
@@ -240,15 +254,15 @@ def _times(axis: Axes, evidence: Evidence) -> None:
         full = [i for i, t in enumerate(some) if t.periodic]
         axis.plot([x[i] for i in full], [y[i] for i in full], style[-1], color=colour, ms=5)
         for t, a, b in zip(some, x, y, strict=True):
-            axis.annotate(
-                f"{t.ratio:g}", (a, b), fontsize=7, xytext=(3, 3), textcoords="offset points"
-            )
+            axis.annotate(f"{t.ratio:g}", (a, b), fontsize=7, xytext=(3, 3), textcoords="offset points")
     axis.axhline(THRESHOLD, color="grey", lw=0.8)
     axis.set(
-        xscale="log", yscale="log", title="b) numbers: $F_{CL}/F_{HE}$; hollow: not all motions periodic",
+        xscale="log",
+        yscale="log",
+        title="b) numbers: $F_{CL}/F_{HE}$; hollow: not all motions periodic",
         xlabel=f"CPU time of {evidence.plan.timing_frequencies} frequencies, median and quartiles, s",
         ylabel="error at resonance against time integration, %",
-    )  # fmt: skip
+    )
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3, which="both")
 
@@ -258,8 +272,11 @@ def optimisation(evidence: Evidence) -> Figure:
     figure, rows = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained")
     mode = evidence.second_plan.mode
     for row, peaks, title in zip(
-        rows, (evidence.second_peaks, evidence.peaks), (f"second damper, {mode}", "first damper, first bending"), strict=True,
-    ):  # fmt: skip
+        rows,
+        (evidence.second_peaks, evidence.peaks),
+        (f"second damper, {mode}", "first damper, first bending"),
+        strict=True,
+    ):
         _optimisation(row[0], row[1], peaks)
         row[0].set_title(title)
     return figure
@@ -269,8 +286,10 @@ def _optimisation(left: Axes, right: Axes, peaks: list[Peaks]) -> None:
     ratios = [p.ratio for p in peaks]
     unit = ratios[0] * peaks[0].high.amplitudes.max()
     for name, colour, style, label in (
-        ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, ":D", "alert"),
-    ):  # fmt: skip
+        ("low", LOW, "--o", "H = 1"),
+        ("high", HIGH, "-s", "H = 5"),
+        ("alert", ALERT, ":D", "alert"),
+    ):
         curves: list[Curve] = [getattr(p, name) for p in peaks]
         per_force = [r * c.amplitudes.max() / unit for r, c in zip(ratios, curves, strict=True)]
         left.plot(ratios, per_force, style, color=colour, ms=4, lw=1.0, label=label)
@@ -279,9 +298,13 @@ def _optimisation(left: Axes, right: Axes, peaks: list[Peaks]) -> None:
     judged = [(p.ratio, p.orbit) for p in peaks if p.orbit is not None and p.orbit.found]
     if judged:
         left.plot(
-            [r for r, _ in judged], [r * o.amplitude / unit for r, o in judged], "x", color=TIME,
-            ms=8, label="time integration at the peak of H = 5",
-        )  # fmt: skip
+            [r for r, _ in judged],
+            [r * o.amplitude / unit for r, o in judged],
+            "x",
+            color=TIME,
+            ms=8,
+            label="time integration at the peak of H = 5",
+        )
     left.set(yscale="log", ylabel="peak amplitude for a unit of force, stuck = 1")
     right.set(ylabel="frequency of the peak, Hz")
     for axis in (left, right):
@@ -304,8 +327,9 @@ def second_responses(evidence: Evidence) -> Figure:
         axis.set(
             xlim=(max(0.94 * centre, plan.hertz[0]), min(1.06 * centre, plan.hertz[1])),
             title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {peaks.ratio:g}",
-            xlabel="frequency, Hz", ylabel="tip amplitude, µm",
-        )  # fmt: skip
+            xlabel="frequency, Hz",
+            ylabel="tip amplitude, µm",
+        )
         axis.legend(fontsize=8)
         axis.grid(alpha=0.3)
     return figure

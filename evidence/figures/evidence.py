@@ -9,19 +9,7 @@ import numpy as np
 
 from evidence.figures.model import SHARES, Model, Plan, SecondPlan
 from evidence.figures.reasons import Truncation, truncation
-from evidence.figures.solve import (
-    HZ,
-    PATIENCE,
-    STEPS,
-    Curve,
-    Orbit,
-    Pair,
-    curve,
-    curve_problem,
-    nearest,
-    orbit,
-    pairs,
-)
+from evidence.figures.solve import HZ, PATIENCE, STEPS, Curve, Orbit, Pair, curve, curve_problem, nearest, orbit, pairs
 from evidence.figures.timing import Timing, timed
 from stickslip.arrays import FloatArray
 from stickslip.harmonic import harmonic_block_norms
@@ -142,9 +130,7 @@ def gather(model: Model, second: Model, plan: Plan, second_plan: SecondPlan, say
         say(f"errors at F_CL/F_HE = {ratio:g}")
         found[ratio], lost[ratio] = pairs(model, ratio, plan.hertz, plan.frequencies)
     peaks = []
-    for ratio in sorted(
-        {*plan.all_ratios, plan.weak, plan.strong, *plan.time_ratios}, reverse=True
-    ):
+    for ratio in sorted({*plan.all_ratios, plan.weak, plan.strong, *plan.time_ratios}, reverse=True):
         say(f"whole responses at {ratio:g}")
         peaks.append(whole(model, ratio, plan.branch_hertz, judged=True))
     say("motions in time")
@@ -163,9 +149,20 @@ def gather(model: Model, second: Model, plan: Plan, second_plan: SecondPlan, say
         grid = second_plan.hertz, second_plan.frequencies
         second_pairs[ratio] = pairs(second, ratio, *grid)[0]
     return Evidence(
-        plan, second_plan, model, found, lost, peaks, in_time, weak_markers, norms_of(model, found, plan),
-        timing, second, second_peaks, second_pairs,
-    )  # fmt: skip
+        plan,
+        second_plan,
+        model,
+        found,
+        lost,
+        peaks,
+        in_time,
+        weak_markers,
+        norms_of(model, found, plan),
+        timing,
+        second,
+        second_peaks,
+        second_pairs,
+    )
 
 
 def whole(model: Model, ratio: float, hertz: tuple[float, float], judged: bool) -> Peaks:
@@ -175,9 +172,7 @@ def whole(model: Model, ratio: float, hertz: tuple[float, float], judged: bool) 
     return Peaks(ratio, low, high, alert, found)
 
 
-def against_time(
-    model: Model, known: dict[float, list[Pair]], peaks: Sequence[Peaks], plan: Plan
-) -> InTime:
+def against_time(model: Model, known: dict[float, list[Pair]], peaks: Sequence[Peaks], plan: Plan) -> InTime:
     """Hold five harmonics against time at the lowest ratio whose peak is periodic; at the highest if none is."""
     refused: list[tuple[float, str]] = []
     for ratio in plan.time_ratios:
@@ -191,9 +186,14 @@ def against_time(
         refused.append((ratio, found.motion))
     finer = orbit(model, pair.problem, pair.high, steps=2 * STEPS)
     return InTime(
-        ratio, tuple(refused), markers_of(model, own, near, plan), pair, found,
-        abs(found.amplitude / finer.amplitude - 1.0), truncation(model, pair, found),
-    )  # fmt: skip
+        ratio,
+        tuple(refused),
+        markers_of(model, own, near, plan),
+        pair,
+        found,
+        abs(found.amplitude / finer.amplitude - 1.0),
+        truncation(model, pair, found),
+    )
 
 
 def markers_of(model: Model, peaks: Peaks, known: Sequence[Pair], plan: Plan) -> list[Marker]:
@@ -205,9 +205,7 @@ def markers_of(model: Model, peaks: Peaks, known: Sequence[Pair], plan: Plan) ->
         pair = min(known, key=lambda p: abs(p.hertz - hertz))
         chosen[pair.hertz] = pair
     return [
-        Marker(
-            orbit(model, p.problem, p.high), p.problem.amplitude(p.high), p.problem.amplitude(p.low)
-        )
+        Marker(orbit(model, p.problem, p.high), p.problem.amplitude(p.high), p.problem.amplitude(p.low))
         for p in chosen.values()
     ]
 
@@ -222,14 +220,15 @@ def norms_of(model: Model, found: dict[float, list[Pair]], plan: Plan) -> Norms:
         kept = pair.problem.low.harmonics
         high = pair.problem.high
         x = high.unknowns(pair.low.coefficients)
-        return harmonic_block_norms(
-            high, x, pair.low.omega, part, kept if part == "missing" else None
-        )
+        return harmonic_block_norms(high, x, pair.low.omega, part, kept if part == "missing" else None)
 
     return Norms(
-        norms(stuck, "jacobian"), *frozen_norms(model, plan.ratios[0], stuck.hertz),
-        norms(weak, "jacobian"), norms(weak, "missing"), norms(strong, "missing"),
-    )  # fmt: skip
+        norms(stuck, "jacobian"),
+        *frozen_norms(model, plan.ratios[0], stuck.hertz),
+        norms(weak, "jacobian"),
+        norms(weak, "missing"),
+        norms(strong, "missing"),
+    )
 
 
 def frozen_norms(model: Model, ratio: float, hertz: float) -> tuple[FloatArray, float]:

@@ -9,12 +9,7 @@ from stickslip import ElasticCoulomb, HarmonicLoad, Sweep, System
 from stickslip.arrays import IntArray
 from stickslip.response import frozen_sliders
 
-SHARES = (
-    0.9,
-    0.7,
-    0.5,
-    0.3,
-)  # of the friction, with which the static state may be found before sliders are frozen
+SHARES = (0.9, 0.7, 0.5, 0.3)  # of the friction, with which the static state may be found before sliders are frozen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +100,7 @@ class Case:
         """Return the study and its changes as the page shows them."""
         where = "/".join(self.study.parts[-3:])
         keys = ", ".join(
-            f"`{key} = {list(value) if isinstance(value, tuple) else value}`"
-            for key, value in self.changed.items()
+            f"`{key} = {list(value) if isinstance(value, tuple) else value}`" for key, value in self.changed.items()
         )
         return f"`{where}`" + (f" with {keys}" if keys else "")
 
@@ -155,9 +149,7 @@ class Model:
         """Return the same with sliders that start from the static state with a share of the friction, and from nothing else."""
         own = self.system.interface
         laws = tuple(
-            replace(law, residual_traction=None, slider=None)
-            if isinstance(law, ElasticCoulomb)
-            else law
+            replace(law, residual_traction=None, slider=None) if isinstance(law, ElasticCoulomb) else law
             for law in own.laws
         )
         plain = replace(self.system, interface=replace(own, laws=laws))

@@ -72,9 +72,7 @@ CAPTIONS = (
 )
 
 
-def page(
-    evidence: Evidence, rows: Sequence[Statement], cases: tuple[str, str], seconds: float
-) -> str:
+def page(evidence: Evidence, rows: Sequence[Statement], cases: tuple[str, str], seconds: float) -> str:
     """Return the page.
 
     Parameters
@@ -88,10 +86,23 @@ def page(
     """
     plan, second = evidence.plan, evidence.second_plan
     head = HEAD.format(
-        first=cases[0], second=cases[1], hertz=plan.hertz, second_hertz=second.hertz, mode=second.mode,
-        steps=STEPS, patience=PATIENCE, seconds=seconds, repeats=plan.repeats, least=100 * LEAST, few=plan.timing_frequencies,
-        timing=plan.timing_hertz, paper=plan.time_ratios[0], in_time=which(evidence), tally=tally(rows), count=len(rows),
-    )  # fmt: skip
+        first=cases[0],
+        second=cases[1],
+        hertz=plan.hertz,
+        second_hertz=second.hertz,
+        mode=second.mode,
+        steps=STEPS,
+        patience=PATIENCE,
+        seconds=seconds,
+        repeats=plan.repeats,
+        least=100 * LEAST,
+        few=plan.timing_frequencies,
+        timing=plan.timing_hertz,
+        paper=plan.time_ratios[0],
+        in_time=which(evidence),
+        tally=tally(rows),
+        count=len(rows),
+    )
     parts = [head, "## Statements\n", table(rows), "## Figures\n"]
     parts += [f"![{text.split('.')[0]}](images/{name}.png)\n\n{text}\n" for name, text in CAPTIONS]
     parts += ["## What was not found\n", lost(evidence)]
@@ -100,10 +111,7 @@ def page(
 
 def table(rows: Sequence[Statement]) -> str:
     """Return the rows as a Markdown table."""
-    lines = [
-        "| | where | the paper says | its number | here | verdict | why |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    lines = ["| | where | the paper says | its number | here | verdict | why |", "|---|---|---|---|---|---|---|"]
     for name, row in numbered(rows):
         verdict = row.said if row.verdict == "holds" else f"**{row.said}**"
         why = row.why if row.verdict == "does not hold" else ""
@@ -130,10 +138,7 @@ def lost(evidence: Evidence) -> str:
     ]
     for timing in evidence.timing:
         loose = [o for o in timing.orbits if not o.found]
-        lines += [
-            f"- ratio {timing.ratio:g}, time integration at {o.hertz:.2f} Hz: {o.motion}"
-            for o in loose
-        ]
+        lines += [f"- ratio {timing.ratio:g}, time integration at {o.hertz:.2f} Hz: {o.motion}" for o in loose]
     unstable = sum(o.motion == "unstable" for t in evidence.timing for o in t.orbits)
     lines.append(
         f"- motions in time that are periodic but unstable, among those of figure 7b: {unstable} of {sum(len(t.orbits) for t in evidence.timing)}"

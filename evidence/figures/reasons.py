@@ -56,9 +56,12 @@ def lines_of(model: Model, problem: ForcedProblem, point: ForcedPoint) -> list[L
     out = []
     for name, own in _places(model.lines):
         values = (
-            normal[own].min(), normal[own].mean(), shut[own].mean(),
-            np.any(state[own] == SLIP, axis=1).mean(), turns[own].mean(),
-        )  # fmt: skip
+            normal[own].min(),
+            normal[own].mean(),
+            shut[own].mean(),
+            np.any(state[own] == SLIP, axis=1).mean(),
+            turns[own].mean(),
+        )
         out.append(Line(name, *(float(v) for v in values)))
     return out
 
@@ -138,9 +141,7 @@ def truncation(model: Model, pair: Pair, known: Orbit) -> Truncation:
         np.broadcast_to(np.array(DIRECTIONS), (n, 3)),
     )
     names = list(dict.fromkeys(model.lines))
-    lines5, most = (
-        {x.name: x for x in lines_of(model, p, q)} for p, q in ((pair.problem, pair.high), (problem, best))
-    )  # fmt: skip
+    lines5, most = ({x.name: x for x in lines_of(model, p, q)} for p, q in ((pair.problem, pair.high), (problem, best)))
     work = float(np.sum(fields(problem, best).energy))
     return Truncation(
         errors=errors,
@@ -177,14 +178,10 @@ def solved_from(problem: ForcedProblem, known: ForcedPoint, order: int) -> Force
     balance = problem.balance(tuple(range(order + 1)))
     begin = np.zeros((order + 1, known.coefficients.shape[1]), dtype=complex)
     begin[: len(known.coefficients)] = known.coefficients
-    found = newton(
-        lambda x: balance.linearise(x, known.omega), balance.unknowns(begin), problem.sweep.newton
-    )
+    found = newton(lambda x: balance.linearise(x, known.omega), balance.unknowns(begin), problem.sweep.newton)
     if not found.status.converged:
         return None
-    return replace(
-        known, coefficients=balance.coefficients(found.x), harmonics=np.arange(order + 1)
-    )
+    return replace(known, coefficients=balance.coefficients(found.x), harmonics=np.arange(order + 1))
 
 
 def _input(model: Model, problem: ForcedProblem, point: ForcedPoint) -> float:
@@ -213,9 +210,7 @@ def _sensitivity(model: Model, pair: Pair) -> float:
 class _Cut:
     """Contacts that see a solution with many harmonics only up to those of another problem."""
 
-    def __init__(
-        self, model: Model, few: ForcedProblem, many: ForcedProblem, best: ForcedPoint
-    ) -> None:
+    def __init__(self, model: Model, few: ForcedProblem, many: ForcedProblem, best: ForcedPoint) -> None:
         self.model, self.few, self.many, self.best = model, few, many, best
         self.order = few.high.harmonics[-1]
         self.operator = many.low.interface.gap_operator
@@ -260,5 +255,5 @@ def used_friction(model: Model, problem: ForcedProblem, point: ForcedPoint) -> d
     mu = np.array([law.mu for law in model.system.interface.laws])  # type: ignore[attr-defined]
     limit = mu[:, None] * -force[:, 2]
     closed = limit > 0.0
-    share = np.where(closed, np.max(np.abs(force[:, :2]), axis=1) / np.where(closed, limit, 1.0), 0.0)  # fmt: skip
+    share = np.where(closed, np.max(np.abs(force[:, :2]), axis=1) / np.where(closed, limit, 1.0), 0.0)
     return {name: float(share[own].max()) for name, own in _places(model.lines)}

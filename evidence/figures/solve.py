@@ -32,7 +32,9 @@ from stickslip.response.time.start import start_from_harmonics
 
 HZ = 2 * np.pi
 STEPS = 512  # of a period; the error of the step is printed
-PATIENCE = 250  # periods that shooting takes, and the integrations that decide at which ratio there is a periodic motion
+PATIENCE = (
+    250  # periods that shooting takes, and the integrations that decide at which ratio there is a periodic motion
+)
 BRIEF = 40  # periods of the other integrations, where shooting fails
 ORBIT = 1e-6  # length of shooting's last correction, relative to the vibration
 Motion = Literal["periodic", "unstable", "settled", "not periodic", "overflow"]
@@ -159,9 +161,7 @@ def evaluations() -> Iterator[list[int]]:
 
 def curve_problem(model: Model, ratio: float, selection: str) -> ForcedProblem:
     """Return what a response was solved with."""
-    return forced_problem(
-        model.system, model.load(ratio), replace(model.sweep, selection=selection)
-    )
+    return forced_problem(model.system, model.load(ratio), replace(model.sweep, selection=selection))
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,16 +215,12 @@ class Pair:
         return float(self.low.omega / HZ)
 
 
-def pairs(
-    model: Model, ratio: float, hertz: tuple[float, float], frequencies: int
-) -> tuple[list[Pair], list[float]]:
+def pairs(model: Model, ratio: float, hertz: tuple[float, float], frequencies: int) -> tuple[list[Pair], list[float]]:
     """Solve equally spaced frequencies with few and with many harmonics, each as a response of its own.
 
     Returns the pairs, and the frequencies (Hz) at which one of the two was not found.
     """
-    low, high = (
-        curve(model, ratio, name, hertz, frequencies) for name in ("always_low", "always_high")
-    )
+    low, high = (curve(model, ratio, name, hertz, frequencies) for name in ("always_low", "always_high"))
     problem = curve_problem(model, ratio, "jacobian_alert")
     many = {p.omega: p for p in high.points}
     found = [_pair(model, problem, ratio, p, many[p.omega]) for p in low.points if p.omega in many]
@@ -234,9 +230,7 @@ def pairs(
     return found, lost
 
 
-def _pair(
-    model: Model, problem: ForcedProblem, ratio: float, low: ForcedPoint, high: ForcedPoint
-) -> Pair:
+def _pair(model: Model, problem: ForcedProblem, ratio: float, low: ForcedPoint, high: ForcedPoint) -> Pair:
     outputs = problem.measure.dofs
     x = problem.low.unknowns(low.coefficients)
     alert = jacobian_alert(problem.low, problem.high, x, low.omega, ErrorMeasure(outputs, (1,)))
@@ -252,16 +246,20 @@ def _pair(
     top = outputs[0]
     higher = [float(np.max(np.abs(v[2:, top])) / np.abs(v[1, top])) for v in (many, predicted)]
     return Pair(
-        problem, ratio, low, high,
+        problem,
+        ratio,
+        low,
+        high,
         *(errors[i][j] for j in range(3) for i in range(2)),
         stuck=not any(np.any(s) for s in states),
         states=float(np.mean(states[0] != states[1])),
         slip=float(np.mean(states[1] == SLIP)),
         opened=float(np.mean(states[1] == OPEN)),
-        higher=higher[0], higher_predicted=higher[1],
+        higher=higher[0],
+        higher_predicted=higher[1],
         similarity=jacobian_similarity(*where),
         change_si=jacobian_similarity(*where, scales=np.ones(problem.high.linear.n)).change,
-    )  # fmt: skip
+    )
 
 
 def _errors(
@@ -307,13 +305,7 @@ class Orbit:
         return self.motion in {"periodic", "unstable", "settled"}
 
 
-def orbit(
-    model: Model,
-    problem: ForcedProblem,
-    point: ForcedPoint,
-    steps: int = STEPS,
-    patience: int = BRIEF,
-) -> Orbit:
+def orbit(model: Model, problem: ForcedProblem, point: ForcedPoint, steps: int = STEPS, patience: int = BRIEF) -> Orbit:
     """Find the motion in time that begins at a solution of the balance: by shooting, or by at most `patience` periods where that fails."""
     begun = process_time()
     system = model.system
@@ -321,13 +313,8 @@ def orbit(
     gaps, laws = system.interface.gap_operator, system.interface.laws
     start = start_from_harmonics(motion, point.omega, gaps, laws)
     outputs = np.array([*system.outputs, model.rotation])
-    where = (
-        system.plain_structure, gaps, laws,
-        problem.low.linear.load, point.omega, outputs, start,
-    )  # fmt: skip
-    shot = shoot(
-        *where, TimeStepping(steps_per_period=steps, tolerance=ORBIT, max_periods=PATIENCE)
-    )
+    where = (system.plain_structure, gaps, laws, problem.low.linear.load, point.omega, outputs, start)
+    shot = shoot(*where, TimeStepping(steps_per_period=steps, tolerance=ORBIT, max_periods=PATIENCE))
     kind: Motion
     if shot.converged:
         kind, found = "periodic" if shot.stable else "unstable", shot
@@ -339,10 +326,14 @@ def orbit(
         if not np.isfinite(amplitude):
             kind = "overflow"
     return Orbit(
-        float(point.omega / HZ), kind, float(np.abs(amplitude)), found.outputs[:, -1],
-        found.gap, found.contact_force,
+        float(point.omega / HZ),
+        kind,
+        float(np.abs(amplitude)),
+        found.outputs[:, -1],
+        found.gap,
+        found.contact_force,
         process_time() - begun,
-    )  # fmt: skip
+    )
 
 
 def nearest(points: Sequence[ForcedPoint], hertz: float) -> ForcedPoint:

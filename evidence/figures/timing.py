@@ -87,11 +87,7 @@ class Timing:
         """Return the time of one response over that of another, repeat by repeat."""
         quotient = self.seconds[one] / self.seconds[other]
         first, median, last = np.quantile(quotient, (0.25, 0.5, 0.75))
-        return Share(
-            float(median),
-            float(min(first, (1 - LEAST) * median)),
-            float(max(last, (1 + LEAST) * median)),
-        )
+        return Share(float(median), float(min(first, (1 - LEAST) * median)), float(max(last, (1 + LEAST) * median)))
 
 
 def timed(model: Model, ratio: float, plan: Plan) -> Timing:
@@ -110,9 +106,7 @@ def timed(model: Model, ratio: float, plan: Plan) -> Timing:
 def _around_peaks(model: Model, low: Curve, high: Curve, alert: Curve) -> tuple[Orbit, ...]:
     """Find the motions in time where a response peaks, and on both sides of the peak with many harmonics."""
     place = int(np.argmax(high.amplitudes))
-    chosen: dict[float, ForcedPoint] = {
-        p.omega: p for p in high.points[max(place - 1, 0) : place + 2]
-    }
+    chosen: dict[float, ForcedPoint] = {p.omega: p for p in high.points[max(place - 1, 0) : place + 2]}
     for other in (low, alert):
         begin = nearest(high.points, other.peak.omega / HZ)
         if all(abs(begin.omega - omega) > 1e-9 * omega for omega in chosen):

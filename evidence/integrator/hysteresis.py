@@ -20,9 +20,7 @@ from stickslip.errors import input_error
 
 ELASTIC, PLANAR, SLIDERS, BOUC_WEN, DAHL, CUBIC = range(6)
 TURNS = 4  # Runge-Kutta steps in a step of the integration, where a planar slider slips
-GRAZE = (
-    1e-12  # share of the limit by which a force that is held there may fall below it by rounding
-)
+GRAZE = 1e-12  # share of the limit by which a force that is held there may fall below it by rounding
 
 
 def contact_table(laws: Sequence[Any]) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -62,11 +60,7 @@ def _of(law: Any) -> tuple[int, list[float], int]:
     if name == "Dahl":
         return DAHL, [law.k_t, law.k_w, law.k_n, law.limit], 2
     if name == "CubicSpring":
-        return (
-            CUBIC,
-            [law.k_t, law.k_w, law.k_n, law.cubic_t, law.cubic_w, law.cubic_n],
-            0,
-        )
+        return (CUBIC, [law.k_t, law.k_w, law.k_n, law.cubic_t, law.cubic_w, law.cubic_n], 0)
     raise input_error(
         "evidence.integrator",
         f"has no law {name} of its own",

@@ -37,9 +37,7 @@ class ModalCoordinates:
 
     def motion(self, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return (q, w) of physical displacement and velocity."""
-        return np.concatenate(
-            [self.inverse @ displacement, self.inverse @ velocity / (self.omega * self.speed)]
-        )
+        return np.concatenate([self.inverse @ displacement, self.inverse @ velocity / (self.omega * self.speed)])
 
     def physical(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and velocity of (q, w)."""
@@ -123,9 +121,7 @@ def step_operators(
     return operators, modes
 
 
-def _motion_matrix(
-    stiffness: FloatArray, damping: FloatArray, modes: ModalCoordinates
-) -> FloatArray:
+def _motion_matrix(stiffness: FloatArray, damping: FloatArray, modes: ModalCoordinates) -> FloatArray:
     """Matrix A of ``d(q, w)/dτ = A (q, w)`` in the time ``τ = ωt``, from modal stiffness and damping."""
     speed, omega = modes.speed[:, None], modes.omega
     free = np.hstack([np.zeros_like(stiffness), np.diag(modes.speed)])
@@ -167,14 +163,7 @@ def _clock(orders: list[int], steps: int) -> FloatArray:
     return np.array([np.ones(steps), *waves]).T
 
 
-def _check(
-    n: int,
-    gap_operator: FloatArray,
-    law: FloatArray,
-    load: PeriodicLoad,
-    omega: float,
-    caller: str,
-) -> None:
+def _check(n: int, gap_operator: FloatArray, law: FloatArray, load: PeriodicLoad, omega: float, caller: str) -> None:
     require_array(f"{caller}: gap_operator", gap_operator, (3 * len(law), n))
     require_array(f"{caller}: load.static", load.static, (n,))
     for order, amplitude in load.harmonics.items():

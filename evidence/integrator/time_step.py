@@ -20,7 +20,9 @@ GAP_TOLERANCE = 1e-12  # of the largest gap: some hundred roundings
 class StepOperators(NamedTuple):
     """Matrices of one step; state ``x = (motion, r)``, r being the contact force beyond the stuck springs."""
 
-    transfer: FloatArray  # (m + k, m + k), transposed: x -> motion and gaps at the end of the step, with r held zero there
+    transfer: (
+        FloatArray  # (m + k, m + k), transposed: x -> motion and gaps at the end of the step, with r held zero there
+    )
     drive: FloatArray  # (steps, m + k): what the loads add to that
     hold: FloatArray  # (k, m), transposed: r at the end of the step -> motion
     response: FloatArray  # (k, k): r at the end of the step -> gaps
@@ -58,12 +60,7 @@ class StepWork(NamedTuple):
 
 @njit(cache=True)
 def _contact(
-    gap: FloatArray,
-    before: FloatArray,
-    force_before: FloatArray,
-    law: FloatArray,
-    force: FloatArray,
-    slope: FloatArray,
+    gap: FloatArray, before: FloatArray, force_before: FloatArray, law: FloatArray, force: FloatArray, slope: FloatArray
 ) -> int:
     """Step one contact: write its force and derivative; return 0 open, 1-9 closed, 10-18 landing in this step."""
     slope[:, :] = 0.0
@@ -104,12 +101,7 @@ def _evaluate(free: FloatArray, ops: StepOperators, before: StepState, work: Ste
     for c in range(n_contacts):
         part = slice(3 * c, 3 * c + 3)
         work.code[c] = _contact(
-            work.gap[part],
-            before.gap[part],
-            before.force[part],
-            ops.law[c],
-            work.force[part],
-            work.slope[c],
+            work.gap[part], before.gap[part], before.force[part], ops.law[c], work.force[part], work.slope[c]
         )
         for d in range(3):
             work.slope[c, d, d] -= ops.law[c, d]
@@ -178,9 +170,7 @@ def _back_substitute(work: StepWork) -> None:
 
 
 @njit(cache=True)
-def _solve_contacts(
-    free: FloatArray, ops: StepOperators, before: StepState, work: StepWork
-) -> bool:
+def _solve_contacts(free: FloatArray, ops: StepOperators, before: StepState, work: StepWork) -> bool:
     """Semi-smooth Newton for the gaps at the end of a step; return whether it reached rounding.
 
     Within a contact state the force is affine in the gap, so that a step which ends in the state it was taken in is exact.
@@ -213,21 +203,14 @@ def _accumulate(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
     for j in range(0, whole, 4):
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
         for i in range(out.size):
-            out[i] += (
-                matrix[j, i] * a
-                + matrix[j + 1, i] * b
-                + matrix[j + 2, i] * c
-                + matrix[j + 3, i] * d
-            )
+            out[i] += matrix[j, i] * a + matrix[j + 1, i] * b + matrix[j + 2, i] * c + matrix[j + 3, i] * d
     for j in range(whole, x.size):
         for i in range(out.size):
             out[i] += matrix[j, i] * x[j]
 
 
 @njit(cache=True)
-def advance(
-    ops: StepOperators, state: StepState, work: StepWork, step: int, moved: FloatArray
-) -> bool:
+def advance(ops: StepOperators, state: StepState, work: StepWork, step: int, moved: FloatArray) -> bool:
     """Take one step of `state`, with `moved` (m + k,) to write to; return whether the contacts were solved."""
     m, k = ops.hold.shape[1], ops.hold.shape[0]
     moved[:] = ops.drive[step]

@@ -17,20 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from evidence.integrator.propagator import (
-    ModalCoordinates,
-    PeriodicLoad,
-    require_array,
-    step_operators,
-)
+from evidence.integrator.propagator import ModalCoordinates, PeriodicLoad, require_array, step_operators
 from evidence.integrator.settling import Progress, SettlingStatus, overflowed, period_harmonics
-from evidence.integrator.time_step import (
-    StepOperators,
-    StepRecord,
-    StepState,
-    run_period,
-    step_workspace,
-)
+from evidence.integrator.time_step import StepOperators, StepRecord, StepState, run_period, step_workspace
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
@@ -66,9 +55,7 @@ class TimeStepping:
         check_quantities(self)
         if 2 * self.harmonics >= self.steps_per_period:
             problem = f"{self.harmonics} are too many for {self.steps_per_period} steps a period"
-            raise input_error(
-                "TimeStepping.harmonics", problem, "Ask for less than half the number of steps."
-            )
+            raise input_error("TimeStepping.harmonics", problem, "Ask for less than half the number of steps.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +141,7 @@ class TransientResult:
     def drifting(self) -> tuple[str, ...]:
         """Names of the coordinates whose mean moves by a visible share of their swing in every period."""
         visible = np.maximum(DRIFT_THRESHOLD * self.swing, 1e-9 * np.max(self.swing))
-        return tuple(
-            name
-            for name, moves in zip(self.labels, np.abs(self.drift) > visible, strict=True)
-            if moves
-        )
+        return tuple(name for name, moves in zip(self.labels, np.abs(self.drift) > visible, strict=True) if moves)
 
 
 def rest(n: int, laws: Sequence[Any], caller: str = "integrate") -> TransientStart:
@@ -168,9 +151,7 @@ def rest(n: int, laws: Sequence[Any], caller: str = "integrate") -> TransientSta
     return TransientStart(np.zeros(n), np.zeros(n), np.tile(held, (2, 1)).T)
 
 
-def start_from_harmonics(
-    coefficients: ComplexArray, omega: float, traction: FloatArray
-) -> TransientStart:
+def start_from_harmonics(coefficients: ComplexArray, omega: float, traction: FloatArray) -> TransientStart:
     """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as that of a harmonic balance.
 
     With the balance's `problem` and `point`: ``problem.low.linear.recover(point.omega, point.coefficients)`` are the
@@ -231,9 +212,7 @@ def integrate(
     start = start or rest(structure.n, laws)
     check_arguments(structure.n, len(laws), outputs, start)
     law = law_table(laws)
-    operators, modes = step_operators(
-        structure, gap_operator, law, load, omega, stepping.steps_per_period
-    )
+    operators, modes = step_operators(structure, gap_operator, law, load, omega, stepping.steps_per_period)
     state = initial_state(modes, gap_operator, law, start)
     return _settle(structure, operators, modes, state, outputs, stepping)
 
@@ -243,9 +222,7 @@ def _known(laws: Sequence[Any], caller: str) -> Sequence[Any]:
     for law in laws:
         if type(law).__name__ != "ElasticCoulomb":
             raise input_error(
-                f"{caller}: laws",
-                f"got {type(law).__name__}",
-                "This integration judges ElasticCoulomb contacts only.",
+                f"{caller}: laws", f"got {type(law).__name__}", "This integration judges ElasticCoulomb contacts only."
             )
     return laws
 
@@ -262,18 +239,14 @@ def law_table(laws: Sequence[Any], caller: str = "integrate") -> FloatArray:
     return np.array(rows, dtype=float).reshape(-1, 5)
 
 
-def initial_state(
-    modes: ModalCoordinates, gap_operator: Matrix, law: FloatArray, start: TransientStart
-) -> StepState:
+def initial_state(modes: ModalCoordinates, gap_operator: Matrix, law: FloatArray, start: TransientStart) -> StepState:
     """Return the step's own form of a start, with its springs limited to what friction holds."""
     gap = gap_operator @ start.displacement
     normal = np.maximum(0.0, law[:, 4] - law[:, 2] * gap[2::3])
     limit = (law[:, 3] * normal)[:, None]
     force = np.hstack([np.clip(start.traction, -limit, limit), -normal[:, None]]).ravel()
     beyond = force - law[:, :3].ravel() * gap
-    return StepState(
-        np.concatenate([modes.motion(start.displacement, start.velocity), beyond]), gap, force
-    )
+    return StepState(np.concatenate([modes.motion(start.displacement, start.velocity), beyond]), gap, force)
 
 
 def _settle(
@@ -299,9 +272,7 @@ def _settle(
                 array.fill(np.nan)
             break
         modal = period_harmonics(began, record.motion, stepping.harmonics)
-        now.take_in(
-            modal @ modes.basis[outputs].T, modes.basis @ modal[0].real, failed, stepping.tolerance
-        )
+        now.take_in(modal @ modes.basis[outputs].T, modes.basis @ modal[0].real, failed, stepping.tolerance)
     return _result(structure, modes, state, record, outputs, now)
 
 
@@ -345,6 +316,4 @@ def check_arguments(
     require_array(f"{caller}: start.velocity", start.velocity, (n,))
     require_array(f"{caller}: start.traction", start.traction, (n_contacts, 2))
     if len(outputs) == 0 or np.min(outputs) < 0 or np.max(outputs) >= n:
-        raise input_error(
-            f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}."
-        )
+        raise input_error(f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}.")

@@ -17,18 +17,11 @@ from numba import njit
 from evidence.integrator.hysteresis import advance, contact_table
 from evidence.integrator.propagator import PeriodicLoad, dense
 from evidence.integrator.settling import Progress, overflowed, period_harmonics
-from evidence.integrator.transient import (
-    TimeStepping,
-    TransientResult,
-    TransientStart,
-    check_arguments,
-)
+from evidence.integrator.transient import TimeStepping, TransientResult, TransientStart, check_arguments
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.harmonic.linear import LinearSide, one_structure
 
-LONGEST = (
-    0.2  # of a step times the highest frequency with stuck contacts; 2 is where the scheme explodes
-)
+LONGEST = 0.2  # of a step times the highest frequency with stuck contacts; 2 is where the scheme explodes
 HISTORY = 4  # periods of a given motion over which contacts are marched to learn what they remember
 
 
@@ -90,12 +83,7 @@ def _springs(laws: Sequence[Any]) -> FloatArray:
 
 
 def prepared(
-    structure: LinearSide,
-    gap_operator: Matrix,
-    laws: Sequence[Any],
-    load: PeriodicLoad,
-    omega: float,
-    steps: int,
+    structure: LinearSide, gap_operator: Matrix, laws: Sequence[Any], load: PeriodicLoad, omega: float, steps: int
 ) -> tuple[Scheme, int, FloatArray]:
     """Return the scheme, by how many its steps divide those asked for, and the contacts' states at rest."""
     one = one_structure(structure, "integrate")
@@ -112,9 +100,17 @@ def prepared(
         loads += (np.exp(1j * order * angles)[:, None] * amplitude).real
     kind, table, states = contact_table(laws)
     scheme = Scheme(
-        h, np.linalg.inv(mass), np.linalg.inv(mass + 0.5 * h * damping), mass, damping, stiffness,
-        gaps, loads, kind, table,
-    )  # fmt: skip
+        h,
+        np.linalg.inv(mass),
+        np.linalg.inv(mass + 0.5 * h * damping),
+        mass,
+        damping,
+        stiffness,
+        gaps,
+        loads,
+        kind,
+        table,
+    )
     return scheme, every, states
 
 
@@ -178,11 +174,7 @@ def integrate(
 
 
 def start_along(
-    coefficients: ComplexArray,
-    omega: float,
-    gap_operator: Matrix,
-    laws: Sequence[Any],
-    steps: int = 4096,
+    coefficients: ComplexArray, omega: float, gap_operator: Matrix, laws: Sequence[Any], steps: int = 4096
 ) -> TransientStart:
     """Return the state at t = 0 of a given motion (H + 1, n): the contacts are marched along its gaps for some periods."""
     kind, table, states = contact_table(laws)

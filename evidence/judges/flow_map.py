@@ -57,9 +57,7 @@ def judged(
     """Set a judged motion up: gaps are (2H+1, 3 n_contacts), `elements` one (k, 7) array a contact."""
     inverse = np.linalg.inv(mass)
     owner = np.repeat(np.arange(len(elements)), [len(e) for e in elements])
-    rows = np.concatenate(
-        [e * [w, w, w, 1.0, w, 1.0, 1.0] for e, w in zip(elements, weights, strict=True)]
-    )
+    rows = np.concatenate([e * [w, w, w, 1.0, w, 1.0, 1.0] for e, w in zip(elements, weights, strict=True)])
     springs = np.zeros(len(gap_operator))
     for c, row in zip(owner, rows, strict=True):
         springs[3 * c : 3 * c + 3] += row[:3]
@@ -157,9 +155,7 @@ def _change(elements, owner, mode, place, x, v, e, d):  # type: ignore[no-untype
         mode[e, 2] = STICK
         for t in range(2):
             rate = row[t] * v[c + t]
-            mode[e, t] = (
-                STICK if abs(rate) <= row[MU] * rise else FORWARD if rate > 0.0 else BACKWARD
-            )
+            mode[e, t] = STICK if abs(rate) <= row[MU] * rise else FORWARD if rate > 0.0 else BACKWARD
             place[e, t] = x[c + t]
     elif d == 2:
         mode[e, :] = OPEN
@@ -295,9 +291,7 @@ class FlowMap:
 
     def __init__(self, case: Judged, begin: float = 0.0) -> None:
         self.case, self.begin = case, begin
-        self.model = (
-            case.stiffness, case.damping, case.rows, case.spread, case.elements, case.owner, case.polynomials
-        )  # fmt: skip
+        self.model = (case.stiffness, case.damping, case.rows, case.spread, case.elements, case.owner, case.polynomials)
         self.modes, self.places = self._settled()
 
     def _settled(self) -> tuple[FloatArray, FloatArray]:
@@ -306,10 +300,7 @@ class FlowMap:
         start = self.begin - 2 * np.pi * SETTLING
         x, v = np.empty(len(case.polynomials)), np.empty(len(case.polynomials))
         _gaps(case.polynomials, start, x, v)
-        mode, place = (
-            np.zeros((len(case.elements), 3), dtype=np.int64),
-            np.zeros((len(case.elements), 3)),
-        )
+        mode, place = (np.zeros((len(case.elements), 3), dtype=np.int64), np.zeros((len(case.elements), 3)))
         for e, row in enumerate(case.elements):
             own = x[3 * case.owner[e] : 3 * case.owner[e] + 3]
             pressure = _pressure(row, own[2], 0.0)[0]
@@ -327,9 +318,7 @@ class FlowMap:
         modes, places = np.array([mode, mode]), np.array([place, place])
         still = np.zeros(2 * len(case.stiffness))
         if _march(start, self.begin, case.step, still, _A, _B, _C, self.model, modes, places) < 0:
-            raise RuntimeError(
-                "the contacts of the prescribed motion change their modes without end"
-            )
+            raise RuntimeError("the contacts of the prescribed motion change their modes without end")
         modes[1], places[1] = modes[0], places[0]
         return modes, places
 

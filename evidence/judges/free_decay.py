@@ -29,13 +29,7 @@ class Decay:
 
 
 def free_decay(
-    stiffness: Rows,
-    damping: Rows,
-    springs: Rows,
-    limits: Rows,
-    start: Rows,
-    periods: int,
-    steps: int,
+    stiffness: Rows, damping: Rows, springs: Rows, limits: Rows, start: Rows, periods: int, steps: int
 ) -> Decay:
     """March unit masses from rest at a displacement.
 

@@ -105,9 +105,7 @@ class _Motion:
         pull = along_x * k_x * x + along_y * k_y * y
         stiff = k_x * along_x**2 + k_y * along_y**2
         multiplier = (pull + contact.mu * contact.k_n * z) / stiff
-        across = along_x * k_y * (y - multiplier * along_y) - along_y * k_x * (
-            x - multiplier * along_x
-        )
+        across = along_x * k_y * (y - multiplier * along_y) - along_y * k_x * (x - multiplier * along_x)
         limit = contact.mu * (contact.preload - contact.k_n * (self.mean[2] + normal))
         return multiplier, across / max(0.0, limit)
 
@@ -133,9 +131,7 @@ def _zero(f: Callable[[Any], Any], left: float, right: float) -> float:
     return float(brentq(f, left, right, xtol=1e-15, rtol=1e-15)) if f(right) > 0.0 else float(right)
 
 
-def _first_crossing(
-    f: Callable[[Any], Any], begin: float, begun: bool = False, last: float = PERIOD
-) -> float:
+def _first_crossing(f: Callable[[Any], Any], begin: float, begun: bool = False, last: float = PERIOD) -> float:
     """Return where f first rises through zero, `last` if nowhere before; with `begun` it is zero at the beginning and leaves it downward."""
     near = begin + 1e-5 * 2.0 ** np.arange(9) if begun else np.array([begin])
     grid = np.concatenate([near, np.arange(near[-1] + CELL, last, CELL), [last]])
@@ -144,14 +140,9 @@ def _first_crossing(
     above = np.append(np.flatnonzero(values > 0.0), len(grid))[0]
     bent = np.max(np.abs(np.diff(values, 2)), initial=0.0)
     for i in range(1, min(above, len(grid) - 1)):
-        if (
-            values[i] >= max(values[i - 1], values[i + 1]) and values[i] > -bent
-        ):  # it may rise between
+        if values[i] >= max(values[i - 1], values[i + 1]) and values[i] > -bent:  # it may rise between
             top = minimize_scalar(
-                lambda t: -f(t),
-                bounds=(grid[i - 1], grid[i + 1]),
-                method="bounded",
-                options={"xatol": 1e-12},
+                lambda t: -f(t), bounds=(grid[i - 1], grid[i + 1]), method="bounded", options={"xatol": 1e-12}
             )
             if top.fun < 0.0:
                 return _zero(f, grid[i - 1], top.x)
@@ -202,9 +193,7 @@ def _open(motion: _Motion, t: float) -> tuple[float, str, np.ndarray]:
     return (closing, STICK, np.zeros(2)) if e is None else (closing, SLIP, e)
 
 
-def _stick(
-    motion: _Motion, t: float, force: np.ndarray, sums: _Sums | None
-) -> tuple[float, str, np.ndarray]:
+def _stick(motion: _Motion, t: float, force: np.ndarray, sums: _Sums | None) -> tuple[float, str, np.ndarray]:
     """March over a stick; return its end, what follows and the force there."""
     origin = motion.gap(t)[:2] - force / np.where(motion.k > 0.0, motion.k, 1.0)
 
@@ -250,9 +239,16 @@ def _slip(
     stops.terminal, stops.direction = True, -1.0  # type: ignore[attr-defined]
     opens = _first_crossing(lambda at: 0.5 * faint - motion.contact.mu * motion.normal(at), t)
     run = solve_ivp(
-        lambda at, y: [motion.slip(at, y[0])[1]], (t, opens), [angle], method="DOP853", rtol=tolerance,
-        atol=tolerance, max_step=PANEL, events=stops, dense_output=True,
-    )  # fmt: skip
+        lambda at, y: [motion.slip(at, y[0])[1]],
+        (t, opens),
+        [angle],
+        method="DOP853",
+        rtol=tolerance,
+        atol=tolerance,
+        max_step=PANEL,
+        events=stops,
+        dense_output=True,
+    )
     if not run.success:
         raise RuntimeError(run.message)
     end = _first_dip(lambda at: motion.multiplier(at, run.sol(at)[0]), t, float(run.t[-1]))

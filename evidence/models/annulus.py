@@ -15,12 +15,7 @@ HEX20 = np.array([*CORNERS, *MIDDLES, *UPRIGHT])
 
 
 def annular_sector(
-    inner_radius: float,
-    outer_radius: float,
-    width: float,
-    *,
-    sectors: int,
-    divisions: tuple[int, int, int] = (4, 2, 1),
+    inner_radius: float, outer_radius: float, width: float, *, sectors: int, divisions: tuple[int, int, int] = (4, 2, 1)
 ) -> SolidMesh:
     """Mesh one of `sectors` equal sectors of a ring of rectangular cross-section.
 
@@ -52,9 +47,7 @@ def annular_sector(
     place = np.stack(np.meshgrid(*(np.arange(n) for n in steps), indexing="ij"), axis=-1)
     place = place.reshape(-1, 3)
     first = np.stack(np.meshgrid(*(np.arange(0, n - 1, 2) for n in steps), indexing="ij"), axis=-1)
-    cells = np.ravel_multi_index(
-        tuple((first.reshape(-1, 1, 3) + HEX20).transpose(2, 0, 1)), tuple(steps)
-    )
+    cells = np.ravel_multi_index(tuple((first.reshape(-1, 1, 3) + HEX20).transpose(2, 0, 1)), tuple(steps))
     # nodes with at most one odd step lie on edges: the others belong to no serendipity element
     used = np.flatnonzero((place % 2).sum(axis=1) <= 1)
     place = place[used]

@@ -93,7 +93,7 @@ def packet(rng: Random) -> Built:
         loads[2] = rng.uniform(0.1, 0.5) * shake**2 * np.exp(1j * rng.uniform(0.0, 2 * np.pi))
     structure = lumped(np.eye(4 * blades), K, damping, ("x", "z"))
     names = tuple(f"S{i}" for i in range(blades - 1))
-    system = System(structure, Interface(names, tuple(laws), np.vstack(rows)), np.arange(2, 4 * blades, 4))  # fmt: skip
+    system = System(structure, Interface(names, tuple(laws), np.vstack(rows)), np.arange(2, 4 * blades, 4))
     note = f"packet of {blades}, {'planar, ' if planar else ''}{'apart, ' if apart else ''}preload {ratio:.3g}, harmonics {sorted(loads)}, damping {damping:.1e}"
     return system, HarmonicLoad(np.zeros(structure.n), loads), note
 
@@ -109,7 +109,7 @@ def ring(rng: Random) -> Built:
         one = omega**2 * (1.0 + 0.01 * rng.standard_normal())
         K[np.ix_([disk, blade], [disk, blade])] += one * np.array([[1.0, -1.0], [-1.0, 1.0]])
         K[disk, disk] += 3.0 * omega**2
-        K[np.ix_([disk, other], [disk, other])] += 4.0 * omega**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])  # fmt: skip
+        K[np.ix_([disk, other], [disk, other])] += 4.0 * omega**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
     damping, ratio = decades(rng, 2e-4, 2e-2), decades(rng, 0.3, 30.0)
     lifts = rng.uniform() < 0.4
     laws: list[Jenkins | ElasticCoulomb] = []
@@ -119,10 +119,12 @@ def ring(rng: Random) -> Built:
         row[0, 2 * i] = 1.0
         k_t = omega**2 * decades(rng, 0.3, 10.0)
         if lifts:
-            row[2, 2 * i] = rng.uniform(
-                0.2, 1.0
-            )  # the rim tilts: its motion opens the contact, too
-            laws.append(ElasticCoulomb(k_t=k_t, k_w=0.0, k_n=k_t * decades(rng, 0.5, 2.0), mu=decades(rng, 0.1, 0.6), preload=ratio))  # fmt: skip
+            row[2, 2 * i] = rng.uniform(0.2, 1.0)  # the rim tilts: its motion opens the contact, too
+            laws.append(
+                ElasticCoulomb(
+                    k_t=k_t, k_w=0.0, k_n=k_t * decades(rng, 0.5, 2.0), mu=decades(rng, 0.1, 0.6), preload=ratio
+                )
+            )
         else:
             laws.append(Jenkins(k_t=k_t, limit=ratio * rng.uniform(0.5, 1.0)))
         rows.append(row)
@@ -148,9 +150,7 @@ def stops(rng: Random) -> Built:
     laws: list[ElasticCoulomb | CubicSpring | Iwan | Jenkins] = []
     rows = []
 
-    def add(
-        law: ElasticCoulomb | CubicSpring | Iwan | Jenkins, direction: int, sign: float
-    ) -> None:
+    def add(law: ElasticCoulomb | CubicSpring | Iwan | Jenkins, direction: int, sign: float) -> None:
         row = np.zeros((3, n))
         row[direction, tip] = sign
         laws.append(law)
@@ -158,7 +158,7 @@ def stops(rng: Random) -> Built:
 
     stiff, clearance = omega**2 * decades(rng, 0.1, 10.0), free * decades(rng, 0.02, 0.5)
     for sign in (1.0, -1.0)[: int(rng.integers(1, 3))]:
-        add(ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=stiff, mu=0.0, preload=-stiff * clearance), 2, sign)  # fmt: skip
+        add(ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=stiff, mu=0.0, preload=-stiff * clearance), 2, sign)
     cubic = rng.uniform(-0.15, 1.0) * omega**2 / free**2 * decades(rng, 0.1, 3.0)
     add(CubicSpring(k_t=0.0, cubic_t=max(cubic, -0.02 * omega**2 / free**2)), 0, 1.0)
     k_t, limit = omega**2 * decades(rng, 0.1, 1.0), decades(rng, 0.1, 3.0)
@@ -174,9 +174,7 @@ def stops(rng: Random) -> Built:
     return system, HarmonicLoad(np.zeros(n), {1: shake}), note
 
 
-def lumped(
-    mass: FloatArray, stiffness: FloatArray, damping: float, names: tuple[str, str]
-) -> Structure:
+def lumped(mass: FloatArray, stiffness: FloatArray, damping: float, names: tuple[str, str]) -> Structure:
     """Return masses with two named dofs a node and the same damping ratio in all modes."""
     n = len(mass)
     dofs = Dofs(np.repeat(np.arange(n // 2), 2), names * (n // 2), np.zeros((n, 3)))

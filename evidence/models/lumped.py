@@ -55,9 +55,14 @@ Y2 = 3  # dof of which the tables speak
 
 
 def blades_and_damper(
-    *, m: float | tuple[float, float] | None = 0.0, excitation: float = 1.0, length: float = 1.0, force: float = 1.0,
-    phase: float = 0.0, mirrored: bool = False,
-) -> tuple[System, HarmonicLoad]:  # fmt: skip
+    *,
+    m: float | tuple[float, float] | None = 0.0,
+    excitation: float = 1.0,
+    length: float = 1.0,
+    force: float = 1.0,
+    phase: float = 0.0,
+    mirrored: bool = False,
+) -> tuple[System, HarmonicLoad]:
     """B6, after Ferhatoglu & Zucca (2021): two planar blades and a wedge between them, dofs x1 y1 x2 y2 xD yD.
 
     120 N on the damper, `excitation` times (0, -20, 5, 0, 0, 0) sin(ωt) on the blades. `m` holds the tangential forces of the two
@@ -80,9 +85,7 @@ def blades_and_damper(
         gap = np.diag([-1.0, 1, 1, -1, 1, 1]) @ gap
     per_length = length / force
     laws = tuple(
-        ElasticCoulomb(
-            k_t=3e5 * per_length, k_w=0.0, k_n=3e5 * per_length, mu=0.5, residual_traction=share
-        )
+        ElasticCoulomb(k_t=3e5 * per_length, k_w=0.0, k_n=3e5 * per_length, mu=0.5, residual_traction=share)
         for share in (m if isinstance(m, tuple) else (m, m))
     )
     shake = excitation * np.array([0, -20, 5, 0, 0, 0.0]) * (-1j) * np.exp(1j * phase)

@@ -19,12 +19,7 @@ RING_HOLD = 0.1  # N/m to ground: nothing else tells a slipping ring where its m
 
 
 def blade_ring(
-    sectors: int,
-    *,
-    mass: float = 1.0,
-    stiffness: float = 1.0,
-    coupling: float = 0.02,
-    damping: float = 0.0,
+    sectors: int, *, mass: float = 1.0, stiffness: float = 1.0, coupling: float = 0.02, damping: float = 0.0
 ) -> CyclicSector:
     """Return a ring of blades, each one mass on a spring and a dashpot, with springs between neighbours.
 
@@ -34,14 +29,10 @@ def blade_ring(
     structure = _assembled(("blade",), (mass,), springs, 1)
     dashpots = structure.stiffness * 0.0
     dashpots[0, 0] = damping
-    return CyclicSector(
-        structure.with_damping(dashpots), sectors, np.array([0]), np.array([1]), axis=None
-    )
+    return CyclicSector(structure.with_damping(dashpots), sectors, np.array([0]), np.array([1]), axis=None)
 
 
-def mistuned_blade_ring(
-    deviations: Sequence[float] | FloatArray, damping: float = 0.0
-) -> Structure:
+def mistuned_blade_ring(deviations: Sequence[float] | FloatArray, damping: float = 0.0) -> Structure:
     """Return the whole `blade_ring`; blade n stands on ``1 + deviations[n]``."""
     shares = np.asarray(deviations, dtype=float)
     tuned = wheel(blade_ring(shares.size, damping=damping))
@@ -121,10 +112,7 @@ def _damped(wave: Structure, _keep: object, _n_modes: int) -> Structure:
 
 
 def _assembled(
-    names: tuple[str, ...],
-    masses: tuple[float, ...],
-    springs: dict[tuple[int, int | None], float],
-    copies: int,
+    names: tuple[str, ...], masses: tuple[float, ...], springs: dict[tuple[int, int | None], float], copies: int
 ) -> Structure:
     """Return a sector from its springs, by pairs of coordinates (None: the ground), with massless copies of a neighbour's coordinates last."""
     n = len(names) + copies

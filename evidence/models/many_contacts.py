@@ -94,14 +94,10 @@ def _assembled(points: int) -> tuple[Structure, np.ndarray, np.ndarray]:
         (np.ones(rows.size), (rows, (3 * lower[:, None] + three).ravel())), shape=(6 * n, 6 * n)
     )
     to_full = scipy.sparse.csr_array(scipy.sparse.eye_array(6 * n) + follow)
-    free = np.concatenate(
-        [np.repeat(places[:, 0] > 1e-9, 3), np.repeat(places[:, 0] < LENGTH - 1e-9, 3)]
-    )
+    free = np.concatenate([np.repeat(places[:, 0] > 1e-9, 3), np.repeat(places[:, 0] < LENGTH - 1e-9, 3)])
     free = np.flatnonzero(free)
     matrices = [
-        scipy.sparse.csr_array(to_full.T @ scipy.sparse.block_diag([a, a], format="csr") @ to_full)[
-            free
-        ][:, free]
+        scipy.sparse.csr_array(to_full.T @ scipy.sparse.block_diag([a, a], format="csr") @ to_full)[free][:, free]
         for a in (mass, stiffness)
     ]
     new = np.full(6 * n, -1)
@@ -114,9 +110,7 @@ def _assembled(points: int) -> tuple[Structure, np.ndarray, np.ndarray]:
     return full, gaps, new[3 * n + 3 * corner + three]
 
 
-def _with_contacts(
-    structure: Structure | Unreduced, gaps: np.ndarray, tip: np.ndarray, seed: int
-) -> Plates:
+def _with_contacts(structure: Structure | Unreduced, gaps: np.ndarray, tip: np.ndarray, seed: int) -> Plates:
     points = gaps.size // 3
     area = LENGTH * WIDTH / points
     rng = np.random.default_rng(seed)
@@ -126,7 +120,7 @@ def _with_contacts(
             k_t=TANGENTIAL * area, k_w=TANGENTIAL * area, k_n=NORMAL * area, mu=FRICTION, preload=PRESSURE * area * r
         )
         for r in rough
-    )  # fmt: skip
+    )
     entries = np.ones(gaps.size), (np.arange(gaps.size), gaps)
     operator = scipy.sparse.csr_array(entries, shape=(gaps.size, structure.n))
     names = tuple(str(i) for i in range(points))
@@ -134,9 +128,7 @@ def _with_contacts(
     return Plates(system, float(PRESSURE * area * rough.sum()))
 
 
-def _plate(
-    along: int, across: int
-) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array, np.ndarray]:
+def _plate(along: int, across: int) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array, np.ndarray]:
     """Return mass, stiffness (node-major) and node places of one free plate, two elements thick."""
     grid = skfem.MeshHex.init_tensor(
         np.linspace(0, LENGTH, along), np.linspace(0, WIDTH, across), np.linspace(0, THICKNESS, 3)
@@ -147,16 +139,12 @@ def _plate(
 
     @skfem.BilinearForm
     def stiffness(u, v, _):
-        return first * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * second * ddot(
-            sym_grad(u), sym_grad(v)
-        )
+        return first * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * second * ddot(sym_grad(u), sym_grad(v))
 
     @skfem.BilinearForm
     def mass(u, v, _):
         return steel.density * dot(u, v)
 
     order = basis.nodal_dofs.T.ravel()
-    both = [
-        scipy.sparse.csr_array(form.assemble(basis))[order][:, order] for form in (mass, stiffness)
-    ]
+    both = [scipy.sparse.csr_array(form.assemble(basis))[order][:, order] for form in (mass, stiffness)]
     return both[0], scipy.sparse.csr_array((both[1] + both[1].T) / 2), grid.p.T

@@ -25,12 +25,7 @@ def shrouded_sector(sectors: int) -> SolidMesh:
     pitch = 2 * math.pi / sectors
     number = np.arange(len(RADII) * len(ANGLES) * len(DEPTH)).reshape(len(RADII), len(ANGLES), 3)
     points = np.array(
-        [
-            [r * math.cos(a * pitch), r * math.sin(a * pitch), z]
-            for r in RADII
-            for a in ANGLES
-            for z in DEPTH
-        ]
+        [[r * math.cos(a * pitch), r * math.sin(a * pitch), z] for r in RADII for a in ANGLES for z in DEPTH]
     )
     cells = []
     for i in range(len(RADII) - 1):
@@ -38,13 +33,7 @@ def shrouded_sector(sectors: int) -> SolidMesh:
             for k in range(2):
                 low = number[i : i + 2, j : j + 2, k]
                 high = number[i : i + 2, j : j + 2, k + 1]
-                cells.append(
-                    [
-                        part[a, b]
-                        for part in (low, high)
-                        for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))
-                    ]
-                )
+                cells.append([part[a, b] for part in (low, high) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))])
     used, at = np.unique(np.array(cells), return_inverse=True)
     place = np.full(len(points), -1)
     place[used] = np.arange(used.size)
@@ -71,9 +60,7 @@ def mistuned_wheel(
 ) -> Model:
     """Return a wheel of shrouded blades whose frequencies scatter; no deviation at all: None of it."""
     law = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=4e6, mu=0.3, preload=5.0)
-    scatter = BladeMistuning(
-        of="sector.blade", deviations=pattern(sectors, "normal", deviation, seed), modes=3
-    )
+    scatter = BladeMistuning(of="sector.blade", deviations=pattern(sectors, "normal", deviation, seed), modes=3)
     return Model(
         parts={
             "sector": solid_part(
@@ -86,16 +73,10 @@ def mistuned_wheel(
         },
         contacts={
             "shroud": Contact(
-                between=("sector.shroud_high", "next.sector.shroud_low"),
-                law=law,
-                tangent=(1.0, 0.0, 0.0),
+                between=("sector.shroud_high", "next.sector.shroud_low"), law=law, tangent=(1.0, 0.0, 0.0)
             )
         },
-        loads={
-            "gas": Load(
-                on="sector.tip", newton=newton, direction=(0.0, 1.0, 1.0), engine_order=engine_order
-            )
-        },
+        loads={"gas": Load(on="sector.tip", newton=newton, direction=(0.0, 1.0, 1.0), engine_order=engine_order)},
         outputs=(Output(name="tip", on="sector.tip"),),
         mistuning=Mistuning(blades={"scatter": scatter}) if deviation else None,
     )

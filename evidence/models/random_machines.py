@@ -139,9 +139,7 @@ def common(rng: Random) -> Blade:
     )
 
 
-def finished(
-    rng: Random, number: int, family: str, system: System, load: HarmonicLoad, note: str
-) -> Drawn:
+def finished(rng: Random, number: int, family: str, system: System, load: HarmonicLoad, note: str) -> Drawn:
     """Add the sweep: from the free to the stuck resonance."""
     free, stuck = first_frequencies(system, load)
     low, high = 0.9 * min(free, stuck), min(1.1 * max(free, stuck), 2.5 * free)
@@ -219,9 +217,7 @@ def with_platform(structure: Structure, nodes: int, at: int, blade: Blade) -> St
     return Structure(M, modal_damping(M, K, blade.damping), K, dofs)
 
 
-def law_of(
-    rng: Random, blade: Blade, *, k_n: float | None = None, preload: float = 0.0
-) -> ElasticCoulomb:
+def law_of(rng: Random, blade: Blade, *, k_n: float | None = None, preload: float = 0.0) -> ElasticCoulomb:
     """Draw a contact about the stiffness of the system."""
     k_t, k_w = (blade.contact * decades(rng, 0.5, 2.0) for _ in range(2))
     normal = k_t * decades(rng, 0.5, 3.0) if k_n is None else k_n
@@ -287,9 +283,7 @@ def wedge(
     return system.with_retention(retention), HarmonicLoad(static, {1: shake}), note
 
 
-def wedge_contacts(
-    rng: Random, dofs: int, contacts: int | None
-) -> tuple[FloatArray, list[FloatArray], np.ndarray]:
+def wedge_contacts(rng: Random, dofs: int, contacts: int | None) -> tuple[FloatArray, list[FloatArray], np.ndarray]:
     """Return positions on the damper (m), frames and which lie on the left platform.
 
     The left lines stand on both sides of the point where the resultant of the left platform passes: the frictionless equilibrium
@@ -299,21 +293,13 @@ def wedge_contacts(
     left_normal = np.array([-np.sin(flat), 0.0, np.cos(flat)])
     right_normal = np.array([np.sin(curved), 0.0, np.cos(curved)])
     w = np.array([0.0, 1.0, 0.0])
-    frames_of = [
-        np.column_stack([np.cross(w, n) * s, s * w, n])
-        for n, s in ((left_normal, 1), (right_normal, -1))
-    ]
+    frames_of = [np.column_stack([np.cross(w, n) * s, s * w, n]) for n, s in ((left_normal, 1), (right_normal, -1))]
     size = 0.01
     right_point = size * right_normal + 0.2 * size * rng.uniform(-1, 1) * frames_of[1][:, 0]
-    crossing = np.array(
-        [0.0, 0.0, right_point[2] - right_point[0] * right_normal[2] / right_normal[0]]
-    )
+    crossing = np.array([0.0, 0.0, right_point[2] - right_point[0] * right_normal[2] / right_normal[0]])
     foot = crossing + (0.7 * size - crossing @ left_normal) * left_normal
     wide = size * rng.uniform(0.15, 0.5)
-    lines_left = [
-        foot + share * wide * frames_of[0][:, 0]
-        for share in (rng.uniform(0.5, 1.0), -rng.uniform(0.5, 1.0))
-    ]
+    lines_left = [foot + share * wide * frames_of[0][:, 0] for share in (rng.uniform(0.5, 1.0), -rng.uniform(0.5, 1.0))]
     if dofs == 2:
         lines_left = lines_left[: int(rng.integers(1, 3))]
     sections = 1 if dofs < 6 else int(rng.integers(2, 5))
@@ -340,8 +326,7 @@ def shroud(rng: Random, blade: Blade) -> tuple[System, HarmonicLoad, str]:
     """Two blades that touch each other, perhaps the ground too."""
     lumps = int(rng.integers(1, 4))
     whole = join(
-        left=lumped_blade(rng, blade, lumps),
-        right=lumped_blade(rng, blade, lumps, float(rng.choice([1.0, 1.05, 1.5]))),
+        left=lumped_blade(rng, blade, lumps), right=lumped_blade(rng, blade, lumps, float(rng.choice([1.0, 1.05, 1.5])))
     )
     n_contacts = int(rng.integers(1, 7))
     clearance = rng.uniform() < 1 / 3

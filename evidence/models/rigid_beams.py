@@ -52,9 +52,7 @@ def rubbing_beams(coordinates: Coordinates, preload: float) -> tuple[System, Har
     return _system(whole, gap, force, preload)
 
 
-def _system(
-    structure: Structure, gap: FloatArray, force: FloatArray, preload: float
-) -> tuple[System, HarmonicLoad]:
+def _system(structure: Structure, gap: FloatArray, force: FloatArray, preload: float) -> tuple[System, HarmonicLoad]:
     if structure.basis is not None and structure.basis.shape[0] == force.size:
         force = structure.basis.T @ force
     laws = (RigidCoulomb(mu=0.5, preload=preload),) * len(NODES)

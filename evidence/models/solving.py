@@ -98,9 +98,7 @@ def balance_of(problem: System, load: HarmonicLoad, order: int, samples: int) ->
     return harmonic_balance(linear, problem.interface, order, samples)
 
 
-def bonded(
-    problem: System, balance: HarmonicBalance, load: HarmonicLoad, omega: float
-) -> FloatArray:
+def bonded(problem: System, balance: HarmonicBalance, load: HarmonicLoad, omega: float) -> FloatArray:
     """Return the scaled start that the library uses: the static equilibrium plus the vibration with bonded contacts."""
     guess = balance.coefficients(bonded_start(balance, omega, problem))
     guess[0] = preload(problem, load.static)
@@ -128,12 +126,7 @@ def motion(balance: HarmonicBalance, omega: float, x: FloatArray) -> ComplexArra
 
 
 def at_frequency(
-    problem: System,
-    load: HarmonicLoad,
-    hertz: float,
-    order: int,
-    samples: int = 256,
-    span: float = 0.5,
+    problem: System, load: HarmonicLoad, hertz: float, order: int, samples: int = 256, span: float = 0.5
 ) -> ForcedPoint:
     """Solve at one frequency in hertz with the public forced response, coming from `span` below in four steps."""
     sweep = Sweep(
@@ -158,9 +151,7 @@ def frictionless(problem: System) -> System:
     return replace(problem, interface=replace(problem.interface, laws=laws))
 
 
-def integrated(
-    problem: System, load: HarmonicLoad, omega: float, order: int, stepping: TimeStepping
-) -> RefinedResult:
+def integrated(problem: System, load: HarmonicLoad, omega: float, order: int, stepping: TimeStepping) -> RefinedResult:
     """Integrate to the steady state with two step lengths.
 
     Order 0 starts from the static equilibrium without tangential forces. Any other order starts from the harmonic balance of that
@@ -168,9 +159,7 @@ def integrated(
     """
     n, n_contacts = problem.structure.n, problem.interface.n_contacts
     if order == 0:
-        start = TransientStart(
-            preload(frictionless(problem), load.static), np.zeros(n), np.zeros((n_contacts, 2))
-        )
+        start = TransientStart(preload(frictionless(problem), load.static), np.zeros(n), np.zeros((n_contacts, 2)))
     else:
         balance = balance_of(problem, load, order, 1024)
         x = solve(balance, omega, bonded(problem, balance, load, omega))

@@ -48,27 +48,21 @@ def box(along: int = 10, up: int = 10) -> tuple[Structure, np.ndarray, np.ndarra
     Its sets ``low`` and ``high`` are the lower parts of the sides, which are tied; `along` and `up` count the contacts each way.
     """
     heights = np.concatenate([np.linspace(0, DISK, 5), DISK + np.linspace(0, BLADE, up + 1)[1:]])
-    grid = skfem.MeshHex.init_tensor(
-        np.linspace(0, WIDTH, 4), np.linspace(0, DEPTH, along), heights
-    )
+    grid = skfem.MeshHex.init_tensor(np.linspace(0, WIDTH, 4), np.linspace(0, DEPTH, along), heights)
     basis = skfem.Basis(grid, skfem.ElementVector(skfem.ElementHex1()))
     steel = Material()
     first, second = steel.lame
 
     @skfem.BilinearForm
     def stiffness(u, v, _):
-        return first * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * second * ddot(
-            sym_grad(u), sym_grad(v)
-        )
+        return first * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * second * ddot(sym_grad(u), sym_grad(v))
 
     @skfem.BilinearForm
     def mass(u, v, _):
         return steel.density * dot(u, v)
 
     order = basis.nodal_dofs.T.ravel()
-    m, k = (
-        scipy.sparse.csr_array(form.assemble(basis))[order][:, order] for form in (mass, stiffness)
-    )
+    m, k = (scipy.sparse.csr_array(form.assemble(basis))[order][:, order] for form in (mass, stiffness))
     x, y, z = grid.p
     free = np.flatnonzero(np.repeat(z > 1e-9, 3))
     place = np.full(3 * grid.p.shape[1], -1)
@@ -95,14 +89,10 @@ def box(along: int = 10, up: int = 10) -> tuple[Structure, np.ndarray, np.ndarra
 def sector(sectors: int, along: int = 10, up: int = 10) -> CyclicSector:
     """Return the box as one of so many sectors."""
     structure = box(along, up)
-    return CyclicSector(
-        structure, sectors, structure.dof_set("low"), structure.dof_set("high"), axis=None
-    )
+    return CyclicSector(structure, sectors, structure.dof_set("low"), structure.dof_set("high"), axis=None)
 
 
-def rubbing_wheel(
-    sectors: int, engine_order: int, harmonics: int, along: int = 10, up: int = 10
-) -> Rubbing:
+def rubbing_wheel(sectors: int, engine_order: int, harmonics: int, along: int = 10, up: int = 10) -> Rubbing:
     """Return the tuned wheel under an engine order."""
     one = sector(sectors, along, up)
     s = one.structure
@@ -140,18 +130,10 @@ def _nodes(side: LinearSide) -> np.ndarray:
 def _frames(dofs: np.ndarray, n: int) -> scipy.sparse.csr_array:
     """Return the operator (3 p, n) to the displacements of nodes along t = y, w = z, n = x."""
     order = dofs.reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    return scipy.sparse.csr_array(
-        (np.ones(order.size), (np.arange(order.size), order)), shape=(order.size, n)
-    )
+    return scipy.sparse.csr_array((np.ones(order.size), (np.arange(order.size), order)), shape=(order.size, n))
 
 
-def _loaded(
-    side: LinearSide,
-    operator: np.ndarray,
-    force: np.ndarray,
-    outputs: np.ndarray,
-    points: int,
-) -> Rubbing:
+def _loaded(side: LinearSide, operator: np.ndarray, force: np.ndarray, outputs: np.ndarray, points: int) -> Rubbing:
     """Return the system with its contacts, under the pressure and `FORCE` times its sum at `force`; `points` are those of an interface."""
     area = DEPTH * BLADE / points
     interfaces = operator.shape[0] // 3 // points
@@ -162,12 +144,10 @@ def _loaded(
             k_t=TANGENTIAL * area, k_w=TANGENTIAL * area, k_n=NORMAL * area, mu=FRICTION, preload=PRESSURE * area * r
         )
         for r in rough
-    )  # fmt: skip
+    )
     names = tuple(str(i) for i in range(rough.size))
     interface = Interface(names, laws, scipy.sparse.csr_array(operator))
     clamping = interface.gap_operator.T @ interface.resting_force()
     system = System(side, interface, outputs)
     preload = PRESSURE * area * one.sum()
-    return Rubbing(
-        system, HarmonicLoad(clamping, {1: FORCE * preload * np.asarray(force, dtype=complex)})
-    )
+    return Rubbing(system, HarmonicLoad(clamping, {1: FORCE * preload * np.asarray(force, dtype=complex)}))

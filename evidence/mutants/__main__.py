@@ -28,9 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--n", type=int, default=40, help="how many mutants")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--only", nargs="*", default=(), help="beginnings of paths in src/stickslip"
-    )
+    parser.add_argument("--only", nargs="*", default=(), help="beginnings of paths in src/stickslip")
     parser.add_argument("--cache", type=Path, default=HERE / "out", help="what is recorded")
     parser.add_argument("--budget", type=float, default=BUDGET_S, help="CPU of a mutant's tests, s")
     parser.add_argument("--workers", type=int, default=1, help="processes that record")
@@ -82,12 +80,8 @@ def told(one: Judged, source: str) -> str:
     new = m.applied(source)
     parts = difflib.unified_diff(source.splitlines(), new.splitlines(), n=2, lineterm="")
     lines += [f"    {text}" for text in list(parts)[2:]]
-    said = (
-        f"{one.ran} of {one.reach} tests that reach it ran" if one.reach else "no test reaches it"
-    )
-    lines.append(
-        f"    Does anybody see it, or is it equivalent? {m.where or 'the module'}: {m.about} ({said})"
-    )
+    said = f"{one.ran} of {one.reach} tests that reach it ran" if one.reach else "no test reaches it"
+    lines.append(f"    Does anybody see it, or is it equivalent? {m.where or 'the module'}: {m.about} ({said})")
     lines.append(f"    {key(m)}")
     return "\n".join(lines)
 
@@ -108,10 +102,7 @@ def equivalent() -> frozenset[str]:
 def summary(found: Sequence[Judged]) -> int:
     """Print how many were noticed, and return 0 if they are enough."""
     counted = [one for one in found if one.by or key(one.mutant) not in equivalent()]
-    for what, own in (
-        ("all", counted),
-        ("core numerics", [o for o in counted if o.mutant.core]),
-    ):
+    for what, own in (("all", counted), ("core numerics", [o for o in counted if o.mutant.core])):
         noticed = sum(bool(o.by) for o in own)
         if own:
             print(f"{what}: {noticed} of {len(own)} noticed ({100 * noticed / len(own):.0f} %)")

@@ -15,23 +15,27 @@ from evidence.mutants.points import Mutant
 START_S = 60.0  # CPU of a start of Python and pytest, with compiling
 SLOWER = 4.0  # than when it was recorded: a test that takes so many times as long does not end
 WAITING = 15.0  # wall time over CPU on a machine that others use
-OPTIONS = [
-    "-x",
-    "-q",
-    "--tb=no",
-    "-p",
-    "no:cacheprovider",
-    "-p",
-    "no:cov",
-    "-o",
-    "faulthandler_timeout=0",
-]
+OPTIONS = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:cov", "-o", "faulthandler_timeout=0"]
 LEFT_OUT = ("*.git", ".venv*", "__pycache__", "results", "out", "dist", "_build", ".*_cache")
 # loaded once, before any mutant: what no mutant changes
 LOADED = (
-    "numpy", "scipy.sparse.linalg", "scipy.linalg", "scipy.optimize", "scipy.integrate", "scipy.interpolate", "scipy.spatial",
-    "numba", "xarray", "pandas", "pydantic", "h5netcdf", "jinja2", "plotly", "typer", "rich.console",
-)  # fmt: skip
+    "numpy",
+    "scipy.sparse.linalg",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.integrate",
+    "scipy.interpolate",
+    "scipy.spatial",
+    "numba",
+    "xarray",
+    "pandas",
+    "pydantic",
+    "h5netcdf",
+    "jinja2",
+    "plotly",
+    "typer",
+    "rich.console",
+)
 PASSED = 0  # code of pytest
 
 
@@ -65,13 +69,14 @@ class Copy:
         self.package = folder / "src" / "stickslip"
         paths = os.pathsep.join([str(folder / "src"), str(folder)])
         self.server = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("server.py")), *loaded], cwd=folder, text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, str(Path(__file__).with_name("server.py")), *loaded],
+            cwd=folder,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
             env=os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"},
-        )  # fmt: skip
-        self.compiled = {
-            file: (file.read_bytes(), file.stat()) for file in self.package.rglob("*.nb[ic]")
-        }
+        )
+        self.compiled = {file: (file.read_bytes(), file.stat()) for file in self.package.rglob("*.nb[ic]")}
 
     def judge(self, mutant: Mutant, tests: Sequence[str], cpu_s: float, reach: int) -> Judged:
         """Run tests with a mutant in place.
@@ -106,8 +111,13 @@ class Copy:
         listed, said = self.root / ".mutant_tests", self.root / ".mutant_said"
         listed.write_text("\n".join(tests), encoding="utf-8")
         asked = {
-            "tests": str(listed), "said": str(said), "failed": str(self.root / ".mutant_failed"), "options": OPTIONS, "cpu_s": limit, "wall_s": WAITING * limit,
-        }  # fmt: skip
+            "tests": str(listed),
+            "said": str(said),
+            "failed": str(self.root / ".mutant_failed"),
+            "options": OPTIONS,
+            "cpu_s": limit,
+            "wall_s": WAITING * limit,
+        }
         assert self.server.stdin is not None
         assert self.server.stdout is not None
         print(json.dumps(asked), file=self.server.stdin, flush=True)

@@ -10,32 +10,47 @@ from typing import Any
 # what decides a number before anybody words it
 CORE = ("contact", "harmonic", "solve", "reduction", "response", "model/fe")
 COMPARED: Mapping[type[ast.cmpop], tuple[str, ...]] = {
-    ast.Lt: ("<=", ">="), ast.LtE: ("<", ">"), ast.Gt: (">=", "<="), ast.GtE: (">", "<"),
-    ast.Eq: ("!=",), ast.NotEq: ("==",), ast.Is: ("is not",), ast.IsNot: ("is",),
-    ast.In: ("not in",), ast.NotIn: ("in",),
-}  # fmt: skip
+    ast.Lt: ("<=", ">="),
+    ast.LtE: ("<", ">"),
+    ast.Gt: (">=", "<="),
+    ast.GtE: (">", "<"),
+    ast.Eq: ("!=",),
+    ast.NotEq: ("==",),
+    ast.Is: ("is not",),
+    ast.IsNot: ("is",),
+    ast.In: ("not in",),
+    ast.NotIn: ("in",),
+}
 OTHER: Mapping[type[ast.operator], str] = {
-    ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*", ast.Pow: "*",
-    ast.BitAnd: "|", ast.BitOr: "&",
-}  # fmt: skip
+    ast.Add: "-",
+    ast.Sub: "+",
+    ast.Mult: "/",
+    ast.Div: "*",
+    ast.FloorDiv: "*",
+    ast.Mod: "*",
+    ast.Pow: "*",
+    ast.BitAnd: "|",
+    ast.BitOr: "&",
+}
 SWAPPED = {
-    "min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any",
-    "sin": "cos", "cos": "sin", "floor": "ceil", "ceil": "floor", "argmin": "argmax", "argmax": "argmin",
-    "nanmin": "nanmax", "nanmax": "nanmin",
-}  # fmt: skip
+    "min": "max",
+    "max": "min",
+    "minimum": "maximum",
+    "maximum": "minimum",
+    "any": "all",
+    "all": "any",
+    "sin": "cos",
+    "cos": "sin",
+    "floor": "ceil",
+    "ceil": "floor",
+    "argmin": "argmax",
+    "argmax": "argmin",
+    "nanmin": "nanmax",
+    "nanmax": "nanmin",
+}
 
 # whose arguments may stand in any order: a swap changes nothing
-SYMMETRIC = {
-    "min",
-    "max",
-    "minimum",
-    "maximum",
-    "gcd",
-    "lcm",
-    "hypot",
-    "union1d",
-    "intersect1d",
-}
+SYMMETRIC = {"min", "max", "minimum", "maximum", "gcd", "lcm", "hypot", "union1d", "intersect1d"}
 
 
 @dataclass(frozen=True)
@@ -110,10 +125,7 @@ class _Finder:
     def span(self, node: ast.expr) -> tuple[int, int]:
         assert node.end_lineno is not None
         assert node.end_col_offset is not None
-        return (
-            self.at(node.lineno, node.col_offset),
-            self.at(node.end_lineno, node.end_col_offset),
-        )
+        return (self.at(node.lineno, node.col_offset), self.at(node.end_lineno, node.end_col_offset))
 
     def text(self, node: ast.expr) -> str:
         start, end = self.span(node)
@@ -124,7 +136,7 @@ class _Finder:
         before = self.source[start:end]
         mutant = Mutant(
             self.path, node.lineno, place.statement, start, end, before, after, kind, place.where, place.about
-        )  # fmt: skip
+        )
         self.found.append(mutant)
 
     def walk(self, node: ast.AST, place: _Place) -> None:
@@ -203,8 +215,7 @@ def _negated(conditions: Sequence[ast.expr], text: Any) -> Iterator[tuple[str, s
 def _of_operator(node: ast.BinOp, text: Any) -> Iterator[tuple[str, str, ast.expr]]:
     left, right = text(node.left), text(node.right)
     of_text = any(
-        isinstance(side, ast.JoinedStr)
-        or (isinstance(side, ast.Constant) and isinstance(side.value, str))
+        isinstance(side, ast.JoinedStr) or (isinstance(side, ast.Constant) and isinstance(side.value, str))
         for side in (node.left, node.right)
     )
     other = OTHER.get(type(node.op))
@@ -260,9 +271,12 @@ def _of_numbers(node: ast.AST) -> Iterator[tuple[str, str, ast.expr]]:
 def _numbers(node: ast.AST) -> Sequence[ast.AST | None]:
     """Return where a node may hold a number that counts."""
     of: Mapping[type[ast.AST], Sequence[str]] = {
-        ast.BinOp: ("left", "right"), ast.Slice: ("lower", "upper"), ast.IfExp: ("body", "orelse"), ast.Return: ("value",),
+        ast.BinOp: ("left", "right"),
+        ast.Slice: ("lower", "upper"),
+        ast.IfExp: ("body", "orelse"),
+        ast.Return: ("value",),
         ast.keyword: ("value",),
-    }  # fmt: skip
+    }
     if isinstance(node, ast.Compare):
         return [node.left, *node.comparators]
     if isinstance(node, ast.Subscript):
@@ -304,8 +318,7 @@ def is_another(mutant: Mutant, source: str) -> bool:
 def sources_of(package: Path) -> dict[str, str]:
     """Return the text of each Python file of a package by its path below the package's folder."""
     return {
-        file.relative_to(package).as_posix(): file.read_text(encoding="utf-8")
-        for file in sorted(package.rglob("*.py"))
+        file.relative_to(package).as_posix(): file.read_text(encoding="utf-8") for file in sorted(package.rglob("*.py"))
     }
 
 

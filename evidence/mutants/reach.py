@@ -52,9 +52,10 @@ def record(root: Path, cache: Path, workers: int = 1) -> None:
     cache.mkdir(parents=True, exist_ok=True)
     known = {(file, sum_) for piece in _pieces(cache) for file, sum_ in piece["files"].items()}
     to_do = [
-        file for file in sorted((root / "tests").glob("test_*.py"))
+        file
+        for file in sorted((root / "tests").glob("test_*.py"))
         if (f"tests/{file.name}", _digest(file)) not in known
-    ]  # fmt: skip
+    ]
     pieces = [to_do[start : start + PIECE] for start in range(0, len(to_do), PIECE)]
     with ThreadPoolExecutor(workers) as pool:
         for done in pool.map(lambda files: _record(root, cache, files), pieces):
@@ -67,21 +68,39 @@ def _record(root: Path, cache: Path, files: Sequence[Path]) -> list[str]:
     where = cache / f"piece_{_sum(repr(sums).encode())[:12]}"
     _run(root, where, list(sums))
     shutil.copytree(
-        root / "src" / "stickslip", where.with_suffix(".src"),
-        ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True,
-    )  # fmt: skip
+        root / "src" / "stickslip",
+        where.with_suffix(".src"),
+        ignore=shutil.ignore_patterns("__pycache__"),
+        dirs_exist_ok=True,
+    )
     said = json.loads(where.with_suffix(".json").read_text(encoding="utf-8"))
     where.with_suffix(".json").write_text(json.dumps(said | {"files": sums}), encoding="utf-8")
     return list(sums)
 
 
 def _run(root: Path, where: Path, files: Sequence[str]) -> None:
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "evidence.mutants.recorder"]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:cov",
+        "-p",
+        "evidence.mutants.recorder",
+    ]
     paths = os.pathsep.join([str(root / "src"), str(root)])
     done = subprocess.run(
-        [*command, *files], cwd=root, check=False, capture_output=True, text=True, timeout=PER_PIECE_S,
+        [*command, *files],
+        cwd=root,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=PER_PIECE_S,
         env=os.environ | {"PYTHONPATH": paths, WHERE: str(where)},
-    )  # fmt: skip
+    )
     if not where.with_suffix(".json").exists():
         raise RuntimeError(f"pytest recorded nothing of {', '.join(files)}: {done.stdout[-2000:]}")
 
@@ -129,7 +148,7 @@ class _Reader(ast.NodeVisitor):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         outer = self.inside
-        compiled = any("njit" in ast.unparse(d) or "cfunc" in ast.unparse(d) for d in node.decorator_list)  # fmt: skip
+        compiled = any("njit" in ast.unparse(d) or "cfunc" in ast.unparse(d) for d in node.decorator_list)
         if outer is None or compiled:
             self.inside = (self.path, node.name, compiled)
         if compiled:
@@ -204,9 +223,11 @@ class Reach:
     def cpu_s(self) -> dict[str, float]:
         """CPU of each test, s."""
         return {
-            t: s for piece in self.pieces for t, s in piece["cpu_s"].items()
+            t: s
+            for piece in self.pieces
+            for t, s in piece["cpu_s"].items()
             if self._valid.get(t.partition("::")[0]) == piece["data"]
-        }  # fmt: skip
+        }
 
     @cached_property
     def failed(self) -> set[str]:
@@ -228,9 +249,8 @@ class Reach:
         """For each test file the last piece that holds it as it is now."""
         now = {file: _sum(text.encode()) for file, text in self.tests_as_they_are.items()}
         return {
-            file: piece["data"] for piece in self.pieces for file, own in piece["files"].items()
-            if now.get(file) == own
-        }  # fmt: skip
+            file: piece["data"] for piece in self.pieces for file, own in piece["files"].items() if now.get(file) == own
+        }
 
     def lines(self, path: str) -> dict[int, set[str]]:
         """Return the tests that reach each line of a file as it is now."""
@@ -264,13 +284,14 @@ class Reach:
         return self._recorded(mutant) | self._unrecorded(mutant)
 
     def _unrecorded(self, mutant: Mutant) -> set[str]:
-        module = "stickslip." + mutant.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")  # fmt: skip
-        named = {name for name in mutant.where.split(".") if len(name) >= NAMED and not name.startswith("_")}  # fmt: skip
+        module = "stickslip." + mutant.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        named = {name for name in mutant.where.split(".") if len(name) >= NAMED and not name.startswith("_")}
         words = [re.escape(module), *map(re.escape, named)]
         return {
-            file for file, text in self.tests_as_they_are.items()
+            file
+            for file, text in self.tests_as_they_are.items()
             if file not in self._valid and re.search(rf"\b({'|'.join(words)})\b", text)
-        }  # fmt: skip
+        }
 
     def _recorded(self, mutant: Mutant) -> set[str]:
         path = mutant.path

@@ -23,9 +23,7 @@ class Recorder:
 
     def __init__(self, where: str) -> None:
         self.where = where
-        self.coverage = coverage.Coverage(
-            data_file=where, source_pkgs=["stickslip"], config_file=False
-        )
+        self.coverage = coverage.Coverage(data_file=where, source_pkgs=["stickslip"], config_file=False)
         self.file = ""
         self.cpu: dict[str, float] = {}
         self.failed: list[str] = []

@@ -18,7 +18,7 @@ DOCS = HERE.parents[1] / "docs"
 def main() -> None:
     """Judge every candidate cheaply and the best of them in full; what a folder holds already is not computed again."""
     parser = argparse.ArgumentParser(prog="python -m evidence.reconstruction", description=__doc__)
-    parser.add_argument("--folder", type=Path, default=HERE / "out", help="for the results, one line a candidate")  # fmt: skip
+    parser.add_argument("--folder", type=Path, default=HERE / "out", help="for the results, one line a candidate")
     parser.add_argument("--best", type=int, default=24, help="how many are judged in full")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)

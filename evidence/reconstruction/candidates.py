@@ -18,13 +18,7 @@ FRICTION = math.atan(0.6)  # angle of friction
 DAMPING = (0.003, 0.005, 0.0075, 0.0125)
 FORCE_SPAN = (0.0, -0.04, -0.08)  # hub, and down the shank
 FLAT = ((0.002, 0.029), (0.004, 0.027))  # m
-CURVED = (
-    0.0045,
-    0.0055,
-    0.0065,
-    0.009,
-    0.0105,
-)  # m; the largest with which the damper rests is taken
+CURVED = (0.0045, 0.0055, 0.0065, 0.009, 0.0105)  # m; the largest with which the damper rests is taken
 CURVED_ANGLE = (45.0, 50.0, 55.0, 60.0)  # degrees
 SLACK = 1e-4  # m
 RETENTION = 1e4  # N/m
@@ -61,9 +55,7 @@ class Candidate:
     def body(self) -> tuple[float, tuple[float, float, float], tuple[float, float]]:
         """Mass (kg), moments of inertia (kg m^2) and centre of mass from the apex (x and z, m) of the damper as a prism."""
         damper = FlatCurvedDamper(
-            flat_distances=self.flat,
-            curved_distance=self.curved,
-            curved_angle=math.radians(self.curved_angle),
+            flat_distances=self.flat, curved_distance=self.curved, curved_angle=math.radians(self.curved_angle)
         )
         area, centre, second = section_moments(damper.outline() - damper.apex)
         mass = self.density * area * LENGTH
@@ -119,10 +111,7 @@ class Candidate:
 OLD = Candidate(0.003, 0.0, (0.002, 0.029), 0.0045, 45.0)  # shipped until November 2026
 CHOSEN = Candidate(0.0075, 0.0, (0.002, 0.029), 0.0105, 60.0, TITANIUM)  # the example's
 # what becomes of dampers that do not rest on both lines
-LIFTING = (
-    Candidate(0.0075, 0.0, (0.002, 0.029), 0.0115, 45.0),
-    Candidate(0.0075, 0.0, (0.004, 0.022), 0.0085, 50.0),
-)
+LIFTING = (Candidate(0.0075, 0.0, (0.002, 0.029), 0.0115, 45.0), Candidate(0.0075, 0.0, (0.004, 0.022), 0.0085, 50.0))
 
 
 def candidates() -> Iterator[Candidate]:

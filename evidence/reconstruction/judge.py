@@ -89,12 +89,8 @@ def cheap(blades: TwoBlades) -> dict[str, Any]:
 
 def costly(blades: TwoBlades) -> dict[str, Any]:
     """Return what five and eleven harmonics and the motion in time say."""
-    few, five, eleven = (
-        {r: passage(blades, r, order) for r in JUDGED} for order in (1, FIVE, ELEVEN)
-    )
-    pairs = np.concatenate(
-        [np.column_stack([predicted(few[r]), actual(few[r], five[r])]) for r in JUDGED]
-    )
+    few, five, eleven = ({r: passage(blades, r, order) for r in JUDGED} for order in (1, FIVE, ELEVEN))
+    pairs = np.concatenate([np.column_stack([predicted(few[r]), actual(few[r], five[r])]) for r in JUDGED])
     pairs = pairs[np.isfinite(pairs).all(axis=1)]
     band = pairs[(pairs[:, 0] >= SMALL) & (pairs[:, 0] <= ALARM)]
     times = {r: in_time(blades, five[r]) for r in JUDGED}

@@ -59,9 +59,13 @@ def passage(blades: TwoBlades, ratio: float, order: int) -> Passage:
     sweep = replace(
         blades.sweep,
         omega_range=(HZ * HERTZ[0], HZ * HERTZ[1]),
-        low=1, high=FIVE if few else order, samples=256, frequencies=FREQUENCIES, peak_points=0,
+        low=1,
+        high=FIVE if few else order,
+        samples=256,
+        frequencies=FREQUENCIES,
+        peak_points=0,
         selection="always_low" if few else "always_high",
-    )  # fmt: skip
+    )
     solved = forced_response(blades.system, load, sweep)
     points = {round(p.omega / HZ, 6): p for p in solved if p.converged}
     return Passage(forced_problem(blades.system, load, sweep), points)
@@ -73,9 +77,7 @@ def predicted(few: Passage) -> FloatArray:
     measure = ErrorMeasure(problem.measure.dofs, (1,))
     return np.array(
         [
-            jacobian_alert(
-                problem.low, problem.high, problem.low.unknowns(p.coefficients), p.omega, measure
-            ).error
+            jacobian_alert(problem.low, problem.high, problem.low.unknowns(p.coefficients), p.omega, measure).error
             for p in few.points.values()
         ]
     )
@@ -89,9 +91,7 @@ def actual(few: Passage, many: Passage) -> FloatArray:
 def _actual(few: Passage, many: Passage, hertz: float) -> float:
     outputs = few.problem.measure.dofs
     first, other = (
-        p.problem.low.linear.recover(p.points[hertz].omega, p.points[hertz].coefficients)[
-            1, outputs
-        ]
+        p.problem.low.linear.recover(p.points[hertz].omega, p.points[hertz].coefficients)[1, outputs]
         for p in (few, many)
     )
     return float(np.max(np.abs(first - other) / np.abs(first)))
@@ -99,19 +99,14 @@ def _actual(few: Passage, many: Passage, hertz: float) -> float:
 
 def moves(found: Passage) -> FloatArray:
     """Return for every frequency whether a contact slips or opens."""
-    return np.array(
-        [bool(np.any(signals(found.problem, p).state != 0)) for p in found.points.values()]
-    )
+    return np.array([bool(np.any(signals(found.problem, p).state != 0)) for p in found.points.values()])
 
 
 def at_peak(blades: TwoBlades, found: Passage) -> list[tuple[float, float]]:
     """Return for L1, L2 and R the shares of points and instants that slip and that are open at the peak."""
     state = signals(found.problem, found.points[found.peak]).state
     own = [state[_of_line(blades, line)] for line in LINES]
-    return [
-        (float(np.any(s == SLIP, axis=1).mean()), float(np.any(s == OPEN, axis=1).mean()))
-        for s in own
-    ]
+    return [(float(np.any(s == SLIP, axis=1).mean()), float(np.any(s == OPEN, axis=1).mean())) for s in own]
 
 
 def in_time(blades: TwoBlades, found: Passage) -> tuple[str, float]:

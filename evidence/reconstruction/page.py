@@ -77,19 +77,19 @@ def _counts(rows: Sequence[Row], both: Sequence[Row]) -> list[str]:
     lines = ["| statement | shown by |", "|---|---|"]
     for name, word in WORDS.items():
         among = both if word.costly else rows
-        lines.append(f"| {word.text} | {sum(r['words'].get(name, False) for r in among)} of {len(among)} |")  # fmt: skip
+        lines.append(f"| {word.text} | {sum(r['words'].get(name, False) for r in among)} of {len(among)} |")
     notes = (
         f"\nDefinitions. L1 and L2 carry load if the smaller force is at least {LEAST:g} of the larger. A line stays shut if it is open for at most {100 * SHUT:g} % of the time at the peak. Alarms are predicted errors above {100 * ALARM:g} %. "
         "One harmonic is compared with eleven.\n"
     )
     nowhere = [WORDS[n].text for n in WORDS if not any(r["words"].get(n, False) for r in both)]
     every = max(sum(r["words"].values()) for r in both)
-    none = f"No choice that was judged in full shows: {'; '.join(nowhere)}. " if nowhere else "Each statement is shown by one of them at least. "  # fmt: skip
-    return [
-        *lines,
-        notes,
-        none + f"No choice shows more than {every} of the {len(WORDS)} together.\n",
-    ]
+    none = (
+        f"No choice that was judged in full shows: {'; '.join(nowhere)}. "
+        if nowhere
+        else "Each statement is shown by one of them at least. "
+    )
+    return [*lines, notes, none + f"No choice shows more than {every} of the {len(WORDS)} together.\n"]
 
 
 def _table(both: Sequence[Row]) -> list[str]:
@@ -120,8 +120,7 @@ def _table(both: Sequence[Row]) -> list[str]:
 
 def _example(chosen: Row, both: Sequence[Row]) -> list[str]:
     keys = ", ".join(
-        f"`{key} = {list(value) if isinstance(value, tuple) else value}`"
-        for key, value in CHOSEN.keys.items()
+        f"`{key} = {list(value) if isinstance(value, tuple) else value}`" for key, value in CHOSEN.keys.items()
     )
     own, most = (sum(r["words"].values()) for r in (chosen, both[0]))
     place = next(i for i, row in enumerate(both) if row is chosen) + 1

@@ -56,9 +56,6 @@ def reduction_error(candidate: Candidate) -> float:
     known = two_blades(COARSER, SHIPPED, **candidate.values).question.model.frequencies
     errors = [
         np.abs(reduced / full - 1)[: np.sum(full < 700.0)].max()
-        for full, reduced in (
-            (known.free_full, known.free_reduced),
-            (known.stuck_full, known.stuck_reduced),
-        )
+        for full, reduced in ((known.free_full, known.free_reduced), (known.stuck_full, known.stuck_reduced))
     ]
     return float(max(errors))

@@ -23,9 +23,15 @@ from stickslip.study.models.study import read_study
 
 SHOWN = 12  # rows of the table
 HEAD = (
-    "damper", "normal forces", *(f"R slips at {r:g}" for r in JUDGED), *(f"peak at {r:g}" for r in JUDGED), "1 to 5 harmonics", "alert",
-    f"at {LOWEST:g}", "not shown",
-)  # fmt: skip
+    "damper",
+    "normal forces",
+    *(f"R slips at {r:g}" for r in JUDGED),
+    *(f"peak at {r:g}" for r in JUDGED),
+    "1 to 5 harmonics",
+    "alert",
+    f"at {LOWEST:g}",
+    "not shown",
+)
 
 
 def _row(found: Found) -> list[str]:
@@ -37,10 +43,7 @@ def _row(found: Found) -> list[str]:
         named(found.candidate),
         "/".join(f"{v:.0f}" for v in found.static) + " N",
         *(f"{100 * found.few[r].slips[2]:.0f} %" for r in JUDGED),
-        *(
-            f"{100 * found.of_stuck(r):.1f} % ({(found.many or found.few)[r].hertz:.1f} Hz)"
-            for r in JUDGED
-        ),
+        *(f"{100 * found.of_stuck(r):.1f} % ({(found.many or found.few)[r].hertz:.1f} Hz)" for r in JUDGED),
         asunder,
         "/".join(f"{100 * found.alarms[r]:.1f} %" for r in PUBLISHED) if found.alarms else "–",
         lowest,
@@ -54,11 +57,7 @@ def _table(rows: Sequence[Found]) -> list[str]:
 
 
 def page(
-    first: Sequence[Found],
-    second: Sequence[Found],
-    none: int,
-    meshes: Sequence[Refined],
-    reduction: float,
+    first: Sequence[Found], second: Sequence[Found], none: int, meshes: Sequence[Refined], reduction: float
 ) -> str:
     """Return the page of the documentation.
 
@@ -73,13 +72,9 @@ def page(
     """
     whole = [f for f in first if f.score == ASKED]
     best = first[0]
-    counts = [
-        f"- {name}: {sum(f.holds()[name] for f in first)} of {len(first)}" for name in best.holds()
-    ]
+    counts = [f"- {name}: {sum(f.holds()[name] for f in first)} of {len(first)}" for name in best.holds()]
     keys = [
-        f"`{k} = {_toml(v)}`"
-        for k, v in best.candidate.values.items()
-        if k.startswith("part.") or k.endswith("share")
+        f"`{k} = {_toml(v)}`" for k, v in best.candidate.values.items() if k.startswith("part.") or k.endswith("share")
     ]
     closest = max((f for f in (*first, *second) if f.score == ASKED), key=_near, default=best)
     damping = 100 * float(read_study(SHIPPED).file.raw["damping"]["ratio"])
@@ -124,10 +119,7 @@ def page(
 
 
 def _meshes(meshes: Sequence[Refined]) -> str:
-    told = [
-        f"{m.hertz:.1f} Hz with {m.dofs} dofs (elements {m.factor:g} times those of the example)"
-        for m in meshes
-    ]
+    told = [f"{m.hertz:.1f} Hz with {m.dofs} dofs (elements {m.factor:g} times those of the example)" for m in meshes]
     last = abs(meshes[-1].hertz / meshes[-2].hertz - 1)
     return f"{', '.join(told)}; the last refinement changes it by {100 * last:.2f} %"
 

@@ -36,11 +36,7 @@ CLOSED = 0.95  # share of the time that they must be closed
 ALIKE = 0.05  # difference of peaks with one and with five harmonics
 FLAT_ANGLES, CURVED_ANGLES = (38.0, 44.0, 50.0, 56.0), (66.0, 72.0, 78.0)
 DISTANCES = (0.002, 0.025), (0.005, 0.02)
-OTHERS = (
-    {"damping.ratio": 0.003},
-    {"damping.ratio": 0.012},
-    {"part.blades.force_span": 0.4},
-)
+OTHERS = ({"damping.ratio": 0.003}, {"damping.ratio": 0.012}, {"part.blades.force_span": 0.4})
 FILLINGS = (0.5, 1.5)
 SHARES = None, 0.1  # of the friction that holds while the damper seats itself; None: no seating
 ASKED = 7  # what is asked of a damper
@@ -90,7 +86,7 @@ class Candidate:
         f, c = math.radians(self.flat_deg), math.radians(self.curved_deg)
         return FlatCurvedDamper(
             apex=(0.0, 0.0), flat_angle=f, curved_angle=c, flat_distances=self.flat, curved_distance=right
-        )  # fmt: skip
+        )
 
     @property
     def values(self) -> dict[str, Any]:
@@ -110,9 +106,7 @@ class Candidate:
             "forced_response.frequency_hz": RANGE,
             "forced_response.points": 24,
         }
-        seated = (
-            {"forced_response.static_friction_share": self.share} if self.share is not None else {}
-        )
+        seated = {"forced_response.static_friction_share": self.share} if self.share is not None else {}
         return own | seated | dict(self.more)
 
 
@@ -260,8 +254,7 @@ def at_peak(blades: TwoBlades, ratio: float, selection: str) -> AtPeak:
 def first_stage() -> list[Candidate]:
     """Return dampers of all angles and lines, each seated and not."""
     return [
-        Candidate(f, c, flat, share)
-        for f, c, flat, share in product(FLAT_ANGLES, CURVED_ANGLES, DISTANCES, SHARES)
+        Candidate(f, c, flat, share) for f, c, flat, share in product(FLAT_ANGLES, CURVED_ANGLES, DISTANCES, SHARES)
     ]
 
 

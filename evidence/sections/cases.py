@@ -20,22 +20,11 @@ from stickslip.response.forced.response import forced_response
 SECTIONS = (1, 2, 3, 5, 7, 9, 11, 15)
 MOST = SECTIONS[-1]
 EXAMPLE = 3  # sections, as in the paper
-FEWER = (
-    1,
-    3,
-    7,
-    15,
-)  # sections that are solved with harmonics by need, too, and with stiffness per point
+FEWER = (1, 3, 7, 15)  # sections that are solved with harmonics by need, too, and with stiffness per point
 LINES = (2, 3, 5, 9)  # of the flat side, in the middles of equal strips
 UNEVEN = 7  # sections that crowd at one end
-OFF = (
-    1 / 6
-)  # of the length: how far from the middle the pull acts; there the pressure at the other end would vanish
-SWEPT = {
-    "bending": (0.95, 1.02),
-    "leaning": (0.9, 1.02),
-    "lines": (0.9, 1.02),
-}  # over the lowest stuck frequency
+OFF = 1 / 6  # of the length: how far from the middle the pull acts; there the pressure at the other end would vanish
+SWEPT = {"bending": (0.95, 1.02), "leaning": (0.9, 1.02), "lines": (0.9, 1.02)}  # over the lowest stuck frequency
 TORSION = (1350.0, 1600.0)  # Hz
 POINTS, PEAK_POINTS = 24, 20  # of a sweep
 ORDERS, FITS = (0.1, 6.0), 0.2  # of convergence that are looked for; misfit that is let pass
@@ -125,9 +114,7 @@ def peak(blades: TwoBlades, case: Case, ratio: float, kept: Kept, count: int) ->
     low, high = case.hertz(blades)
     five: dict[str, Any] = {"low": 5, "high": 5, "selection": "always_high"}
     how = five if kept == "5" else {"high": "auto"}
-    sweep = replace(
-        blades.sweep, omega_range=(HZ * low, HZ * high), points=POINTS, peak_points=PEAK_POINTS, **how
-    )  # fmt: skip
+    sweep = replace(blades.sweep, omega_range=(HZ * low, HZ * high), points=POINTS, peak_points=PEAK_POINTS, **how)
     load, begun = blades.load(ratio), process_time()
     solved = list(forced_response(blades.system, load, sweep))
     seconds = process_time() - begun
@@ -259,9 +246,8 @@ def solve(say: Say) -> Found:
 
     at = partial(peak, case=bending, kept="5")
     per_point = tuple(
-        told(f"per point, {n}", at(blades_with(patch.sections(n), per="point"), ratio=strong, count=n))
-        for n in FEWER
-    )  # fmt: skip
+        told(f"per point, {n}", at(blades_with(patch.sections(n), per="point"), ratio=strong, count=n)) for n in FEWER
+    )
     sections = patch.sections(EXAMPLE)
     more = [(n, blades_with(sections, patch.lines(n))) for n in LINES]
     lines = tuple(
@@ -269,9 +255,7 @@ def solve(say: Say) -> Found:
             MORE_LINES,
             ratio,
             "5",
-            tuple(
-                told(f"{n} lines", peak(blades, MORE_LINES, ratio, "5", n)) for n, blades in more
-            ),
+            tuple(told(f"{n} lines", peak(blades, MORE_LINES, ratio, "5", n)) for n, blades in more),
         )
         for ratio in MORE_LINES.ratios
     )
@@ -279,19 +263,13 @@ def solve(say: Say) -> Found:
     ways = [blades_with(crowded, per=per) for per in ("area", "interface")]
     uneven = [told("crowded", peak(way, MORE_LINES, strong, "5", UNEVEN)) for way in ways]
     return Found(
-        tuple(series),
-        Series(bending, strong, "5", per_point),
-        lines,
-        (uneven[0], uneven[1]),
-        resultant(ways[0]),
+        tuple(series), Series(bending, strong, "5", per_point), lines, (uneven[0], uneven[1]), resultant(ways[0])
     )
 
 
 def _of_case(case: Case, say: Say) -> Iterator[Series]:
     """Solve a motion with all numbers of sections."""
-    peaks: dict[tuple[float, Kept], list[Peak]] = {
-        (r, k): [] for r in case.ratios for k in case.kept
-    }
+    peaks: dict[tuple[float, Kept], list[Peak]] = {(r, k): [] for r in case.ratios for k in case.kept}
     for count in SECTIONS:
         blades = blades_with(example()[1].sections(count), **case.changed)
         for (ratio, kept), own in peaks.items():

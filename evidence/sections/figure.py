@@ -50,12 +50,7 @@ def _curves(axes: Axes, series: Series) -> None:
     for count, shade in zip(SHOWN, SHADES, strict=True):
         one = series.of(count)
         axes.plot(
-            one.curve[0],
-            1e6 * one.curve[1],
-            color=shade,
-            lw=1.3,
-            ls="--" if count == MOST else "-",
-            label=f"{count}",
+            one.curve[0], 1e6 * one.curve[1], color=shade, lw=1.3, ls="--" if count == MOST else "-", label=f"{count}"
         )
     axes.set(xlabel="frequency, Hz", ylabel="amplitude, µm")
     axes.set_title(f"{series.case.title}, ratio {series.ratio:g}", fontsize=9)

@@ -4,24 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from evidence.sections.cases import (
-    EXAMPLE,
-    LINES,
-    MOST,
-    SECTIONS,
-    UNEVEN,
-    Found,
-    Peak,
-    Series,
-)
+from evidence.sections.cases import EXAMPLE, LINES, MOST, SECTIONS, UNEVEN, Found, Peak, Series
 from evidence.sections.model import example, points_of_example
 
 NUMBERS = Path(__file__).parents[2] / "docs" / "contact_points_numbers.md"
 FEW = EXAMPLE
-HEIGHT, PLACE = (
-    0.01,
-    0.001,
-)  # of amplitude and of frequency, from which on a change is called significant
+HEIGHT, PLACE = (0.01, 0.001)  # of amplitude and of frequency, from which on a change is called significant
 
 
 def write(found: Found, path: Path = NUMBERS) -> None:
@@ -80,9 +68,7 @@ def _table(found: Found) -> str:
 
 def _lost(found: Found) -> str:
     """Say how many points of the sweeps were not found."""
-    lost = [
-        f"{p.lost} with {p.count} ({_heading(s)})" for s in found.series for p in s.peaks if p.lost
-    ]
+    lost = [f"{p.lost} with {p.count} ({_heading(s)})" for s in found.series for p in s.peaks if p.lost]
     return f"Points of the sweeps without a solution: {'; '.join(lost) or 'none'}."
 
 
@@ -124,9 +110,7 @@ def _said(found: Found) -> list[str]:
     offs = [s.off(FEW) for s in bending]
     height, place = (max(abs(off[i]) for off in offs) for i in (0, 1))
     changed = [s for s, off in zip(bending, offs, strict=True) if significant(off)]
-    verdict = (
-        "holds in all of them" if not changed else f"does not hold at {'; '.join(_heading(s) for s in changed)}"
-    )  # fmt: skip
+    verdict = "holds in all of them" if not changed else f"does not hold at {'; '.join(_heading(s) for s in changed)}"
     limits = f"{100 * HEIGHT:g} % of the amplitude or {100 * PLACE:g} % of the frequency"
     first = (
         f"**Bending.** Between {FEW} and {MOST} sections the peak changes by at most {100 * height:.2g} % in amplitude and {100 * place:.2g} % in frequency, over both "
@@ -151,7 +135,7 @@ def _of_lines(found: Found) -> str:
     rows = [["lines of the flat side", *(f"ratio {s.ratio:g}" for s in found.lines)]]
     rows.append(["---:"] * len(rows[0]))
     for count in LINES:
-        cells = [pair(s.off(count)) if count < LINES[-1] else _whole(s.of(count)) for s in found.lines]  # fmt: skip
+        cells = [pair(s.off(count)) if count < LINES[-1] else _whole(s.of(count)) for s in found.lines]
         rows.append([str(count), *cells])
     own = [against(found.get("bending", s.ratio).of(FEW), s.peaks[-1]) for s in found.lines]
     rows.append(["the example's 2", *own])

@@ -36,9 +36,7 @@ def main() -> None:
         except ModuleNotFoundError as error:
             if error.name is None or error.name.split(".")[0] != "matplotlib":
                 raise
-            sys.exit(
-                "The comparison needs matplotlib: `make strategies` installs it and runs this."
-            )
+            sys.exit("The comparison needs matplotlib: `make strategies` installs it and runs this.")
         found = compare.run()
         page.write(found)
         figure.draw(found)

@@ -156,9 +156,7 @@ def alarm_table(found: Sequence[Source], names: Sequence[str]) -> list[str]:
 def unjudged_line(found: Sequence[Source], names: Sequence[str]) -> str:
     """Return a sentence on the points without truth."""
     rows = [r for s in found for r in s.rows if not np.isfinite(r.error)]
-    raised = ", ".join(
-        f"`{n}` at {sum(not r.indicators[n] <= THRESHOLD for r in rows)}" for n in names
-    )
+    raised = ", ".join(f"`{n}` at {sum(not r.indicators[n] <= THRESHOLD for r in rows)}" for n in names)
     lost = sum(s.lost for s in found)
     return (
         f"No solution with twice the harmonics of the reference was found at {len(rows)} points, which are in no other count; "

@@ -65,9 +65,7 @@ class SelectionCase:
         return replace(sweep, **changes)
 
 
-def example(
-    name: str, title: str, ratio: float, hertz: tuple[float, float], frequencies: int
-) -> SelectionCase:
+def example(name: str, title: str, ratio: float, hertz: tuple[float, float], frequencies: int) -> SelectionCase:
     """Return the example study on its coarse mesh with F_CL/F_HE = `ratio`."""
     case = two_blades(COARSER)
     return SelectionCase(
@@ -102,9 +100,7 @@ def friction_ring() -> SelectionCase:
     force[TIP] = 1.0
     load = HarmonicLoad(np.zeros(wheel.n), {1: wheel.project(force, 1)})
     title = "blisk of 24 sectors with a friction ring (B9, slip limit 4 N)"
-    return SelectionCase(
-        "friction_ring", title, system, load, (HZ * 620.0, HZ * 628.0), 41, samples=256
-    )
+    return SelectionCase("friction_ring", title, system, load, (HZ * 620.0, HZ * 628.0), 41, samples=256)
 
 
 def chain() -> SelectionCase:

@@ -64,9 +64,7 @@ class Cost:
 def b6(factor: float) -> Iterable[SelectionCase]:
     """Literature benchmark B6 from 150 to 235 Hz with its excitation times a factor."""
     title = f"B6, excitation times {factor:g}"
-    yield SelectionCase(
-        f"b6_{factor:g}", title, *blades_and_damper(excitation=factor), (HZ * 150, HZ * 235), 171
-    )
+    yield SelectionCase(f"b6_{factor:g}", title, *blades_and_damper(excitation=factor), (HZ * 150, HZ * 235), 171)
 
 
 def thinned(case: SelectionCase) -> SelectionCase:
@@ -77,9 +75,7 @@ def thinned(case: SelectionCase) -> SelectionCase:
 
 def sources(systems: int) -> dict[str, Callable[[], Iterable[SelectionCase]]]:
     """Return the groups of cases whose points are counted together."""
-    found: dict[str, Callable[[], Iterable[SelectionCase]]] = {
-        f"b6_{f:g}": lambda f=f: b6(f) for f in B6_FACTORS
-    }
+    found: dict[str, Callable[[], Iterable[SelectionCase]]] = {f"b6_{f:g}": lambda f=f: b6(f) for f in B6_FACTORS}
     found |= {name: lambda made=made: [thinned(made())] for name, made in CASES.items()}
     for name, first in (("random", 0), ("random_held_out", HELD_OUT)):
         numbers = range(first, first + systems)
@@ -110,9 +106,7 @@ def judged(problem: ForcedProblem, truth: Truth) -> Row:
     return Row(truth.error, alert, found.error, found.bound, weak)
 
 
-def repeats(
-    problem: ForcedProblem, judge: ForcedProblem, name: str, found: Sequence[Truth]
-) -> Cost:
+def repeats(problem: ForcedProblem, judge: ForcedProblem, name: str, found: Sequence[Truth]) -> Cost:
     """Judge all points by a strategy and solve again what it asks for, until it asks for no more."""
     strategy = strategy_named(name, THRESHOLD)
     count = again = rows = iterations = lost = 0
@@ -135,9 +129,7 @@ def repeats(
             balance = problem.balance(wanted)
             start = own.coefficients if verdict.start is None else verdict.start
             began = process_time()
-            solution = newton(
-                lambda v, b=balance, w=own.omega: b.linearise(v, w), balance.unknowns(start), NEWTON
-            )
+            solution = newton(lambda v, b=balance, w=own.omega: b.linearise(v, w), balance.unknowns(start), NEWTON)
             solving += process_time() - began
             asked, rows = asked + 1, rows + balance.n_rows
             iterations += solution.iterations
@@ -184,7 +176,7 @@ def cost_line(name: str, cost: Cost) -> str:
     if not cost.repeats:
         return f"{line}, judging {cost.judging:.2f} s"
     left = np.array(cost.errors)
-    spread = ", ".join(f"{100 * v:.3g}" for v in np.percentile(left, [50, 95, 100])) if left.size else "none"  # fmt: skip
+    spread = ", ".join(f"{100 * v:.3g}" for v in np.percentile(left, [50, 95, 100])) if left.size else "none"
     return (
         f"{line} ({cost.again} more of the same points), {cost.rows / cost.repeats:.2f} rows a point, {cost.iterations} Newton steps, judging {cost.judging:.2f} s, "
         f"solving {cost.solving:.2f} s, errors left (50, 95, 100 %): {spread} %, {int(np.sum(left > THRESHOLD))} above 5 %, {cost.lost} not found"
@@ -220,9 +212,7 @@ def measured(cases: Iterable[SelectionCase]) -> tuple[list[Row], dict[str, Cost]
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(
-        prog="python -m evidence.strategies.effectivity", description=__doc__
-    )
+    parser = argparse.ArgumentParser(prog="python -m evidence.strategies.effectivity", description=__doc__)
     parser.add_argument("--systems", type=int, default=50, help="random systems of each set")
     parser.add_argument("names", nargs="*", help="sources; all by default")
     given = parser.parse_args()
@@ -232,7 +222,7 @@ def main() -> None:
         parser.error(f"no source {', '.join(unknown)}; there are {', '.join(known)}")
     for name in given.names or known:
         rows, costs = measured(known[name]())
-        print(name, *table(rows), *(cost_line(n, c) for n, c in costs.items()), sep="\n", flush=True)  # fmt: skip
+        print(name, *table(rows), *(cost_line(n, c) for n, c in costs.items()), sep="\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -41,9 +41,7 @@ def _panel(axes: Axes, comparison: Comparison, cost: str) -> None:
 
 def draw(found: Sequence[Comparison], path: Path = FIGURE) -> None:
     """Write the figure."""
-    figure, axes = plt.subplots(
-        2, len(found), figsize=(4 * len(found), 7.4), layout="constrained", squeeze=False
-    )
+    figure, axes = plt.subplots(2, len(found), figsize=(4 * len(found), 7.4), layout="constrained", squeeze=False)
     for column, comparison in enumerate(found):
         _panel(axes[0, column], comparison, "unknowns")
         _panel(axes[1, column], comparison, "seconds")

@@ -92,12 +92,7 @@ def page(found: Sequence[Comparison], after: str) -> str:
         lines += [*heading(comparison), *table(comparison), ""]
     lines += [after.rstrip(), ""]
     if ALARMS.exists():
-        lines += [
-            "## Alarms counted one by one",
-            "",
-            f"```{{include}} {ALARMS.name}\n```",
-            "",
-        ]
+        lines += ["## Alarms counted one by one", "", f"```{{include}} {ALARMS.name}\n```", ""]
     return "\n".join(lines)
 
 

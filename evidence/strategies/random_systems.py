@@ -100,12 +100,7 @@ def random_two_blade_system(number: int) -> SelectionCase:
         note = f"{note}, severity {severity:.2g}, F_CL/F_HE = {ratio:.3g}"
         load = HarmonicLoad(ratio * _outward(system), {1: shake})
         return SelectionCase(
-            f"random{number}",
-            f"random system {number}: {note}",
-            system,
-            load,
-            (low, high),
-            FREQUENCIES,
+            f"random{number}", f"random system {number}: {note}", system, load, (low, high), FREQUENCIES
         )
     raise RuntimeError(f"no equilibrium in {DRAWS} draws of system {number}")
 
@@ -137,12 +132,7 @@ def _drawn(rng: Random) -> tuple[System, ComplexArray, str]:
     if rotating:
         K[6, 6] += held * SIZE**2
     names = tuple(f"c{i}" for i in range(len(laws)))
-    system = System(
-        Structure(M, damping, K, _dofs(n)),
-        Interface(names, laws, gap),
-        np.arange(4),
-        free=np.arange(4, n),
-    )
+    system = System(Structure(M, damping, K, _dofs(n)), Interface(names, laws, gap), np.arange(4), free=np.arange(4, n))
     phases = rng.normal(size=4) + 1j * rng.normal(size=4)
     phases[2:] *= rng.choice([0.0, 0.3, 1.0])
     force = np.zeros(n, dtype=complex)
@@ -150,16 +140,11 @@ def _drawn(rng: Random) -> tuple[System, ComplexArray, str]:
     return system, force, f"damper of {n_damper} dofs, damping {ratio:.2%}"
 
 
-def _contacts(
-    rng: Random, soft: float, n_damper: int
-) -> tuple[tuple[ElasticCoulomb, ...], FloatArray]:
+def _contacts(rng: Random, soft: float, n_damper: int) -> tuple[tuple[ElasticCoulomb, ...], FloatArray]:
     """Return laws and gap operator: one contact a side, or two on the flat side of a damper that rotates."""
     flat, curved = rng.uniform(np.radians(20), np.radians(60), 2)
     # outward normals of the damper's sides: gaps open inward
-    normals = (
-        np.array([-np.sin(flat), np.cos(flat)]),
-        np.array([np.sin(curved), np.cos(curved)]),
-    )
+    normals = (np.array([-np.sin(flat), np.cos(flat)]), np.array([np.sin(curved), np.cos(curved)]))
     right = SIZE * normals[1]
     # where the line of action of the curved side meets the axis of the load, all three forces meet: the foot of the flat side's resultant
     crossing = np.array([0.0, right[1] - right[0] * normals[1][1] / normals[1][0]])
@@ -179,11 +164,7 @@ def _contacts(
         if n_damper == 3:  # a rotation θ moves a point by θ (-z, x)
             gap[rows, 6] += frame @ np.array([-point[1], point[0]])
         k_t = soft * decades(rng, 0.5, 2.0) / (len(shares) if blade == 0 else 1)
-        laws.append(
-            ElasticCoulomb(
-                k_t=k_t, k_w=0.0, k_n=k_t * decades(rng, 0.5, 2.0), mu=decades(rng, 0.1, 0.8)
-            )
-        )
+        laws.append(ElasticCoulomb(k_t=k_t, k_w=0.0, k_n=k_t * decades(rng, 0.5, 2.0), mu=decades(rng, 0.1, 0.8)))
     return tuple(laws), gap
 
 

@@ -24,9 +24,7 @@ from stickslip.response.forced.response import forced_response
 from stickslip.solve.newton_method import Newton, newton
 
 NEWTON = Newton(max_iterations=25)
-CLEAR = (
-    5e-3  # error below which no other candidate is looked for: a nearer one would change no verdict
-)
+CLEAR = 5e-3  # error below which no other candidate is looked for: a nearer one would change no verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +58,7 @@ class Truth:
 
 def judging_problem(case: SelectionCase) -> ForcedProblem:
     """Return the forced response of a case with the judge's support as its reference."""
-    return forced_problem(
-        case.system, case.load, case.sweep(high=2 * case.high, selection="always_low")
-    )
+    return forced_problem(case.system, case.load, case.sweep(high=2 * case.high, selection="always_low"))
 
 
 def low_order_points(case: SelectionCase) -> list[ForcedPoint]:
@@ -110,26 +106,20 @@ def _direct(problem: ForcedProblem, middle: HarmonicBalance, point: ForcedPoint)
         else:
             first = middle.unknowns(point.coefficients)
             if start == "predicted":
-                first = jacobian_alert(
-                    few, middle, x, omega, problem.measure, problem.alert_solve
-                ).start
+                first = jacobian_alert(few, middle, x, omega, problem.measure, problem.alert_solve).start
             begin = _solved(middle, omega, first)
             if begin is not None:
                 high_error = _error(problem, point, middle, begin)
                 begin = many.unknowns(middle.coefficients(begin))
         solved = None if begin is None else _solved(many, omega, begin)
         if solved is not None:
-            candidates.append(
-                (_error(problem, point, many, solved), high_error, _reference(many, point, solved))
-            )
+            candidates.append((_error(problem, point, many, solved), high_error, _reference(many, point, solved)))
         if candidates and (candidates[-1][0] < CLEAR or start == "at once"):
             break
     return _nearest(point, candidates)
 
 
-def _led(
-    problem: ForcedProblem, point: ForcedPoint, index: int, known: Mapping[int, ForcedPoint]
-) -> Truth:
+def _led(problem: ForcedProblem, point: ForcedPoint, index: int, known: Mapping[int, ForcedPoint]) -> Truth:
     """Return the nearest of the solutions to which the branches of the neighbours lead."""
     candidates = []
     for neighbour in (index - 1, index + 1):
@@ -151,16 +141,9 @@ def _nearest(point: ForcedPoint, candidates: list[tuple[float, float, ForcedPoin
     return Truth(point, reference, error, high_error, tuple(sorted(c[0] for c in candidates)))
 
 
-def _error(
-    problem: ForcedProblem, point: ForcedPoint, balance: HarmonicBalance, x: FloatArray
-) -> float:
+def _error(problem: ForcedProblem, point: ForcedPoint, balance: HarmonicBalance, x: FloatArray) -> float:
     return problem.real_error(point, _reference(balance, point, x))
 
 
 def _reference(balance: HarmonicBalance, point: ForcedPoint, x: FloatArray) -> ForcedPoint:
-    return replace(
-        point,
-        coefficients=balance.coefficients(x),
-        harmonics=np.array(balance.harmonics),
-        stage="high",
-    )
+    return replace(point, coefficients=balance.coefficients(x), harmonics=np.array(balance.harmonics), stage="high")

@@ -35,8 +35,11 @@ def model_of(machine: Machine) -> "ss.Model":
     for i, name in enumerate(names):
         if machine.force[i]:
             loads[f"f{i}"] = ss.Load(
-                on=name, newton=float(abs(machine.force[i])), harmonic=machine.harmonic, phase=float(np.angle(machine.force[i])),
-            )  # fmt: skip
+                on=name,
+                newton=float(abs(machine.force[i])),
+                harmonic=machine.harmonic,
+                phase=float(np.angle(machine.force[i])),
+            )
         if machine.static[i]:
             loads[f"s{i}"] = ss.Load(on=name, newton=float(machine.static[i]), harmonic=0)
     return ss.Model(
@@ -50,15 +53,17 @@ def model_of(machine: Machine) -> "ss.Model":
 def _contact(c: Contact, names: list[str], machine: Machine) -> "ss.Contact":
     own, other = c.between
     if c.kind == "pad":
-        law: Any = ss.ElasticCoulomb(k_t=c.stiffness, k_w=c.stiffness, k_n=c.normal_stiffness, mu=c.friction, preload=c.preload)  # fmt: skip
+        law: Any = ss.ElasticCoulomb(
+            k_t=c.stiffness, k_w=c.stiffness, k_n=c.normal_stiffness, mu=c.friction, preload=c.preload
+        )
         return ss.Contact(
-            between=(f"p.node{own + 1}", "ground"), law=law, normal=(0.0, 0.0, 1.0), tangent=(1.0, 0.0, 0.0),
-        )  # fmt: skip
+            between=(f"p.node{own + 1}", "ground"), law=law, normal=(0.0, 0.0, 1.0), tangent=(1.0, 0.0, 0.0)
+        )
     second = "ground" if other < 0 else names[other]
     if c.kind == "stop":
         law = ss.UnilateralSpring(k_n=c.stiffness, initial_gap=c.clearance)
         return ss.Contact(between=(names[own], second), law=law, acts="normal")
-    law = ss.CubicSpring(cubic_t=c.stiffness) if c.kind == "cubic" else ss.Jenkins(k_t=c.stiffness, limit=c.limit)  # fmt: skip
+    law = ss.CubicSpring(cubic_t=c.stiffness) if c.kind == "cubic" else ss.Jenkins(k_t=c.stiffness, limit=c.limit)
     return ss.Contact(between=(names[own], second), law=law, acts="tangential")
 
 
@@ -88,6 +93,6 @@ def _stability(data: Any) -> tuple[str, ...]:
         return tuple("carried" if names[w] == "stable" and b == 2 else names[w] for w, b in own)
     told = dict.fromkeys(np.round(data.frequency_hz.values, 9).tolist(), "not examined")
     if "stability_verdict" in data:
-        for hz, word in zip(data.stability_frequency_hz.values, data.stability_verdict.values, strict=True):  # fmt: skip
+        for hz, word in zip(data.stability_frequency_hz.values, data.stability_verdict.values, strict=True):
             told[round(float(hz), 9)] = str(word)
     return tuple(told[round(float(hz), 9)] for hz in data.frequency_hz.values)

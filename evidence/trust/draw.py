@@ -118,9 +118,7 @@ def _line(rng: np.random.Generator, number: int, family: str) -> Machine:
         if kind == "slider":
             # at most what the spring would carry if it stuck at the free resonance
             limit = min(k, modal) * size * _decades(rng, 0.02, 1.0)
-            contacts.append(
-                Contact("slider", row, np.zeros(n), k, limit=limit, between=(own, other))
-            )
+            contacts.append(Contact("slider", row, np.zeros(n), k, limit=limit, between=(own, other)))
         elif kind == "stop":
             gap = size * _decades(rng, 0.05, 0.8)
             contacts.append(Contact("stop", np.zeros(n), row, k, clearance=gap, between=(own, -1)))
@@ -128,16 +126,14 @@ def _line(rng: np.random.Generator, number: int, family: str) -> Machine:
             cubic = modal / size**2 * _decades(rng, 1e-3, 0.3)
             contacts.append(Contact("cubic", row, np.zeros(n), cubic, between=(own, -1)))
     stuck = stiffness + sum(
-        (c.stiffness * np.outer(c.tangent, c.tangent) for c in contacts if c.kind == "slider"),
-        np.zeros((n, n)),
+        (c.stiffness * np.outer(c.tangent, c.tangent) for c in contacts if c.kind == "slider"), np.zeros((n, n))
     )
     low, high = sorted((_lowest(mass, stiffness), _lowest(mass, stuck)))
     hz = (0.8 * low / (2 * np.pi * harmonic), 1.25 * min(high, 2 * low) / (2 * np.pi * harmonic))
     nodes = tuple(range(1, n + 1))
     return Machine(
-        number, family, mass, damping, stiffness, nodes, ("x",) * n, tuple(contacts),
-        force, np.zeros(n), harmonic, hz,
-    )  # fmt: skip
+        number, family, mass, damping, stiffness, nodes, ("x",) * n, tuple(contacts), force, np.zeros(n), harmonic, hz
+    )
 
 
 def _pad(rng: np.random.Generator, number: int) -> Machine:
@@ -164,20 +160,16 @@ def _pad(rng: np.random.Generator, number: int) -> Machine:
     for i in range(count):
         tangent, normal = np.zeros(n), np.zeros(n)
         tangent[2 * i], normal[2 * i + 1] = 1.0, 1.0
-        k, kn, mu = modal * _decades(rng, 0.05, 20.0), modal * _decades(rng, 0.05, 20.0), rng.uniform(0.1, 0.8)  # fmt: skip
+        k, kn, mu = modal * _decades(rng, 0.05, 20.0), modal * _decades(rng, 0.05, 20.0), rng.uniform(0.1, 0.8)
         size = float(np.max(np.abs(free[:, 2 * i : 2 * i + 2])))
         preload = min(k, modal) * size * _decades(rng, 0.05, 2.0) / mu
         static[2 * i + 1] = preload
         contacts.append(
-            Contact(
-                "pad", tangent, normal, k, normal_stiffness=kn, friction=mu, preload=preload,
-                between=(i, -1),
-            )
-        )  # fmt: skip
+            Contact("pad", tangent, normal, k, normal_stiffness=kn, friction=mu, preload=preload, between=(i, -1))
+        )
     stuck = stiffness + sum(
         (
-            c.stiffness * np.outer(c.tangent, c.tangent)
-            + c.normal_stiffness * np.outer(c.normal, c.normal)
+            c.stiffness * np.outer(c.tangent, c.tangent) + c.normal_stiffness * np.outer(c.normal, c.normal)
             for c in contacts
         ),
         np.zeros((n, n)),
@@ -187,9 +179,8 @@ def _pad(rng: np.random.Generator, number: int) -> Machine:
     nodes = tuple(int(i) + 1 for i in np.repeat(np.arange(count), 2))
     # the ground carries what presses the node, so that it rests at zero
     return Machine(
-        number, "pad", mass, damping, stiffness, nodes, ("x", "z") * count, tuple(contacts),
-        force, static, harmonic, hz,
-    )  # fmt: skip
+        number, "pad", mass, damping, stiffness, nodes, ("x", "z") * count, tuple(contacts), force, static, harmonic, hz
+    )
 
 
 def _lowest(mass: Array, stiffness: Array) -> float:
@@ -197,7 +188,7 @@ def _lowest(mass: Array, stiffness: Array) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(stiffness / np.outer(root, root))[0]))
 
 
-def _resonance(mass: Array, damping: Array, stiffness: Array, force: npt.NDArray[np.complex128]) -> Array:  # fmt: skip
+def _resonance(mass: Array, damping: Array, stiffness: Array, force: npt.NDArray[np.complex128]) -> Array:
     """Return (m, n) amplitudes of the free structure around its first resonance."""
     first = _lowest(mass, stiffness)
     return np.array(

@@ -142,7 +142,27 @@ def _states(kind, tangent, normal, number, q, v, place, code):  # type: ignore[n
 
 
 @numba.njit(cache=True)
-def _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, time, h, q, v, place, moved, work):  # type: ignore[no-untyped-def]  # fmt: skip
+def _step(
+    inverse,
+    damping,
+    stiffness,
+    kind,
+    tangent,
+    normal,
+    number,
+    real,
+    imaginary,
+    static,
+    order,
+    omega,
+    time,
+    h,
+    q,
+    v,
+    place,
+    moved,
+    work,
+):  # type: ignore[no-untyped-def]
     """March a step from an angle of the load's first harmonic; q, v, place are changed in place."""
     contact, load, a, b, c, d = work[0], work[1], work[2], work[3], work[4], work[5]
     angle = order * time
@@ -168,7 +188,27 @@ def _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imag
 
 
 @numba.njit(cache=True)
-def period(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, steps, q, v, place, moved, sums, places):  # type: ignore[no-untyped-def]  # fmt: skip
+def period(
+    inverse,
+    damping,
+    stiffness,
+    kind,
+    tangent,
+    normal,
+    number,
+    real,
+    imaginary,
+    static,
+    order,
+    omega,
+    steps,
+    q,
+    v,
+    place,
+    moved,
+    sums,
+    places,
+):  # type: ignore[no-untyped-def]
     """March one period; q, v, place are changed in place, `sums` (2, harmonics, n) gets the Fourier coefficients, `places` (2, contacts) from and to where sliders stick all the time.
 
     A step in which a contact begins or ceases to slip, opens or closes is taken in `PIECES`: the times of these decide the multipliers.
@@ -191,13 +231,53 @@ def period(inverse, damping, stiffness, kind, tangent, normal, number, real, ima
         time = 2 * np.pi * s / steps
         _narrow(kind, tangent, normal, number, q, places)
         q0[:], v0[:], place0[:], moved0[:] = q, v, place, moved
-        _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, time, h, q, v, place, moved, work)  # fmt: skip
+        _step(
+            inverse,
+            damping,
+            stiffness,
+            kind,
+            tangent,
+            normal,
+            number,
+            real,
+            imaginary,
+            static,
+            order,
+            omega,
+            time,
+            h,
+            q,
+            v,
+            place,
+            moved,
+            work,
+        )
         _states(kind, tangent, normal, number, q, v, place, after)
         if np.any(before != after):
             q[:], v[:], place[:], moved[:] = q0, v0, place0, moved0
             for part in range(PIECES):
                 ahead = time + part * 2 * np.pi / steps / PIECES
-                _step(inverse, damping, stiffness, kind, tangent, normal, number, real, imaginary, static, order, omega, ahead, h / PIECES, q, v, place, moved, work)  # fmt: skip
+                _step(
+                    inverse,
+                    damping,
+                    stiffness,
+                    kind,
+                    tangent,
+                    normal,
+                    number,
+                    real,
+                    imaginary,
+                    static,
+                    order,
+                    omega,
+                    ahead,
+                    h / PIECES,
+                    q,
+                    v,
+                    place,
+                    moved,
+                    work,
+                )
             _states(kind, tangent, normal, number, q, v, place, after)
         before[:] = after
 
@@ -230,9 +310,7 @@ def _inside(place: Array, places: Array, scale: Array) -> Array:
     off = np.minimum(INSIDE * scale, 0.25 * (high - low))
     sticks = np.isfinite(high - low) & (high > low)
     near = (place < low + 0.5 * off) | (place > high - 0.5 * off)
-    return np.where(
-        sticks & near, np.clip(place, low + off, np.maximum(high - off, low + off)), place
-    )
+    return np.where(sticks & near, np.clip(place, low + off, np.maximum(high - off, low + off)), place)
 
 
 class Judge:
@@ -245,10 +323,7 @@ class Judge:
         self.tangent = np.array([c.tangent for c in contacts])
         self.normal = np.array([c.normal for c in contacts])
         self.number = np.array(
-            [
-                [c.stiffness, c.limit, c.normal_stiffness, c.friction, c.preload, c.clearance]
-                for c in contacts
-            ]
+            [[c.stiffness, c.limit, c.normal_stiffness, c.friction, c.preload, c.clearance] for c in contacts]
         )
         self.inverse = np.linalg.inv(machine.mass)
         # a pad at rest is held by what presses it: the preload of the contact, as a load
@@ -259,11 +334,13 @@ class Judge:
                 for c in contacts
             ),
             np.zeros_like(machine.stiffness),
-        )  # fmt: skip
+        )
         fastest = float(np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stuck)))))
         self.steps = int(np.clip(2 * np.pi * fastest / omega / ANGLE, LEAST_STEPS, MOST_STEPS))
 
-    def flow(self, state: Array, omega: float, steps: int) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_], Array]:  # fmt: skip
+    def flow(
+        self, state: Array, omega: float, steps: int
+    ) -> tuple[Array, npt.NDArray[np.complex128], npt.NDArray[np.bool_], Array]:
         """Return the state (2n + contacts,) after a period, the motion's Fourier coefficients, which sliders moved, and between which places (2, contacts) each would stick."""
         n = len(self.machine.mass)
         q, v, place = state[:n].copy(), state[n : 2 * n].copy(), state[2 * n :].copy()
@@ -271,9 +348,26 @@ class Judge:
         sums, places = np.zeros((2, HARMONICS, n)), np.zeros((2, self.kind.size))
         m = self.machine
         period(
-            self.inverse, m.damping, m.stiffness, self.kind, self.tangent, self.normal, self.number,
-            m.force.real.copy(), m.force.imag.copy(), m.static, m.harmonic, omega, steps, q, v, place, moved, sums, places,
-        )  # fmt: skip
+            self.inverse,
+            m.damping,
+            m.stiffness,
+            self.kind,
+            self.tangent,
+            self.normal,
+            self.number,
+            m.force.real.copy(),
+            m.force.imag.copy(),
+            m.static,
+            m.harmonic,
+            omega,
+            steps,
+            q,
+            v,
+            place,
+            moved,
+            sums,
+            places,
+        )
         return np.concatenate([q, v, place]), sums[0] + 1j * sums[1], moved, places
 
     def start(self, motion: npt.NDArray[np.complex128]) -> Array:
@@ -302,15 +396,11 @@ class Judge:
             return near
         return own
 
-    def _nearest(
-        self, begin: Array, motion: npt.NDArray[np.complex128], own: Orbit | None
-    ) -> Orbit | None:
+    def _nearest(self, begin: Array, motion: npt.NDArray[np.complex128], own: Orbit | None) -> Orbit | None:
         """Return the nearest of the motions that are found in other ways, and of that which was found."""
         found = [own, self._orbit(begin, free=False, cut=CUT)]
         found += [self._later(motion, share) for share in LATER]
-        return min(
-            (o for o in found if o is not None), key=lambda o: self._apart(o, motion), default=None
-        )
+        return min((o for o in found if o is not None), key=lambda o: self._apart(o, motion), default=None)
 
     def _later(self, motion: npt.NDArray[np.complex128], share: float) -> Orbit | None:
         """Return the motion that is found from the told one at a later time: that of the machine whose load is ahead, turned back."""
@@ -340,8 +430,8 @@ class Judge:
         return Orbit(two.motion, off, two.multiplier, error, abs(two.omega / self.omega - 1.0))
 
     def _shoot(
-        self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0, jac: Array | None = None,
-    ) -> _Closed | None:  # fmt: skip
+        self, state: Array, omega: float, steps: int, free: bool, cut: float = 1.0, jac: Array | None = None
+    ) -> _Closed | None:
         """Return a motion that closes, at the frequency given or, `free`, at one beside it; the derivative of a state nearby serves as long as it is good."""
         scale, n, before = self._scale(state, omega, steps), len(self.machine.mass), np.inf
         for number in range(NEWTON):
@@ -379,17 +469,14 @@ class Judge:
         n = len(self.machine.mass)
         amplitude = float(np.max(np.abs(self.flow(state, omega, steps)[1][1:]))) or 1.0
         speed = amplitude * omega * self.machine.harmonic
-        return np.concatenate([np.full(n, amplitude), np.full(n, speed), np.full(self.kind.size, amplitude)])  # fmt: skip
+        return np.concatenate([np.full(n, amplitude), np.full(n, speed), np.full(self.kind.size, amplitude)])
 
     def _jacobian(self, state: Array, omega: float, steps: int, scale: Array) -> Array:
         columns = []
         for i in range(len(state)):
             nudge = np.zeros_like(state)
             nudge[i] = NUDGE * scale[i]
-            ahead, behind = (
-                self.flow(state + nudge, omega, steps)[0],
-                self.flow(state - nudge, omega, steps)[0],
-            )
+            ahead, behind = (self.flow(state + nudge, omega, steps)[0], self.flow(state - nudge, omega, steps)[0])
             columns.append((ahead - behind) / scale / (2 * NUDGE))
         return np.array(columns).T
 

@@ -70,7 +70,9 @@ def outcome(seed: int, number: int) -> Outcome:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             told = asked(machine)
     except Exception as error:  # noqa: BLE001 - a crash is a finding
-        return Outcome(number, machine.family, 0, 0, (0, 0, 0), 0, 2, "", process_time() - began, 0, 0, error=repr(error)[:300])  # fmt: skip
+        return Outcome(
+            number, machine.family, 0, 0, (0, 0, 0), 0, 2, "", process_time() - began, 0, 0, error=repr(error)[:300]
+        )
     seconds = process_time() - began
     judged, unjudged = [], 0
     for i in chosen(machine, told, np.random.default_rng([seed, number, 7])):
@@ -80,17 +82,27 @@ def outcome(seed: int, number: int) -> Outcome:
         else:
             judged.append(compared(machine, told, i, orbit))
     levels = np.bincount(told.level, minlength=3)
-    trusted_blind = int(np.sum((told.level == 0) & np.array([s == "not examined" for s in told.stability])))  # fmt: skip
+    trusted_blind = int(np.sum((told.level == 0) & np.array([s == "not examined" for s in told.stability])))
     return Outcome(
-        number, machine.family, len(told.hz), int((~told.solved).sum()), (int(levels[0]), int(levels[1]), int(levels[2])),
-        trusted_blind, told.peak_level, told.stability[told.peak] if told.peak >= 0 else "", seconds, int(acting(machine, told).sum()), unjudged, judged,
-    )  # fmt: skip
+        number,
+        machine.family,
+        len(told.hz),
+        int((~told.solved).sum()),
+        (int(levels[0]), int(levels[1]), int(levels[2])),
+        trusted_blind,
+        told.peak_level,
+        told.stability[told.peak] if told.peak >= 0 else "",
+        seconds,
+        int(acting(machine, told).sum()),
+        unjudged,
+        judged,
+    )
 
 
 def acting(machine: Machine, told: Told) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     """Return at which points contacts do more than a spring."""
     size = np.abs(told.motion[:, machine.harmonic]).max(axis=1)
-    rest = np.delete(np.abs(told.motion), [0, machine.harmonic], axis=1).max(axis=(1, 2), initial=0.0)  # fmt: skip
+    rest = np.delete(np.abs(told.motion), [0, machine.harmonic], axis=1).max(axis=(1, 2), initial=0.0)
     order_one = np.array([m.shape[0] <= machine.harmonic + 1 for m in told.motion])
     return np.asarray(told.solved & ((rest > ACTS * size) | order_one))
 
@@ -111,6 +123,13 @@ def compared(machine: Machine, told: Told, i: int, orbit: Orbit) -> Judged:
     size = np.maximum(np.abs(true), 0.01 * np.max(np.abs(true)))
     off = float(np.max(np.abs(ours - true) / size))
     return Judged(
-        float(told.hz[i]), int(told.level[i]), told.stability[i], off, orbit.motion_error, orbit.multiplier, orbit.multiplier_error, i == told.peak,
+        float(told.hz[i]),
+        int(told.level[i]),
+        told.stability[i],
+        off,
+        orbit.motion_error,
+        orbit.multiplier,
+        orbit.multiplier_error,
+        i == told.peak,
         re.sub(r"[-+]?\d[\d.e+-]*", "#", told.reasons[i])[:160],
-    )  # fmt: skip
+    )

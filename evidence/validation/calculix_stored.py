@@ -83,14 +83,9 @@ def plain_tie(sector: StoredSector, nodal_diameter: int) -> Matrix:
 
 def lowest_frequencies(structure: Structure, tie: Matrix, n: int) -> FloatArray:
     """Return the `n` lowest natural frequencies in Hz of the tied structure."""
-    K, M = (
-        scipy.sparse.csr_array(tie.conj().T @ matrix @ tie)
-        for matrix in (structure.stiffness, structure.mass)
-    )
+    K, M = (scipy.sparse.csr_array(tie.conj().T @ matrix @ tie) for matrix in (structure.stiffness, structure.mass))
     inverse = scipy.sparse.linalg.LinearOperator(K.shape, matvec=factorise(K), dtype=K.dtype)
-    squares = scipy.sparse.linalg.eigsh(
-        K, n, M=M, sigma=0, OPinv=inverse, return_eigenvectors=False
-    )
+    squares = scipy.sparse.linalg.eigsh(K, n, M=M, sigma=0, OPinv=inverse, return_eigenvectors=False)
     return np.asarray(np.sqrt(np.sort(squares)) / (2 * np.pi))
 
 

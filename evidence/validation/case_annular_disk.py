@@ -54,8 +54,7 @@ def plate_roots(n: int) -> tuple[float, ...]:
     values = [boundary_determinant(x, n) for x in grid]
     brackets = [i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0][:N_MODES]
     return tuple(
-        float(optimize.brentq(boundary_determinant, grid[i], grid[i + 1], args=(n,), xtol=1e-13))
-        for i in brackets
+        float(optimize.brentq(boundary_determinant, grid[i], grid[i + 1], args=(n,), xtol=1e-13)) for i in brackets
     )
 
 
@@ -66,11 +65,7 @@ def plate_frequencies(n: int, thickness: float) -> FloatArray:
 
 
 def solid_frequencies(
-    thickness: float,
-    sectors: int,
-    divisions: tuple[int, int, int],
-    wave_number: int,
-    n_modes: int = N_MODES,
+    thickness: float, sectors: int, divisions: tuple[int, int, int], wave_number: int, n_modes: int = N_MODES
 ) -> FloatArray:
     """Return the frequencies in Hz of the solid disk for a wave number, from one sector."""
     mesh = annular_sector(INNER, OUTER, thickness, sectors=sectors, divisions=divisions)
@@ -82,16 +77,28 @@ def run() -> list[Record]:
     """Compare the limit of small thickness with the plate, and cuts into 6, 12, 24 sectors with each other."""
     records = []
     for n in range(4):
-        ratio = [
-            solid_frequencies(h, 24, DIVISIONS, n) / plate_frequencies(n, h) for h in THICKNESSES
-        ]
+        ratio = [solid_frequencies(h, 24, DIVISIONS, n) / plate_frequencies(n, h) for h in THICKNESSES]
         once = [2 * fine - coarse for coarse, fine in itertools.pairwise(ratio)]
         limit = (4 * once[1] - once[0]) / 3
         for mode in range(N_MODES):
             records += [
-                record(CASE, f"frequency over that of the plate, nodal diameter {n}, mode {mode + 1}, thickness 1/200 of the radius", ratio[-1][mode], 1.0, 2e-3, "Kirchhoff's plate, by Bessel functions"),
-                record(CASE, f"the same, extrapolated to no thickness, nodal diameter {n}, mode {mode + 1}", limit[mode], 1.0, 2e-4, "Kirchhoff's plate, by Bessel functions"),
-            ]  # fmt: skip
+                record(
+                    CASE,
+                    f"frequency over that of the plate, nodal diameter {n}, mode {mode + 1}, thickness 1/200 of the radius",
+                    ratio[-1][mode],
+                    1.0,
+                    2e-3,
+                    "Kirchhoff's plate, by Bessel functions",
+                ),
+                record(
+                    CASE,
+                    f"the same, extrapolated to no thickness, nodal diameter {n}, mode {mode + 1}",
+                    limit[mode],
+                    1.0,
+                    2e-4,
+                    "Kirchhoff's plate, by Bessel functions",
+                ),
+            ]
     return records + [r for wave_number in range(4) for r in cuts(wave_number)]
 
 
@@ -105,6 +112,13 @@ def cuts(wave_number: int) -> list[Record]:
         union = np.sort(np.concatenate(parts))[: len(whole)]
         worst = int(np.argmax(np.abs(union / whole - 1)))
         records.append(
-            record(CASE, f"wave number {wave_number} of 6 sectors from a cut in {sectors}, mode {worst + 1} (the worst of 8), Hz", union[worst], whole[worst], 1e-9, "the same mesh, cut otherwise")
-        )  # fmt: skip
+            record(
+                CASE,
+                f"wave number {wave_number} of 6 sectors from a cut in {sectors}, mode {worst + 1} (the worst of 8), Hz",
+                union[worst],
+                whole[worst],
+                1e-9,
+                "the same mesh, cut otherwise",
+            )
+        )
     return records

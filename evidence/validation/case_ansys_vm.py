@@ -40,9 +40,7 @@ OSCILLATOR = (  # harmonics, amplitude and frequency of the peak
 )
 
 
-def peak(
-    one: System, load: HarmonicLoad, around: tuple[float, float], solved: Discretisation
-) -> PeakPoint:
+def peak(one: System, load: HarmonicLoad, around: tuple[float, float], solved: Discretisation) -> PeakPoint:
     """Return the peak of the first output."""
     (found,) = track_peak(one, load, lambda _: (one, load), [1.0], around, discretisation=solved)
     if not found.converged:
@@ -58,9 +56,7 @@ def chain_peak(force: float) -> tuple[float, float]:
     ring = blade_ring(SECTORS, mass=MASS, stiffness=STIFFNESS, coupling=COUPLING, damping=DASHPOT)
     own = np.zeros((3, ring.structure.n))
     own[0, 0] = 1.0
-    wheel, gap = tuned_wheel(
-        ring, 0, 3, (own, None), keep=ring.independent, reduce=lambda wave, *_: wave
-    )
+    wheel, gap = tuned_wheel(ring, 0, 3, (own, None), keep=ring.independent, reduce=lambda wave, *_: wave)
     contacts = Interface(("spring",), (CubicSpring(cubic_t=CUBIC),), gap)
     one = System(wheel, contacts, outputs=np.arange(wheel.n))
     sector = np.zeros(ring.structure.n)

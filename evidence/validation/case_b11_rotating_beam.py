@@ -45,7 +45,7 @@ def run() -> list[Record]:
         out, within = (
             2 * np.pi * natural_frequencies(rotating_beam(UNIT, ELEMENTS, speed, hub_radius=hub, bending=d), 3)
             for d in ("z", "y")
-        )  # fmt: skip
+        )
         rows = [(f"flap {i + 1}", out[i], theirs, 1) for i, theirs in enumerate(flap)]
         for name, ours, theirs, units in [*rows, ("lag 1", within[0], lag, 2)]:
             if theirs:

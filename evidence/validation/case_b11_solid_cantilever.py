@@ -36,10 +36,7 @@ TABLE = {
 }
 CUBE_TETS = [(0, 1, 3, 7), (0, 5, 1, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 4, 5, 7), (0, 6, 4, 7)]
 TET_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
-HEX_EDGES = [
-    *[(0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4)],
-    *[(0, 4), (1, 5), (3, 7), (2, 6)],
-]
+HEX_EDGES = [*[(0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4)], *[(0, 4), (1, 5), (3, 7), (2, 6)]]
 
 
 def beams(hub: float) -> dict[str, SolidMesh]:
@@ -65,20 +62,14 @@ def _second_order(points: FloatArray, corners: IntArray, ends: IntArray) -> Soli
     unique, inverse = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     cells = np.hstack([corners, len(points) + inverse.reshape(len(corners), -1)])
     points = np.vstack([points, points[unique].mean(axis=1)])
-    return SolidMesh(
-        points, cells, {"root": np.flatnonzero(points[:, 0] < points[:, 0].min() + 1e-9)}
-    )
+    return SolidMesh(points, cells, {"root": np.flatnonzero(points[:, 0] < points[:, 0].min() + 1e-9)})
 
 
 def run() -> list[Record]:
     """Compare flap and lag of both kinds of cells at every speed and hub radius of the table."""
     scale = math.sqrt(12 * MATERIAL.density / MATERIAL.young_modulus) * LENGTH**2 / DEPTH
     records = []
-    solids = {
-        (hub, name): rotating_solid(mesh, MATERIAL)
-        for hub in (0, 1)
-        for name, mesh in beams(hub).items()
-    }
+    solids = {(hub, name): rotating_solid(mesh, MATERIAL) for hub in (0, 1) for name, mesh in beams(hub).items()}
     for (eta, hub), (flap, flap2, lag) in TABLE.items():
         for name in beams(0):
             turning = solids[hub, name].at_speed(eta / scale)

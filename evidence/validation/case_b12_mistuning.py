@@ -13,12 +13,22 @@ from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
 
 SOURCE = "literature benchmark B12"
 CASE = "B12 ring of blades"
-DEVIATIONS = (0.012, -0.018, 0.005, 0.021, -0.009, -0.014, 0.017, 0.002, -0.023, 0.008, 0.011, -0.012)  # fmt: skip
-TUNED = ("1.00000000", "1.00267591", "1.00995049", "1.01980390", "1.02956301", "1.03664894", "1.03923048")  # fmt: skip
+DEVIATIONS = (0.012, -0.018, 0.005, 0.021, -0.009, -0.014, 0.017, 0.002, -0.023, 0.008, 0.011, -0.012)
+TUNED = ("1.00000000", "1.00267591", "1.00995049", "1.01980390", "1.02956301", "1.03664894", "1.03923048")
 MISTUNED = (
-    "0.99780035", "0.99981406", "1.00071541", "1.00627219", "1.01313001", "1.01915664",
-    "1.02112393", "1.02631985", "1.03313452", "1.03827659", "1.03918227", "1.04131025",
-)  # fmt: skip
+    "0.99780035",
+    "0.99981406",
+    "1.00071541",
+    "1.00627219",
+    "1.01313001",
+    "1.01915664",
+    "1.02112393",
+    "1.02631985",
+    "1.03313452",
+    "1.03827659",
+    "1.03918227",
+    "1.04131025",
+)
 
 
 def peak(ring: Structure, near: float) -> tuple[float, float, int]:
@@ -32,7 +42,7 @@ def peak(ring: Structure, near: float) -> tuple[float, float, int]:
 
     found = scipy.optimize.minimize_scalar(
         lambda w: -np.max(amplitudes(w)), bounds=(near - 1e-3, near + 1e-3), method="bounded", options={"xatol": 1e-12}
-    )  # fmt: skip
+    )
     return float(-found.fun), float(found.x), int(np.argmax(amplitudes(found.x)))
 
 

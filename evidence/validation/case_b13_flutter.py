@@ -71,12 +71,9 @@ def in_time(cycle: LimitCycle, c: float) -> tuple[float, float]:
     """Return amplitude and frequency that time integration goes to from 5 % beside a cycle."""
     system, load = oscillator(c)
     start = start_from_harmonics(
-        1.05 * cycle.coefficients,
-        cycle.omega,
-        system.interface.gap_operator,
-        system.interface.laws,
+        1.05 * cycle.coefficients, cycle.omega, system.interface.gap_operator, system.interface.laws
     )
-    found = march_periods(system.structure, system.interface, load, cycle.omega, np.array([0]), start, 200, STEPS)  # fmt: skip
+    found = march_periods(system.structure, system.interface, load, cycle.omega, np.array([0]), start, 200, STEPS)
     return float(found.amplitude[0]), float(found.frequency[0])
 
 
@@ -95,20 +92,24 @@ def run() -> list[Record]:
             ]
     problem = motions(-0.1, PLAIN)
     first = limit_cycles(problem, curve(problem))[0]
-    at_top = parameter_over_amplitude(problem, oscillator, -0.1, first.unknowns, (first.amplitude, AT), 10)[-1]  # fmt: skip
+    at_top = parameter_over_amplitude(problem, oscillator, -0.1, first.unknowns, (first.amplitude, AT), 10)[-1]
     records.append(digits(CASE, "largest negative damping, H = 1", -at_top.level, LARGEST, SOURCE))
     beyond = motions(-1.0001 * float(LARGEST), PLAIN)
-    records.append(bound(CASE, "limit cycles beyond it", float(len(limit_cycles(beyond, curve(beyond)))), 0.5, SOURCE))  # fmt: skip
+    records.append(bound(CASE, "limit cycles beyond it", float(len(limit_cycles(beyond, curve(beyond)))), 0.5, SOURCE))
     few = Discretisation(order=5, samples=512)
     for c in (-0.01, -0.05, -0.1, -0.14):
         problem = motions(c, few)
         small, large = limit_cycles(problem, curve(problem), most_harmonics=95, tolerance=1e-7)
         amplitude, omega = in_time(small, c)
-        records.append(record(CASE, f"c = {c:g}: A in time", amplitude, small.amplitude, 1e-4, SOURCE))  # fmt: skip
+        records.append(record(CASE, f"c = {c:g}: A in time", amplitude, small.amplitude, 1e-4, SOURCE))
         records.append(record(CASE, f"c = {c:g}: w in time", omega, small.omega, 1e-4, SOURCE))
         for cycle, word in ((small, "stable"), (large, "unstable")):
             found = cycle_stability(problem.with_order(cycle.order), cycle)
             wrong = float(found.stability.verdict != word)
-            records.append(bound(CASE, f"c = {c:g}: multipliers do not say {word}", wrong, 0.5, SOURCE))  # fmt: skip
-            records.append(bound(CASE, f"c = {c:g}, {word}: multiplier along the motion from 1", abs(found.along - 1), 1e-5, SOURCE))  # fmt: skip
+            records.append(bound(CASE, f"c = {c:g}: multipliers do not say {word}", wrong, 0.5, SOURCE))
+            records.append(
+                bound(
+                    CASE, f"c = {c:g}, {word}: multiplier along the motion from 1", abs(found.along - 1), 1e-5, SOURCE
+                )
+            )
     return records

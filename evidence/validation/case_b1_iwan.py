@@ -12,7 +12,7 @@ from stickslip.harmonic.aft import contact_forces
 SOURCE = "literature benchmark B1 (closed form)"
 SLIDERS = 400
 SAMPLES = 2**12
-ENERGY = (("0.5", "0.0416666667"), ("1", "0.3333333333"), ("2", "2.6666666667"), ("4", "10.6666666667"))  # fmt: skip
+ENERGY = (("0.5", "0.0416666667"), ("1", "0.3333333333"), ("2", "2.6666666667"), ("4", "10.6666666667"))
 
 
 def exact_energy(amplitude: float) -> float:
@@ -56,20 +56,34 @@ def run() -> list[Record]:
         # midpoint rule over the sliders, relative error at most (cell / A)² with cell = 2 / n, and sampling
         tolerance = (2.0 / SLIDERS / amplitude) ** 2 + 30.0 / SAMPLES**2
         records += [
-            record(case, f"energy of {SLIDERS} sliders at A = {printed}", energy(law, amplitude), exact_energy(amplitude), tolerance, SOURCE),
+            record(
+                case,
+                f"energy of {SLIDERS} sliders at A = {printed}",
+                energy(law, amplitude),
+                exact_energy(amplitude),
+                tolerance,
+                SOURCE,
+            ),
             digits(case, f"closed form of the energy at A = {printed}", exact_energy(amplitude), lost, SOURCE),
-        ]  # fmt: skip
+        ]
     x = np.array([0.1, 0.5, 1.0, 1.5, 2.0, 3.0])
     want = np.where(x < 2.0, x - x**2 / 4.0, 1.0)
     for at, got, exact in zip(x, first_loading(law, x), want, strict=True):
         # at an edge of a cell the sum over sliders is the integral
-        records.append(record(case, f"force in first loading at x = {at:g}", got, exact, 1e-12, SOURCE))  # fmt: skip
+        records.append(record(case, f"force in first loading at x = {at:g}", got, exact, 1e-12, SOURCE))
     records.append(
         record(case, "slope of the energy in micro-slip", slope(law, np.array([0.1, 0.2, 0.4])), 3.0, 2e-3, SOURCE)
-    )  # fmt: skip
+    )
     for chi in (-0.3, -0.7):
-        four = Iwan(k_t=1.0, limit=1.0, population=FourParameter(chi=chi, beta=0.5, n_sliders=SLIDERS))  # fmt: skip
+        four = Iwan(k_t=1.0, limit=1.0, population=FourParameter(chi=chi, beta=0.5, n_sliders=SLIDERS))
         records.append(
-            record(case, f"slope of the energy in micro-slip, chi = {chi:g}", slope(four, np.array([0.1, 0.2, 0.4])), 3.0 + chi, 2e-3, "Segalman 2005: 3 + chi")
-        )  # fmt: skip
+            record(
+                case,
+                f"slope of the energy in micro-slip, chi = {chi:g}",
+                slope(four, np.array([0.1, 0.2, 0.4])),
+                3.0 + chi,
+                2e-3,
+                "Segalman 2005: 3 + chi",
+            )
+        )
     return records

@@ -16,16 +16,10 @@ from stickslip.harmonic.fourier import to_complex
 
 SOURCE = "literature benchmark B1 (closed form)"
 # A/xc, real and imaginary part of F/U
-TABLE = (
-    ("1.5", "0.44444444", "0.49690399"),
-    ("2", "0.25", "0.43301270"),
-    ("5", "0.04", "0.19595918"),
-)
+TABLE = (("1.5", "0.44444444", "0.49690399"), ("2", "0.25", "0.43301270"), ("5", "0.04", "0.19595918"))
 
 
-def circle_force(
-    ratio: float, evaluator: Evaluator = "events", samples: int = 0
-) -> tuple[ComplexArray, int]:
+def circle_force(ratio: float, evaluator: Evaluator = "events", samples: int = 0) -> tuple[ComplexArray, int]:
     """Return the harmonics 0..3 of both tangential forces, k = limit = 1, and the contacts whose state did not repeat."""
     gap = np.zeros((7, 3))
     gap[1, 0], gap[2, 1] = ratio, ratio
@@ -42,10 +36,7 @@ def exact_stiffness(ratio: float) -> complex:
 def convergence_order(ratio: float) -> float:
     """Return the exponent with which the error falls, fitted over 64 to 2048 samples."""
     samples = 2 ** np.arange(6, 12)
-    errors = [
-        abs(circle_force(ratio, "march", int(n))[0][1, 0] / ratio - exact_stiffness(ratio))
-        for n in samples
-    ]
+    errors = [abs(circle_force(ratio, "march", int(n))[0][1, 0] / ratio - exact_stiffness(ratio)) for n in samples]
     return float(-np.polyfit(np.log(samples), np.log(errors), 1)[0])
 
 
@@ -62,13 +53,21 @@ def run() -> list[Record]:
             records += [
                 record(case, f"real part {at}", stiffness.real, exact.real, 1e-11, "closed form"),
                 record(case, f"imaginary part {at}", stiffness.imag, exact.imag, 1e-11, "closed form"),
-            ]  # fmt: skip
+            ]
         at = f"at A/xc = {printed}"
         records += [
-            record(case, f"order of the march's sampling error {at}", convergence_order(ratio), 2.0, 0.02, "second order"),
+            record(
+                case, f"order of the march's sampling error {at}", convergence_order(ratio), 2.0, 0.02, "second order"
+            ),
             digits(case, f"closed form, real part {at}", exact.real, real, SOURCE),
             digits(case, f"closed form, imaginary part {at}", exact.imag, imaginary, SOURCE),
-            bound(case, f"harmonics other than the first {at}", np.max(np.abs(force[[0, 2, 3]])), 1e-10, "a circle is a circle"),
+            bound(
+                case,
+                f"harmonics other than the first {at}",
+                np.max(np.abs(force[[0, 2, 3]])),
+                1e-10,
+                "a circle is a circle",
+            ),
             bound(case, f"contacts that did not settle {at}", unsettled, 0.5, "events"),
-        ]  # fmt: skip
+        ]
     return records

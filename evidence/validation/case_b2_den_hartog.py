@@ -28,13 +28,20 @@ TOLERANCE = 1e-5
 SAMPLES_OF_SIGN = 2**18  # of a force that jumps between samples
 HALF_UNIT = 5e-6  # of the last digit printed at b = 0.5
 TABLE = (
-    (0.7, 0.3, 1.8856998504), (0.8, 0.4, 2.5017878810), (0.9, 0.5, 4.2159037168), (1.1, 0.5, 3.5610501056),
-    (1.2, 0.5, 1.6574674711), (1.5, 0.3, 0.7211102551), (2.0, 0.2, 0.3179797338),
-)  # fmt: skip
+    (0.7, 0.3, 1.8856998504),
+    (0.8, 0.4, 2.5017878810),
+    (0.9, 0.5, 4.2159037168),
+    (1.1, 0.5, 3.5610501056),
+    (1.2, 0.5, 1.6574674711),
+    (1.5, 0.3, 0.7211102551),
+    (2.0, 0.2, 0.3179797338),
+)
 HARMONICS = (
-    (0.9, 0.5, 4.22064112, 0.03373714), (1.2, 0.5, 1.66099265, 0.01774303), (0.7, 0.3, 1.89752959, 0.03733840),
+    (0.9, 0.5, 4.22064112, 0.03373714),
+    (1.2, 0.5, 1.66099265, 0.01774303),
+    (0.7, 0.3, 1.89752959, 0.03733840),
     (0.5, 0.2, 1.37588, 0.06791),
-)  # fmt: skip
+)
 
 
 def mass_on_spring(limit: float, penalty: float | None = None) -> Rubbing:
@@ -75,12 +82,7 @@ def limits(motions: list[RigidMotion]) -> FloatArray:
 
     The orders are one less than powers of two; the series is in 1/(H+1).
     """
-    return extrapolated(
-        [
-            np.array([largest(m), abs(m.harmonics[1, 0]), abs(m.harmonics[3, 0])])
-            for m in motions[-3:]
-        ]
-    )
+    return extrapolated([np.array([largest(m), abs(m.harmonics[1, 0]), abs(m.harmonics[3, 0])]) for m in motions[-3:]])
 
 
 def run() -> list[Record]:
@@ -88,13 +90,11 @@ def run() -> list[Record]:
     records = []
     for b, r, x0 in TABLE:
         found = limits(growing(mass_on_spring(r), b, ORDERS))
-        records.append(
-            record(CASE, f"x0 k/P at b = {b:g}, r = {r:g}", found[0], x0, TOLERANCE, SOURCE)
-        )
+        records.append(record(CASE, f"x0 k/P at b = {b:g}, r = {r:g}", found[0], x0, TOLERANCE, SOURCE))
         formula = np.sqrt(1 - (4 * r / np.pi) ** 2) / abs(1 - b**2)
         records.append(
             record(CASE, f"|X1| k/P at b = {b:g}, r = {r:g}, H = 1", one_harmonic(b, r), formula, 1e-5, "closed form")
-        )  # fmt: skip
+        )
     for b, r, x1, x3 in HARMONICS:
         orders = (*ORDERS, 511) if b == HALF else ORDERS
         found = limits(growing(mass_on_spring(r), b, orders))

@@ -75,11 +75,7 @@ def peak(limit: float, near: float, samples: int = PEAK_SAMPLES) -> tuple[float,
         start = bonded(problem, balance, load, float(omegas[0]))
         values = amplitudes(balance, omegas, start)
         fit = Chebyshev.fit(omegas, values, 6)
-        turning = [
-            float(r.real)
-            for r in fit.deriv().roots()
-            if abs(r.imag) < 1e-9 and abs(r.real - best) < width
-        ]
+        turning = [float(r.real) for r in fit.deriv().roots() if abs(r.imag) < 1e-9 and abs(r.real - best) < width]
         best = max(turning, key=fit) if turning else float(omegas[np.argmax(values)])
     return float(fit(best)), best
 
@@ -136,13 +132,7 @@ def run() -> list[Record]:
         records += [
             digits(case, f"|X1| at H = 1, {where}", response(limit, omega, 1), first, SOURCE),
             digits(case, f"|X1| at H = 11, {where}", response(limit, omega, 11), eleventh, SOURCE),
-            digits(
-                case,
-                f"|X1| by time integration, {where}",
-                abs(time.first_harmonic[0]),
-                exact,
-                SOURCE,
-            ),
+            digits(case, f"|X1| by time integration, {where}", abs(time.first_harmonic[0]), exact, SOURCE),
             digits(
                 case,
                 f"|X3| by time integration, {where}",

@@ -27,16 +27,14 @@ TABLE = (
     (1.0, 0.0, ((10.612322, 15.277103), (0.062598, 0.437462), (0.003762, 0.086097), (0.000660, 0.030707))),
     (1.5, 0.0, ((35.664777, 26.786093), (0.009852, 0.179086), (0.000696, 0.037345), (0.000127, 0.013487))),
     (2.0, 0.36710, ((10.048455, 0.302843), (0.001502, 0.050709), (0.000065, 0.006232), (0.000017, 0.003172))),
-)  # fmt: skip
+)
 STICKING = 5e-4  # relative error of the largest harmonics that first order leaves at H = 512
 STICKING_SHARE = 2e-3  # of the period: a few samples of a layer of width 1/H
 
 
 def two_masses(penalty: float | None = None) -> Rubbing:
     """Return the system of the benchmark."""
-    structure = lumped(
-        np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
-    )
+    structure = lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]]))
     load = HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
     return Rubbing(structure, load, 1, 0.9 * 9.0, penalty)
 
@@ -72,13 +70,24 @@ def run() -> list[Record]:
         if not slides:
             share = motions[-1].stick - stick
             records.append(
-                record(CASE, f"share of sticking at W = {omega:g} less {stick:g}, {how}", share, 0.0, STICKING_SHARE, SOURCE)
-            )  # fmt: skip
+                record(
+                    CASE,
+                    f"share of sticking at W = {omega:g} less {stick:g}, {how}",
+                    share,
+                    0.0,
+                    STICKING_SHARE,
+                    SOURCE,
+                )
+            )
         exact = rows[0][1]
         records.append(
             record(
-                CASE, f"order in 1/H of the error of |X1| of dof 2 at W = {omega:g}", order_of_error(motions, exact),
-                1.0, 0.05 if slides else 0.7, "a force that jumps",
+                CASE,
+                f"order in 1/H of the error of |X1| of dof 2 at W = {omega:g}",
+                order_of_error(motions, exact),
+                1.0,
+                0.05 if slides else 0.7,
+                "a force that jumps",
             )
-        )  # fmt: skip
+        )
     return records

@@ -13,14 +13,7 @@ import scipy.linalg
 
 from evidence.integrator.transient import TimeStepping
 from evidence.models.lumped import Y2, blades_and_damper
-from evidence.models.solving import (
-    at_frequency,
-    balance_of,
-    frictionless,
-    integrated,
-    motion,
-    solve,
-)
+from evidence.models.solving import at_frequency, balance_of, frictionless, integrated, motion, solve
 from evidence.validation.compare import Record, digits
 from stickslip.arrays import FloatArray
 from stickslip.response.equilibrium import preload
@@ -48,9 +41,7 @@ PEAK_GOOD_TO, PEAK_HZ_GOOD_TO = 1.2e-4, 4e-4
 MEANS = {"163": "1.43807e-4", "stuck": "1.32755e-4"}
 
 
-def y2(
-    problem: System, hertz: float, order: int, samples: int, harmonic: int = 1, factor: float = 1.0
-) -> complex:
+def y2(problem: System, hertz: float, order: int, samples: int, harmonic: int = 1, factor: float = 1.0) -> complex:
     """Return a harmonic of y2 from the public forced response."""
     load = blades_and_damper(excitation=factor)[1]
     point = at_frequency(problem, load, hertz, order, samples)
@@ -97,20 +88,12 @@ def peak_records(case: str, order: int, traction: float, amplitude: str, at: str
     grid = near + np.arange(-0.15, 0.15, 0.001)
     values = curve(order, traction, grid)
     top = int(np.argmax(values))
-    within = curve(
-        order, traction, near + np.concatenate([[-0.02, -0.005], np.linspace(-5e-4, 5e-4, 21)])
-    )[2:]
+    within = curve(order, traction, near + np.concatenate([[-0.02, -0.005], np.linspace(-5e-4, 5e-4, 21)]))[2:]
     closest = float(within[np.argmin(np.abs(within - float(amplitude)))])
     return [
         digits(case, f"peak |y2|, {where}, m", values[top], amplitude, SOURCE, PEAK_GOOD_TO),
         digits(case, f"peak frequency, {where}, Hz", grid[top], at, SOURCE, PEAK_HZ_GOOD_TO),
-        digits(
-            case,
-            f"|y2| at {at} Hz (where the source has the peak), {where}, m",
-            closest,
-            amplitude,
-            SOURCE,
-        ),
+        digits(case, f"|y2| at {at} Hz (where the source has the peak), {where}, m", closest, amplitude, SOURCE),
     ]
 
 
@@ -119,9 +102,7 @@ def frequencies(*, stuck: bool) -> FloatArray:
     problem, _ = blades_and_damper()
     problem = problem if stuck else frictionless(problem)
     structure = problem.stuck_structure()
-    return np.sqrt(scipy.linalg.eigh(structure.stiffness, structure.mass, eigvals_only=True)) / (
-        2 * np.pi
-    )
+    return np.sqrt(scipy.linalg.eigh(structure.stiffness, structure.mass, eigvals_only=True)) / (2 * np.pi)
 
 
 def run() -> list[Record]:
@@ -141,16 +122,10 @@ def run() -> list[Record]:
         name = f"|y2| at {hertz} Hz, time integration, m"
         records.append(digits(case, name, amplitude, exact, SOURCE, good_to))
         if hertz in MEANS:
-            records.append(
-                digits(
-                    case, f"mean y2 at {hertz} Hz, time integration, m", mean, MEANS[hertz], SOURCE
-                )
-            )
+            records.append(digits(case, f"mean y2 at {hertz} Hz, time integration, m", mean, MEANS[hertz], SOURCE))
         for (order, samples), printed in zip(ORDERS, columns, strict=True):
             ours = abs(y2(problem, f, order, samples))
-            records.append(
-                digits(case, f"|y2| at {hertz} Hz, H = {order}, m", ours, printed, SOURCE)
-            )
+            records.append(digits(case, f"|y2| at {hertz} Hz, H = {order}, m", ours, printed, SOURCE))
     for order, traction, amplitude, at in PEAKS:
         records += peak_records(case, order, traction, amplitude, at)
     # a stuck mean depends on the start; the source's is that of tangential forces which are zero at rest

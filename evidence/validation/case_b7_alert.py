@@ -39,9 +39,7 @@ HARDER = (  # force factor 1.5: Hz, predicted %, real %
 )
 
 
-def both_passages(
-    hertz: float, factor: float = 1.0
-) -> tuple[ForcedProblem, ForcedPoint, ForcedPoint]:
+def both_passages(hertz: float, factor: float = 1.0) -> tuple[ForcedProblem, ForcedPoint, ForcedPoint]:
     """Solve at H = 1 and repeat at H = 5 whatever the alert says."""
     problem, load = blades_and_damper(excitation=factor)
     sweep = Sweep(
@@ -55,9 +53,7 @@ def both_passages(
     )
     points = list(forced_response(problem, load, sweep))
     last = max(p.index for p in points)
-    low, high = (
-        next(p for p in points if p.stage == stage and p.index == last) for stage in ("low", "high")
-    )
+    low, high = (next(p for p in points if p.stage == stage and p.index == last) for stage in ("low", "high"))
     return forced_problem(problem, load, sweep), low, high
 
 
@@ -82,10 +78,7 @@ def two_forms(hertz: float) -> float:
 def crossing() -> list[ForcedPoint]:
     """Follow the branch of H = 1 from 221 to 229 Hz by arc length."""
     sweep = Sweep(
-        omega_range=(2 * np.pi * 221, 2 * np.pi * 229),
-        selection="always_low",
-        peak_points=0,
-        evaluator="intervals",
+        omega_range=(2 * np.pi * 221, 2 * np.pi * 229), selection="always_low", peak_points=0, evaluator="intervals"
     )
     return accepted_points(list(forced_response(*blades_and_damper(), sweep)))
 
@@ -106,20 +99,8 @@ def run() -> list[Record]:
         records += [
             digits(case, f"|y2| at {hertz} Hz, H = 1, m", problem.amplitude(low), first, SOURCE),
             digits(case, f"|y2| at {hertz} Hz, H = 5, m", problem.amplitude(high), fifth, SOURCE),
-            digits(
-                case,
-                f"predicted error at {hertz} Hz, %{note}",
-                100 * low.predicted_error,
-                predicted,
-                SOURCE,
-            ),
-            digits(
-                case,
-                f"real error at {hertz} Hz, %{note}",
-                100 * real_error(problem, low, high),
-                real,
-                SOURCE,
-            ),
+            digits(case, f"predicted error at {hertz} Hz, %{note}", 100 * low.predicted_error, predicted, SOURCE),
+            digits(case, f"real error at {hertz} Hz, %{note}", 100 * real_error(problem, low, high), real, SOURCE),
         ]
     for hertz, predicted, real in HARDER:
         problem, low, high = both_passages(float(hertz), 1.5)
@@ -129,13 +110,7 @@ def run() -> list[Record]:
             digits(case, f"real error {at}", 100 * real_error(problem, low, high), real, SOURCE),
         ]
     records += [
-        bound(
-            case,
-            f"eq. 21 against the Newton form at {hertz} Hz",
-            two_forms(float(hertz)),
-            1e-10,
-            SOURCE,
-        )
+        bound(case, f"eq. 21 against the Newton form at {hertz} Hz", two_forms(float(hertz)), 1e-10, SOURCE)
         for hertz in (160, 162, 163, 220)
     ]
     points = crossing()
@@ -149,12 +124,7 @@ def run() -> list[Record]:
             SOURCE,
         ),
         record(
-            case,
-            "end of the branch followed through the gap, Hz",
-            points[-1].omega / 2 / np.pi,
-            229.0,
-            1e-12,
-            SOURCE,
+            case, "end of the branch followed through the gap, Hz", points[-1].omega / 2 / np.pi, 229.0, 1e-12, SOURCE
         ),
     ]
     return records

@@ -44,20 +44,14 @@ def run() -> list[Record]:
             digits(case, f"largest over smallest |y2| at {hertz} Hz", high / low, ratio, SOURCE),
         ]
         records += [
-            digits(
-                case, f"|y2| at {hertz} Hz with starts {pair}, m", amplitudes[pair], text, SOURCE
-            )
+            digits(case, f"|y2| at {hertz} Hz with starts {pair}, m", amplitudes[pair], text, SOURCE)
             for pair, text in ((at_smallest, smallest), (at_largest, largest))
             if pair is not None
         ]
         if hertz == "158":
             means = [value[1] for value in found.values()]
             records += [
-                digits(
-                    case, "smallest mean of y2 at 158 Hz, m", np.min(means), MEANS_158[0], SOURCE
-                ),
-                digits(
-                    case, "largest mean of y2 at 158 Hz, m", np.max(means), MEANS_158[1], SOURCE
-                ),
+                digits(case, "smallest mean of y2 at 158 Hz, m", np.min(means), MEANS_158[0], SOURCE),
+                digits(case, "largest mean of y2 at 158 Hz, m", np.max(means), MEANS_158[1], SOURCE),
             ]
     return records

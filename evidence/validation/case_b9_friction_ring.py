@@ -25,9 +25,7 @@ from stickslip.solve.newton_method import Newton, newton
 SOURCE = "literature benchmark B9"
 CASE = "B9 blisk with friction ring"
 SECTORS, ORDER, STIFFNESS = 24, 2, 2e7
-RETENTION = (
-    1.0  # N/m a piece of the ring: where all of it slips, nothing else decides its mean position
-)
+RETENTION = 1.0  # N/m a piece of the ring: where all of it slips, nothing else decides its mean position
 FREQUENCIES = {
     0: ("88.263744", "249.311652", "619.343305"),
     1: ("169.344130", "335.565379", "619.820217"),
@@ -62,7 +60,9 @@ def damped_wheel() -> Structure:
     """Return the wheel with its ring; the modes of the blisk alone are damped by 0.1 %."""
     blisk = wheel(blisk_with_ring(SECTORS, ring=None))
     both = wheel(blisk_with_ring(SECTORS))
-    blades = np.concatenate([both.sets[f"sector{n}.{part}"] for n in range(SECTORS) for part in ("disk", "root", "tip")])  # fmt: skip
+    blades = np.concatenate(
+        [both.sets[f"sector{n}.{part}"] for n in range(SECTORS) for part in ("disk", "root", "tip")]
+    )
     damping = np.zeros((both.n, both.n))
     damping[np.ix_(blades, blades)] = modal_damping(blisk, 1e-3).damping.toarray()
     stiffness = both.stiffness.toarray()
@@ -112,5 +112,5 @@ def run() -> list[Record]:
             name = f"limit 4 N, {hertz} Hz, H = {order}: tip, m"
             records.append(record(CASE, name, ours[0], theirs, SEVERAL, SOURCE))
             spread = float(np.ptp(ours) / ours[0])
-            records.append(bound(CASE, f"{hertz} Hz, H = {order}: spread of the blades", spread, 1e-6, SOURCE))  # fmt: skip
+            records.append(bound(CASE, f"{hertz} Hz, H = {order}: spread of the blades", spread, 1e-6, SOURCE))
     return records

@@ -46,7 +46,7 @@ def backbone(drawn: Drawn) -> Backbone:
     outputs = drawn.system.outputs
     dof = int(outputs[int(np.argmax(np.abs(mode.shape[outputs])))])
     still = HarmonicLoad(drawn.load.static)
-    return nonlinear_mode(drawn.system, still, mode, dof, Discretisation(order=5), ModeSweep(to_gross_slip=True))  # fmt: skip
+    return nonlinear_mode(drawn.system, still, mode, dof, Discretisation(order=5), ModeSweep(to_gross_slip=True))
 
 
 def ended(number: int) -> tuple[str, str]:

@@ -32,7 +32,7 @@ def absorber() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return masses, damping and stiffness matrices, and the cubic coefficients of ground and absorber."""
     e = MASS_RATIO
     root = np.sqrt(4 + 3 * e)
-    k = 8 * e * (16 + 23 * e + 9 * e**2 + 2 * (2 + e) * root) / (3 * (1 + e) ** 2 * (64 + 80 * e + 27 * e**2))  # fmt: skip
+    k = 8 * e * (16 + 23 * e + 9 * e**2 + 2 * (2 + e) * root) / (3 * (1 + e) ** 2 * (64 + 80 * e + 27 * e**2))
     c = 0.5 * np.sqrt(k * e * (8 + 9 * e - 4 * root) / (1 + e))
     mass = np.array([1.0, e])
     damping = np.array([[0.002 + c, -c], [-c, c]])
@@ -47,7 +47,7 @@ def located() -> tuple[Bifurcation, ...]:
     gaps = np.zeros((6, 2))
     gaps[0], gaps[3] = (1.0, 0.0), (1.0, -1.0)
     springs = tuple(ss.CubicSpring(cubic_t=float(value)) for value in cubic)
-    system = ss.System(structure, ss.Interface(("ground", "absorber"), springs, gaps), structure.sets["primary"])  # fmt: skip
+    system = ss.System(structure, ss.Interface(("ground", "absorber"), springs, gaps), structure.sets["primary"])
     load = ss.HarmonicLoad(np.zeros(2), {1: np.array([FORCE, 0.0j])})
     sweep = ss.Sweep(omega_range=(0.9, 1.4), low=7, high=7, selection="always_high", points=30)
     problem = ss.response.forced_problem(system, load, sweep)
@@ -55,7 +55,7 @@ def located() -> tuple[Bifurcation, ...]:
     return bifurcations(problem, points).found
 
 
-Equations = tuple[FloatArray, FloatArray, FloatArray, Callable[[FloatArray], tuple[FloatArray, FloatArray]], FloatArray]  # fmt: skip
+Equations = tuple[FloatArray, FloatArray, FloatArray, Callable[[FloatArray], tuple[FloatArray, FloatArray]], FloatArray]
 
 
 def absorber_equations() -> Equations:
@@ -76,7 +76,7 @@ def ring_equations() -> Equations:
     turn = np.roll(np.eye(SECTORS), 1, axis=0)
     stiffness = np.eye(SECTORS) + COUPLING * (2 * np.eye(SECTORS) - turn - turn.T)
     load = DRIVE * (-1.0) ** np.arange(SECTORS)
-    return np.ones(SECTORS), 0.02 * np.eye(SECTORS), stiffness, lambda x: (x**3, np.diag(3 * x**2)), load  # fmt: skip
+    return np.ones(SECTORS), 0.02 * np.eye(SECTORS), stiffness, lambda x: (x**3, np.diag(3 * x**2)), load
 
 
 def flow(equations: Equations, omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -87,19 +87,21 @@ def flow(equations: Equations, omega: float, state: FloatArray) -> tuple[FloatAr
     def rate(t: float, y: FloatArray) -> FloatArray:
         x, v = y[:n], y[n : 2 * n]
         own, slope = force(x)
-        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-(stiffness + slope) / mass[:, None], -damping / mass[:, None]]])  # fmt: skip
+        matrix = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-(stiffness + slope) / mass[:, None], -damping / mass[:, None]]]
+        )
         motion = np.append(v, (load * np.cos(omega * t) - damping @ v - stiffness @ x - own) / mass)
         return np.append(motion, matrix @ y[2 * n :].reshape(2 * n, 2 * n))
 
     y = np.append(state, np.eye(2 * n))
-    end = scipy.integrate.solve_ivp(rate, (0.0, 2 * np.pi / omega), y, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]  # fmt: skip
+    end = scipy.integrate.solve_ivp(rate, (0.0, 2 * np.pi / omega), y, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
     return end[: 2 * n], end[2 * n :].reshape(2 * n, 2 * n)
 
 
 def state_of(coefficients: ComplexArray, omega: float) -> FloatArray:
     """Return displacements and velocities at t = 0."""
     h = np.arange(len(coefficients))[:, None]
-    return np.concatenate([coefficients.real.sum(axis=0), (1j * h * omega * coefficients).real.sum(axis=0)])  # fmt: skip
+    return np.concatenate([coefficients.real.sum(axis=0), (1j * h * omega * coefficients).real.sum(axis=0)])
 
 
 def shot(equations: Equations, omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -158,31 +160,38 @@ def of_ring() -> list[Record]:
     equations = ring_equations()
     problem, lost = ring()
     against = (-1.0) ** np.arange(SECTORS)
-    alike = lost.point.coefficients * against[None, :] ** np.arange(len(lost.point.coefficients))[:, None]  # fmt: skip
+    alike = lost.point.coefficients * against[None, :] ** np.arange(len(lost.point.coefficients))[:, None]
     root = crossing(equations, lost.omega, state_of(alike, lost.omega))
-    records = [record(case, "symmetry lost, frequency in rad/s", lost.omega, root, max(lost.omega_error / lost.omega, SMALLEST), SOURCE)]  # fmt: skip
+    records = [
+        record(
+            case,
+            "symmetry lost, frequency in rad/s",
+            lost.omega,
+            root,
+            max(lost.omega_error / lost.omega, SMALLEST),
+            SOURCE,
+        )
+    ]
     for branch in side_branches(problem, lost, points=30):
         point = max(branch.points, key=branch.localisation)
         start = state_of(point.coefficients, point.omega)
         state, _ = shot(equations, point.omega, start)
         share = f"{100 * branch.localisation(point):.0f} % in one sector"
         off = float(np.abs(state - start).max() / np.abs(state).max())
-        records.append(record(case, f"state at t = 0 of a localised motion, {share}, relative", 1.0 + off, 1.0, CLOSE, SOURCE))  # fmt: skip
+        records.append(
+            record(case, f"state at t = 0 of a localised motion, {share}, relative", 1.0 + off, 1.0, CLOSE, SOURCE)
+        )
     return records
 
 
 def doublings(force: float) -> list[float]:
     """Return the frequencies of the load at which the motion in one well doubles its period, and then again."""
     structure = ss.model.lumped(np.ones(1), np.ones((1, 1)), np.array([[0.3]]), ("mass",))
-    well = ss.PolynomialSpring(
-        along_t=(1.0, 3.0, 1.0)
-    )  # with the structure's spring: -x + x^3 about x = 1
+    well = ss.PolynomialSpring(along_t=(1.0, 3.0, 1.0))  # with the structure's spring: -x + x^3 about x = 1
     spring = ss.Interface(("well",), (well,), np.array([[1.0], [0.0], [0.0]]))
     system = ss.System(structure, spring, np.array([0]))
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
-    sweep = ss.Sweep(
-        omega_range=(1.1, 1.5), low=8, high=8, selection="always_high", points=12, direction="down"
-    )
+    sweep = ss.Sweep(omega_range=(1.1, 1.5), low=8, high=8, selection="always_high", points=12, direction="down")
     problem = ss.response.forced_problem(system, load, sweep)
     points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     found: list[float] = []
@@ -201,8 +210,10 @@ def periods_in_time(force: float) -> int:
         return np.array([v, force * np.cos(WELL_OMEGA * t) - 0.3 * v + x - x**3])
 
     at = 2 * np.pi / WELL_OMEGA * np.arange(SETTLED + 17)
-    course = scipy.integrate.solve_ivp(rate, (0.0, at[-1]), [1.0, 0.0], "DOP853", rtol=1e-9, atol=1e-11, t_eval=at).y[0, SETTLED:]  # fmt: skip
-    return next(p for p in (1, 2, 4, 8, 0) if p == 0 or np.abs(course[p:] - course[:-p]).max() < 1e-4)  # fmt: skip
+    course = scipy.integrate.solve_ivp(rate, (0.0, at[-1]), [1.0, 0.0], "DOP853", rtol=1e-9, atol=1e-11, t_eval=at).y[
+        0, SETTLED:
+    ]
+    return next(p for p in (1, 2, 4, 8, 0) if p == 0 or np.abs(course[p:] - course[:-p]).max() < 1e-4)
 
 
 def of_wells() -> list[Record]:

@@ -71,18 +71,13 @@ def stuck(mesh: SolidMesh) -> SolidMesh:
     return replace(mesh, node_sets=sets)
 
 
-def our_frequencies(
-    solid: RotatingSolid, wheel: Wheel, speed: float
-) -> tuple[dict[int, FloatArray], FloatArray]:
+def our_frequencies(solid: RotatingSolid, wheel: Wheel, speed: float) -> tuple[dict[int, FloatArray], FloatArray]:
     """Return nodal diameter -> frequencies in Hz, and the static displacement (nodes, 3)."""
     tie = cyclic_sector(solid.structure, wheel.sectors, axis=wheel.axis).tie
     structure = solid.at_speed(speed, tie=tie) if speed else solid.structure
     sector = cyclic_sector(structure, wheel.sectors, axis=wheel.axis)
     low, high = wheel.nodal_diameters
-    found = {
-        k: natural_frequencies(travelling_wave(sector, k), wheel.n_modes)
-        for k in range(low, high + 1)
-    }
+    found = {k: natural_frequencies(travelling_wave(sector, k), wheel.n_modes) for k in range(low, high + 1)}
     static = np.zeros_like(wheel.mesh.points)
     if speed:
         static[solid.free] = solid.displacement(speed, tie=tie).reshape(-1, 3)
@@ -102,16 +97,14 @@ def compare_wheel(wheel: Wheel, folder: Path) -> list[Record]:
         ours, static = our_frequencies(solid, wheel, speed)
         for k, values in ours.items():
             worst = int(np.argmax(np.abs(values / theirs[k] - 1)))
-            quantity = (
-                f"{where}, nodal diameter {k}, mode {worst + 1} (the worst of {len(values)}), Hz"
-            )
+            quantity = f"{where}, nodal diameter {k}, mode {worst + 1} (the worst of {len(values)}), Hz"
             records.append(record(case, quantity, values[worst], theirs[k][worst], DIGITS, SOURCE))
         if speed:
             reference = displacements(printed)
             off = np.abs(static - reference).max() / np.abs(reference).max()
             records.append(
                 bound(case, "largest difference of the static displacement over its largest", off, DIGITS, SOURCE)
-            )  # fmt: skip
+            )
     return records
 
 
@@ -126,14 +119,18 @@ def compare_matrices(wheel: Wheel, folder: Path) -> list[Record]:
         theirs = read_calculix_matrices(deck.with_suffix(".sti"), units=Units.si())
         ours = solid.at_speed(speed) if speed else solid.structure
         # equations are numbered otherwise: sort both by node and component
-        us, them = (
-            np.lexsort([[str(c) for c in s.dofs.component], s.dofs.node]) for s in (ours, theirs)
-        )
+        us, them = (np.lexsort([[str(c) for c in s.dofs.component], s.dofs.node]) for s in (ours, theirs))
         for name in ("mass", "stiffness"):
             off = difference(getattr(ours, name)[us][:, us], getattr(theirs, name)[them][:, them])
             records.append(
-                bound(case, f"{name} {where}: Frobenius norm of the difference over that of the matrix", off, MATRIX_DIGITS, SOURCE)
-            )  # fmt: skip
+                bound(
+                    case,
+                    f"{name} {where}: Frobenius norm of the difference over that of the matrix",
+                    off,
+                    MATRIX_DIGITS,
+                    SOURCE,
+                )
+            )
     return records
 
 

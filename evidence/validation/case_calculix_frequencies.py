@@ -35,9 +35,7 @@ def run() -> list[Record]:
     case = f"24 blades, {name} mesh"
     solid, still = sector.solid, plain_tie(sector, 0)
     off = static_difference(sector, still)
-    records = [
-        bound(case, "static displacement at 8000 rpm: largest difference over its largest", off, DIGITS, SOURCE)
-    ]  # fmt: skip
+    records = [bound(case, "static displacement at 8000 rpm: largest difference over its largest", off, DIGITS, SOURCE)]
     states = {
         "free": ("at rest", solid.structure),
         "prestressed_8000rpm": ("at 8000 rpm", solid.at_speed(sector.speed, tie=still)),
@@ -46,9 +44,7 @@ def run() -> list[Record]:
         where, structure = states[kind]
         ours = lowest_frequencies(structure, plain_tie(sector, diameter), len(theirs))
         worst = int(np.argmax(np.abs(ours / theirs - 1)))
-        quantity = (
-            f"{where}, nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
-        )
+        quantity = f"{where}, nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
         records.append(record(case, quantity, ours[worst], theirs[worst], DIGITS, SOURCE))
     if has_complete():
         records += coriolis(name, sector)
@@ -57,13 +53,10 @@ def run() -> list[Record]:
 
 def coriolis(name: str, sector: StoredSector) -> list[Record]:
     """Compare how Coriolis terms change the frequencies of one untied sector."""
-    with (
-        folder("calculix", complete=True) / "n24_coriolis_one_sector_frequencies.csv"
-    ).open() as file:
+    with (folder("calculix", complete=True) / "n24_coriolis_one_sector_frequencies.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["mesh"] == name]
     without, with_terms = (
-        np.array([float(row["frequency_hz"]) for row in rows if row["coriolis"] == word])
-        for word in ("no", "yes")
+        np.array([float(row["frequency_hz"]) for row in rows if row["coriolis"] == word]) for word in ("no", "yes")
     )
     theirs = with_terms - without[: len(with_terms)]
     turning = sector.solid.at_speed(sector.speed, coriolis=True)
@@ -75,7 +68,7 @@ def coriolis(name: str, sector: StoredSector) -> list[Record]:
         record(case, f"at 8000 rpm, change of mode {i + 1} by Coriolis terms, Hz", ours[i], theirs[i], CHANGE, SOURCE)
         for i in range(10)
         if abs(theirs[i]) > LARGE
-    ]  # fmt: skip
+    ]
 
 
 def damped_frequencies(squares: FloatArray, damping: FloatArray) -> FloatArray:

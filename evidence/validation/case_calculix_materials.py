@@ -50,10 +50,7 @@ def write_decks(folder: Path) -> dict[str, Path]:
     mesh = read_deck(source).mesh
     middle = mesh.points[mesh.cells].mean(axis=1)
     blade = np.hypot(middle[:, 0], middle[:, 1]) > BLADE
-    cells = {
-        "STEEL": mesh.cell_numbers[~blade].tolist(),
-        "TITANIUM": mesh.cell_numbers[blade].tolist(),
-    }
+    cells = {"STEEL": mesh.cell_numbers[~blade].tolist(), "TITANIUM": mesh.cell_numbers[blade].tolist()}
     text = edited(read_text(source), cells)
     static, modal = text.index("*STEP"), text.index("*STEP, PERTURBATION")
     decks = {"at 8000 rpm": folder / "speed.inp", "at rest": folder / "rest.inp"}
@@ -66,9 +63,7 @@ def our_solid(deck: Deck) -> RotatingSolid:
     """Assemble what the deck says, supports of single directions included."""
     materials = [deck.materials[name] for name in deck.cell_material]
     assert len(set(materials)) == 2
-    return rotating_solid(
-        deck.mesh, materials, deck.axis, held=deck.held, quadrature=Quadrature.calculix()
-    )
+    return rotating_solid(deck.mesh, materials, deck.axis, held=deck.held, quadrature=Quadrature.calculix())
 
 
 def run() -> list[Record]:
@@ -88,7 +83,7 @@ def run() -> list[Record]:
     off = np.abs(static - reference).max() / np.abs(reference).max()
     records.append(
         bound(CASE, "static displacement at 8000 rpm: largest difference over its largest", off, DIGITS, SOURCE)
-    )  # fmt: skip
+    )
     states = {"at rest": solid.structure, "at 8000 rpm": solid.at_speed(deck.speed, tie=tie)}
     for where, structure in states.items():
         sector = cyclic_sector(structure, 24, axis=deck.axis)

@@ -14,13 +14,7 @@ from evidence.validation.reference_data import chain_mode, has_complete
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.branch import Followed, Judged
-from stickslip.response.nonlinear_modes.backbone import (
-    Backbone,
-    ModePoint,
-    ModeSweep,
-    mode_point,
-    nonlinear_mode,
-)
+from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, mode_point, nonlinear_mode
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.nonlinear_modes.measure import by_energy
 from stickslip.response.parameter import Discretisation
@@ -154,14 +148,12 @@ def run() -> list[Record]:
     fine = ours(FINE)
     away = distances(rows[:, [0, 2, 4]], fine)
     theirs = folds(rows[:, 0])
-    plain, close = (
-        folds(np.array([plane(p)[0] for p in f.solutions])) for f in (ours(PLAIN), fine)
-    )
+    plain, close = (folds(np.array([plane(p)[0] for p in f.solutions])) for f in (ours(PLAIN), fine))
     records = [
         bound(CASE, f"largest distance of {len(rows)} rows", float(away.max()), LARGEST, SOURCE),
         bound(CASE, "median distance", float(np.median(away)), 5e-5, SOURCE),
         record(CASE, f"folds with {PLAIN} points asked for", len(plain), len(theirs), 0.0, SOURCE),
-    ]  # fmt: skip
+    ]
     return records + [
         record(CASE, f"log10 a of fold {i + 1}", float(one), float(other), 2e-3, SOURCE)
         for i, (one, other) in enumerate(zip(close, theirs, strict=True))

@@ -4,20 +4,10 @@ import numpy as np
 
 from evidence.models.lumped import force_at, small_chain
 from evidence.validation.compare import Record, digits, record
-from stickslip.response.forced.response import (
-    Sweep,
-    accepted_points,
-    forced_problem,
-    forced_response,
-)
+from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 
 SOURCE = "chain README, case small"
-PEAKS = (
-    (1.0, "9.6", None),
-    (3.0, "9.54", None),
-    (12.0, "8.36", None),
-    (24.0, "7.68", "0.60"),
-)  # F, rad/s, amplitude
+PEAKS = ((1.0, "9.6", None), (3.0, "9.54", None), (12.0, "8.36", None), (24.0, "7.68", "0.60"))  # F, rad/s, amplitude
 
 
 def curve(force: float) -> tuple[float, float, float]:
@@ -50,7 +40,5 @@ def run() -> list[Record]:
             record(case, f"share of converged points at F = {force:g}", share, 1.0, 0.0, SOURCE),
         ]
         if height is not None:
-            records.append(
-                digits(case, f"peak amplitude at F = {force:g}", amplitude, height, SOURCE)
-            )
+            records.append(digits(case, f"peak amplitude at F = {force:g}", amplitude, height, SOURCE))
     return records

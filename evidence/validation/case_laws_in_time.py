@@ -25,11 +25,16 @@ def judged(law: ContactLaw) -> ComplexArray:
     system, load = on_one_contact(law)
     coarse, fine = (
         integrate(
-            system.structure, system.interface.gap_operator, system.interface.laws, load, OMEGA, np.arange(3),
+            system.structure,
+            system.interface.gap_operator,
+            system.interface.laws,
+            load,
+            OMEGA,
+            np.arange(3),
             stepping=TimeStepping(steps_per_period=steps, tolerance=TOLERANCE),
         ).harmonics
         for steps in (STEPS, 2 * STEPS)
-    )  # fmt: skip
+    )
     return np.asarray(fine + (fine - coarse) / 3.0)
 
 
@@ -44,9 +49,14 @@ def marched(law: ContactLaw) -> ComplexArray:
     """Return the harmonics of the integration over compiled laws."""
     system, load = on_one_contact(law)
     found = transient.integrate(
-        system.structure, system.interface.gap_operator, system.interface.laws, load, OMEGA, np.arange(3),
+        system.structure,
+        system.interface.gap_operator,
+        system.interface.laws,
+        load,
+        OMEGA,
+        np.arange(3),
         stepping=transient.TimeStepping(steps_per_period=STEPS, tolerance=TOLERANCE),
-    )  # fmt: skip
+    )
     return found.harmonics
 
 
@@ -62,7 +72,5 @@ def run() -> list[Record]:
         ):
             rows = min(len(found), len(truth))
             off = float(np.max(np.abs(found[:rows] - truth[:rows]))) / size
-            records.append(
-                bound(CASE, f"{name}: {what}, largest error of a harmonic", off, most, SOURCE)
-            )
+            records.append(bound(CASE, f"{name}: {what}, largest error of a harmonic", off, most, SOURCE))
     return records

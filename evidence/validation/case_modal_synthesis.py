@@ -73,12 +73,12 @@ def compared(rng: np.random.Generator) -> list[Compared]:
     system, load, mode = chain(rng)
     dof = int(system.outputs[0])
     try:
-        followed = nonlinear_mode(system, HarmonicLoad(load.static), mode, dof, HOW, ModeSweep(points=40))  # fmt: skip
+        followed = nonlinear_mode(system, HarmonicLoad(load.static), mode, dof, HOW, ModeSweep(points=40))
         own = modal_oscillator(refined(followed, load, HOW), load)
         levels = 2.0 * LEVELS * float(own.needed(np.array([own.begins]))[0])
         tops = [next((r for r in resonances(own, level) if r.top), None) for level in levels]
         low = 0.93 * min(r.omega for r in tops if r is not None)
-        direct = list(track_peak(system, load, "excitation", levels, (low, 1.05 * mode.omega), discretisation=HOW))  # fmt: skip
+        direct = list(track_peak(system, load, "excitation", levels, (low, 1.05 * mode.omega), discretisation=HOW))
     except InputError:  # nothing slips in this mode, or the range of the sweep holds no peak
         return []
     others, found = other_modes(own), []
@@ -107,16 +107,27 @@ def swept() -> list[Record]:
     structure = lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), 0.01 * np.eye(2))
     system = System(structure, contacts, np.array([1]))
     load = HarmonicLoad(np.zeros(2), {1: np.array([0.0, 0.02 + 0j])})
-    followed = nonlinear_mode(system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 1, HOW, ModeSweep(points=30))  # fmt: skip
+    followed = nonlinear_mode(
+        system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 1, HOW, ModeSweep(points=30)
+    )
     own = modal_oscillator(refined(followed, load, HOW), load)
     turn = np.exp(1j * np.outer(np.arange(HOW.order + 1), np.linspace(0.0, 2 * np.pi, 65)))
     found = []
     for level in (1.0, 3.0, 8.0):
         for seconds in (500.0, 2000.0):
-            passed = passage_through_resonance(own, level, Swept(ends=ENDS, rate=(ENDS[1] - ENDS[0]) / seconds))  # fmt: skip
+            passed = passage_through_resonance(own, level, Swept(ends=ENDS, rate=(ENDS[1] - ENDS[0]) / seconds))
             motion = own.displacement(passed.place)[:, :, 1] @ turn
             in_time = _in_small_steps(0.02 * level, seconds)
-            found.append(record(CASE, f"largest displacement, m, level {level:g} in {seconds:g} s", np.abs(motion.real).max(), in_time, WITHIN, "small steps in time"))  # fmt: skip
+            found.append(
+                record(
+                    CASE,
+                    f"largest displacement, m, level {level:g} in {seconds:g} s",
+                    np.abs(motion.real).max(),
+                    in_time,
+                    WITHIN,
+                    "small steps in time",
+                )
+            )
     return found
 
 
@@ -146,9 +157,16 @@ def run() -> list[Record]:
     return [
         bound(CASE, f"largest error of {len(trusted)} trusted peaks", max(trusted), WITHIN, SOURCE),
         bound(CASE, "the same where nothing slips", max(abs(c.error) for c in found if c.linear), 1e-3, SOURCE),
-        record(CASE, "refused peaks that are off by more than 2 %", sum(e > WITHIN for e in refused), len(refused), 0.4, SOURCE),
+        record(
+            CASE,
+            "refused peaks that are off by more than 2 %",
+            sum(e > WITHIN for e in refused),
+            len(refused),
+            0.4,
+            SOURCE,
+        ),
         *swept(),
-    ]  # fmt: skip
+    ]
 
 
 def main() -> None:
@@ -163,7 +181,9 @@ def main() -> None:
     for low, high in pairwise(edges):
         own = [abs(c.error) for c in found if low <= c.foreign < high and not c.linear]
         if own:
-            print(f"foretold {low:g} to {high:g}: {len(own)} peaks, {sum(e > WITHIN for e in own)} off by more than 2 %, median {np.median(own):.1e}, largest {max(own):.1e}")  # fmt: skip
+            print(
+                f"foretold {low:g} to {high:g}: {len(own)} peaks, {sum(e > WITHIN for e in own)} off by more than 2 %, median {np.median(own):.1e}, largest {max(own):.1e}"
+            )
 
 
 if __name__ == "__main__":

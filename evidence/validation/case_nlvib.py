@@ -36,9 +36,7 @@ def returns(case: NlvibCase) -> list[float]:
         x = row / case.balance.displacement_scale
         start = x + DISTURBANCE * np.max(np.abs(x)) * noise.uniform(-1, 1, x.size) * (np.abs(x) > 0)
         solution = newton(
-            lambda v, w=float(omega): case.balance.linearise(v, w),
-            start,
-            Newton(tolerance=1e-12, max_iterations=60),
+            lambda v, w=float(omega): case.balance.linearise(v, w), start, Newton(tolerance=1e-12, max_iterations=60)
         )
         gone = np.max(np.abs(solution.x - x)) / np.max(np.abs(x))
         found.append(float(gone) if solution.status.converged else np.inf)
@@ -54,19 +52,7 @@ def run() -> list[Record]:
         rows = len(case.omega)
         moved = returns(case)
         records += [
-            bound(
-                label,
-                f"largest residual over the force, {rows} rows",
-                max(residuals(case)),
-                1e-9,
-                source,
-            ),
-            bound(
-                label,
-                f"largest distance of the solution from the row, {len(moved)} rows",
-                max(moved),
-                1e-7,
-                source,
-            ),
+            bound(label, f"largest residual over the force, {rows} rows", max(residuals(case)), 1e-9, source),
+            bound(label, f"largest distance of the solution from the row, {len(moved)} rows", max(moved), 1e-7, source),
         ]
     return records

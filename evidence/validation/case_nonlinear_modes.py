@@ -85,15 +85,10 @@ class _Begun(ModeCurve):
 
 
 def at_modal_amplitudes(
-    system: System,
-    mode: StuckMode,
-    dof: int,
-    how: Discretisation,
-    wanted: list[float],
-    angle: float = 0.0,
+    system: System, mode: StuckMode, dof: int, how: Discretisation, wanted: list[float], angle: float = 0.0
 ) -> list[ModePoint]:
     """Return the motions of growing modal amplitudes, kg^0.5 m, whose period begins by an `angle` later."""
-    problem = self_excited_motions(system, HarmonicLoad(np.zeros(system.structure.n)), mode, dof, how)  # fmt: skip
+    problem = self_excited_motions(system, HarmonicLoad(np.zeros(system.structure.n)), mode, dof, how)
     curve = _Begun.of(problem, (1.0, 2.0), 1)
     object.__setattr__(curve, "angle", angle)
     share, near, found = float(np.log(abs(mode.shape[dof]))), [], []
@@ -101,7 +96,7 @@ def at_modal_amplitudes(
         p, shift = np.log(a) + share, 0.0
         for _ in range(30):
             solution = curve.fresh(0, p + shift, near, effort=1.0)
-            at = Followed("point", 0, 0, Point(solution.x, p + shift, np.zeros(0), 0.0, solution, 0.0), Judged(), 0.0)  # fmt: skip
+            at = Followed("point", 0, 0, Point(solution.x, p + shift, np.zeros(0), 0.0, solution, 0.0), Judged(), 0.0)
             made = mode_point(curve, at)
             off = float(np.log(made.modal_amplitude / a))
             shift, near = shift - off, [at]
@@ -127,9 +122,7 @@ def one_mass() -> list[Record]:
                 ours.append(float(abs(found.coefficients[3, 0])) / 0.2)
             names = ("w", "zeta", "third harmonic")
             records += [
-                digits(
-                    "B4 one mass", f"A = {row[0]:g} xc, H = {order}: {name}", own, str(row[c]), B4
-                )
+                digits("B4 one mass", f"A = {row[0]:g} xc, H = {order}: {name}", own, str(row[c]), B4)
                 for name, own, c in zip(names, ours, columns, strict=False)
             ]
     return records
@@ -198,7 +191,7 @@ def rub(order: int, samples: int, rows: tuple[tuple, ...], *, reduced: bool) -> 
                 nearest = float(np.clip(float(theirs), own.min(), own.max()))
                 records.append(digits("B10 beam", f"{place}: {name}", nearest, theirs, B10))
                 spread = float(np.ptp(own)) / float(theirs)
-                records.append(bound("B10 beam", f"{place}: {name}, spread of ours", spread, 1e-3, B10))  # fmt: skip
+                records.append(bound("B10 beam", f"{place}: {name}, spread of ours", spread, 1e-3, B10))
     return records
 
 

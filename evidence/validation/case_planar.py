@@ -17,7 +17,7 @@ from stickslip.harmonic.aft import ContactPeriod, contact_forces
 CASE = "planar friction against a judge"
 SOURCE = "evidence.judges.planar_contact"
 # of the motions: seed, least normal force as a share of its mean
-TABLE = ((0, 0.02), (1, 0.3), (2, 0.6), (3, 0.1), (4, 0.9), (5, -0.2), (6, -0.5), (7, -1.0), (8, -0.05), (9, -3.0))  # fmt: skip
+TABLE = ((0, 0.02), (1, 0.3), (2, 0.6), (3, 0.1), (4, 0.9), (5, -0.2), (6, -0.5), (7, -1.0), (8, -0.05), (9, -3.0))
 SAMPLES = 2 ** np.arange(7, 12)
 
 
@@ -31,9 +31,7 @@ def drawn(seed: int, least: float) -> tuple[FloatArray, float]:
     return gaps, float(gaps[0, 2] + swing / (1.0 - least))
 
 
-def evaluated(
-    gaps: FloatArray, preload: float, k_w: float | None, how: Evaluator, samples: int = 64
-) -> ContactPeriod:
+def evaluated(gaps: FloatArray, preload: float, k_w: float | None, how: Evaluator, samples: int = 64) -> ContactPeriod:
     """Evaluate one contact."""
     law = CoupledCoulomb(k_t=1.0, k_w=k_w, k_n=1.0, mu=0.5, preload=preload)
     return contact_forces(gaps, compile_contacts([law], evaluator=how), samples)
@@ -50,7 +48,7 @@ def run() -> list[Record]:
         off /= np.max(np.abs(truth.coefficients))
         states = "-".join([event[2] for event in truth.events]) or "no change"
         at = f"least N {least:g} of its mean: {states}"
-        records.append(bound(CASE, f"force at located events, {at}", off, 1e-8 if least > 0 else 1e-6, SOURCE))  # fmt: skip
+        records.append(bound(CASE, f"force at located events, {at}", off, 1e-8 if least > 0 else 1e-6, SOURCE))
     for k_w in (None, 0.4, 2.5):
         errors = np.zeros(SAMPLES.size)
         for seed, least in TABLE[1:8:3]:

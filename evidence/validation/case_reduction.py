@@ -59,22 +59,14 @@ def run() -> list[Record]:
     exact = exact_square()
     full = square(held(bar, N - 1))
     records = [record(CASE, "second squared frequency, 300 masses", full, exact, 1e-10, CLOSED)]
-    reductions: dict[str, Callable[..., Structure]] = {
-        "Craig-Bampton": craig_bampton,
-        "MacNeal-Rubin": rubin,
-    }
+    reductions: dict[str, Callable[..., Structure]] = {"Craig-Bampton": craig_bampton, "MacNeal-Rubin": rubin}
     for name, reduction in reductions.items():
         few, many = COUNTS[name]
-        errors = [
-            square(held(reduction(bar, np.array([N - 1]), count), 0)) / exact - 1
-            for count in (few, many)
-        ]
+        errors = [square(held(reduction(bar, np.array([N - 1]), count), 0)) / exact - 1 for count in (few, many)]
         slope = np.log(errors[1] / errors[0]) / np.log(many / few)
         records += [
             bound(CASE, f"{name}, {many} modes: relative error", errors[1], 1e-5, CLOSED),
-            record(
-                CASE, f"{name}: rate from {few} to {many} modes", slope, RATES[name], 0.05, CLOSED
-            ),
+            record(CASE, f"{name}: rate from {few} to {many} modes", slope, RATES[name], 0.05, CLOSED),
         ]
         reduced = held(reduction(bar, np.array([N - 1]), few), 0)
         stuck = held(bar, N - 1)

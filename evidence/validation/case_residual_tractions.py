@@ -62,9 +62,7 @@ def with_dashpots() -> tuple[System, HarmonicLoad]:
     return replace(made, structure=replace(made.structure, damping=damping)), load
 
 
-def random_motions(
-    made: System, load: HarmonicLoad, omega: float, count: int, random: np.random.Generator
-) -> Outcome:
+def random_motions(made: System, load: HarmonicLoad, omega: float, count: int, random: np.random.Generator) -> Outcome:
     """Integrate from random states until `count` motions are periodic."""
     setup = _setup(made, load, [omega], 0, HARMONICS)
     reference = setup.reference(omega, ())
@@ -84,17 +82,22 @@ def random_motions(
             orders = np.arange(len(motion))[:, None]
             displacement = motion.real.sum(axis=0) + ASIDE * displacement
             velocity = (1j * orders * motion).real.sum(axis=0) + ASIDE * velocity
-            period = setup.problem.at((near or reference).sliders).contacts((near or reference).x, omega)  # fmt: skip
+            period = setup.problem.at((near or reference).sliders).contacts((near or reference).x, omega)
             traction = period.force[:, :2, 0]
         else:
             displacement[5] += SIZE
             pressed = 3e5 * np.maximum(-(gaps @ displacement)[2::3], 0.0)
             traction[:, 0] = 0.5 * pressed * random.uniform(-1.0, 1.0, 2)
         run = integrate(
-            made.structure, gaps, laws, load, omega, made.outputs[:1],
+            made.structure,
+            gaps,
+            laws,
+            load,
+            omega,
+            made.outputs[:1],
             TransientStart(displacement, omega * velocity, traction),
             TimeStepping(steps_per_period=STEPS, max_periods=PERIODS),
-        )  # fmt: skip
+        )
         found.append(float(abs(run.average[0])))
         periodic.append(bool(run.scatter < PERIODIC))
     return Outcome(np.array(found), np.array(periodic))
@@ -117,7 +120,9 @@ def in_time_records(runs: int = RUNS) -> list[Record]:
     for hertz, bounds in zip(HERTZ, each, strict=True):
         outcome = random_motions(made, load, bounds.omega, runs // len(HERTZ), random)
         own = outcome.amplitude[outcome.periodic]
-        within += int(np.sum((own >= bounds.least.amplitude * (1 - GOOD_TO)) & (own <= bounds.most.amplitude * (1 + GOOD_TO))))  # fmt: skip
+        within += int(
+            np.sum((own >= bounds.least.amplitude * (1 - GOOD_TO)) & (own <= bounds.most.amplitude * (1 + GOOD_TO)))
+        )
         width = bounds.most.amplitude / bounds.least.amplitude - 1.0
         seen = own.max() / own.min() - 1.0
         print(
@@ -125,9 +130,15 @@ def in_time_records(runs: int = RUNS) -> list[Record]:
             f"{outcome.amplitude.size} motions periodic, {own.min():.5e} to {own.max():.5e} m ({100 * seen:.2g} %)"
         )
         records.append(
-            bound(CASE, f"{hertz:g} Hz: how far a periodic motion in time lies outside, relative", outside(bounds, outcome), GOOD_TO, JUDGE)
-        )  # fmt: skip
-    records.append(record(CASE, "periodic motions in time within the bounds", within, runs, 0.0, JUDGE))  # fmt: skip
+            bound(
+                CASE,
+                f"{hertz:g} Hz: how far a periodic motion in time lies outside, relative",
+                outside(bounds, outcome),
+                GOOD_TO,
+                JUDGE,
+            )
+        )
+    records.append(record(CASE, "periodic motions in time within the bounds", within, runs, 0.0, JUDGE))
     return records
 
 
@@ -137,16 +148,25 @@ def benchmark_records() -> list[Record]:
     records = []
     omegas = [HZ * float(row[0]) for row in TABLE]
     for row, found in zip(TABLE, traction_bounds(made, load, omegas, 0, ON_SAMPLES), strict=True):
-        records.append(digits(CASE, f"smallest |y2| at {row[0]} Hz, m", found.least.amplitude, row[1], B8))  # fmt: skip
+        records.append(digits(CASE, f"smallest |y2| at {row[0]} Hz, m", found.least.amplitude, row[1], B8))
         if row[0] == "215":  # the largest lies between the benchmark's starts
             off = max(1.0 - found.most.amplitude / float(row[3]), 0.0)
-            records.append(bound(CASE, "largest |y2| at 215 Hz: how far below the benchmark's, relative", off, 0.0, B8))  # fmt: skip
+            records.append(bound(CASE, "largest |y2| at 215 Hz: how far below the benchmark's, relative", off, 0.0, B8))
             continue
-        records.append(digits(CASE, f"largest |y2| at {row[0]} Hz, m", found.most.amplitude, row[3], B8))  # fmt: skip
+        records.append(digits(CASE, f"largest |y2| at {row[0]} Hz, m", found.most.amplitude, row[3], B8))
     (at,) = traction_bounds(made, load, [HZ * 164.0], 0, HARMONICS)
     for name, end in (("smallest", at.least), ("largest", at.most)):
         told = confirmed(made, load, at.omega, end, 0, HARMONICS)
-        records.append(record(CASE, f"{name} |y2| at 164 Hz, in time from its tractions, m", told.transient, end.amplitude, 3e-4, "time integration"))  # fmt: skip
+        records.append(
+            record(
+                CASE,
+                f"{name} |y2| at 164 Hz, in time from its tractions, m",
+                told.transient,
+                end.amplitude,
+                3e-4,
+                "time integration",
+            )
+        )
     return records
 
 

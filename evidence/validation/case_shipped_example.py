@@ -23,15 +23,13 @@ def run() -> list[Record]:
         data = result["forced_response"].load()
     records = []
     for i, label in enumerate(data.case_label.values):
-        own = np.flatnonzero((data.verify_case.values == i) & (data.verify_frequency_hz.values == data.peak_frequency_hz.values[i]))  # fmt: skip
-        balance, transient = (
-            float(data[name].values[own[-1]]) for name in ("verify_balance", "verify_transient")
+        own = np.flatnonzero(
+            (data.verify_case.values == i) & (data.verify_frequency_hz.values == data.peak_frequency_hz.values[i])
         )
+        balance, transient = (float(data[name].values[own[-1]]) for name in ("verify_balance", "verify_transient"))
         motion = str(data.verify_motion.values[own[-1]])
         case = ("trusted", "doubtful", "wrong")[int(data.case_verdict.values[i])]
         name = f"{label}, peak at {data.peak_frequency_hz.values[i]:.3f} Hz, {case}, motion in time {motion}, m"
         made = record(CASE, name, balance, transient, TOLERANCE, "time integration")
-        records.append(
-            {**made, "holds": bool(made["holds"] and motion == "attained") or case != "trusted"}
-        )
+        records.append({**made, "holds": bool(made["holds"] and motion == "attained") or case != "trusted"})
     return records

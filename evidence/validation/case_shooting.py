@@ -21,10 +21,7 @@ from stickslip.response.time.marcher import prepared
 from stickslip.response.time.period_map import period_map
 from stickslip.response.time.shooting import ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
-from stickslip.response.time.transient import (
-    TimeStepping,
-    integrate,
-)
+from stickslip.response.time.transient import TimeStepping, integrate
 
 CASE = "Shooting"
 HZ = 2 * np.pi
@@ -40,11 +37,7 @@ EXACT_STEPS = (32768, 65536)
 
 
 def shot(
-    system: System,
-    load: HarmonicLoad,
-    omega: float,
-    steps: int,
-    start: TransientStart | None = None,
+    system: System, load: HarmonicLoad, omega: float, steps: int, start: TransientStart | None = None
 ) -> ShootingResult:
     """Shoot, and insist on a result.
 
@@ -55,14 +48,7 @@ def shot(
     """
     interface, stepping = system.interface, TimeStepping(steps, tolerance=TIGHT)
     found = shoot(
-        system.plain_structure,
-        interface.gap_operator,
-        interface.laws,
-        load,
-        omega,
-        system.outputs,
-        start,
-        stepping,
+        system.plain_structure, interface.gap_operator, interface.laws, load, omega, system.outputs, start, stepping
     )
     if found.status not in {"converged", "coarse"}:  # the error of the step is what is measured
         raise RuntimeError(f"omega = {omega}: {found.status}, residual {found.residual:.1e}")
@@ -92,9 +78,7 @@ def step_errors(found: list[ShootingResult]) -> FloatArray:
     return np.array([np.max(np.abs(r.harmonics[1] - exact)) / size for r in found])
 
 
-def balance_start(
-    system: System, load: HarmonicLoad, hertz: float
-) -> tuple[TransientStart, ComplexArray]:
+def balance_start(system: System, load: HarmonicLoad, hertz: float) -> tuple[TransientStart, ComplexArray]:
     """Return the state at t = 0 of the balance with five harmonics, and its first harmonic of the outputs."""
     point = at_frequency(system, load, hertz, order=5)
     problem = forced_problem(system, load, Sweep(omega_range=(1.0, 2.0)))
@@ -112,12 +96,7 @@ def linear_records() -> list[Record]:
         at = f"B6 at {hertz:g} Hz, stuck"
         stuck = system.stuck_structure()
         inverse = np.linalg.inv(stuck.mass)
-        first_order = np.block(
-            [
-                [np.zeros((6, 6)), np.eye(6)],
-                [-inverse @ stuck.stiffness, -inverse @ stuck.damping],
-            ]
-        )
+        first_order = np.block([[np.zeros((6, 6)), np.eye(6)], [-inverse @ stuck.stiffness, -inverse @ stuck.damping]])
         exact = np.exp(scipy.linalg.eigvals(first_order) / hertz)
         left = list(found.floquet.multipliers)
         worst = 0.0
@@ -145,7 +124,7 @@ def griffin_records() -> list[Record]:
 
 def mean_error(
     system: System, load: HarmonicLoad, omega: float, begin: ShootingResult, exact: ComplexArray, steps: int
-) -> float:  # fmt: skip
+) -> float:
     """Return the root mean square error over neighbouring numbers of steps: where switches fall within one is a matter of chance."""
     counts = [round(steps * factor) for factor in BESIDE]
     found = [shot(system, load, omega, count, begin.final).harmonics[1] for count in counts]
@@ -154,16 +133,20 @@ def mean_error(
 
 
 def order_records(
-    name: str, system: System, load: HarmonicLoad, omega: float, found: list[ShootingResult], judged: ComplexArray,
-    *, slow: bool,
-) -> list[Record]:  # fmt: skip
+    name: str,
+    system: System,
+    load: HarmonicLoad,
+    omega: float,
+    found: list[ShootingResult],
+    judged: ComplexArray,
+    *,
+    slow: bool,
+) -> list[Record]:
     """Ask for second order where all contact springs are slow, and for an error an order below the difference that the integration judges."""
     errors = step_errors(found)
     steps = np.array([len(r.outputs) for r in found])
     exact = extrapolated(found)
-    coarse, fine = (
-        mean_error(system, load, omega, found[-1], exact, count) for count in (RESOLVED, FINER)
-    )
+    coarse, fine = (mean_error(system, load, omega, found[-1], exact, count) for count in (RESOLVED, FINER))
     judged_error = float(np.max(np.abs(judged - exact)) / np.max(np.abs(exact)))
     used = float(errors[list(steps).index(DEFAULT)])
     source = "values extrapolated to a vanishing step; errors " + ", ".join(
@@ -179,20 +162,21 @@ def order_records(
             bound(CASE, f"{name}: mean error at {RESOLVED} steps, {over}", coarse, 5e-4, source),
             bound(CASE, f"{name}: mean error at {FINER} steps, {over}", fine, 5e-5, source),
         ]
-    )  # fmt: skip
+    )
     return [
         *known,
         bound(CASE, f"{name}: error of the first harmonic at {DEFAULT} steps, all outputs", used, 1e-3, source),
         bound(
-            CASE, f"{name}: that error over the error of the balance with H = 5",
-            used / judged_error, 0.1, f"{source}; error of the balance {judged_error:.1e}",
+            CASE,
+            f"{name}: that error over the error of the balance with H = 5",
+            used / judged_error,
+            0.1,
+            f"{source}; error of the balance {judged_error:.1e}",
         ),
-    ]  # fmt: skip
+    ]
 
 
-def settled_records(
-    name: str, system: System, load: HarmonicLoad, omega: float, start: TransientStart
-) -> list[Record]:
+def settled_records(name: str, system: System, load: HarmonicLoad, omega: float, start: TransientStart) -> list[Record]:
     """Compare with the settled state of an integration from the same start, and begin at its end."""
     interface = system.interface
     arguments = (system.plain_structure, interface.gap_operator, interface.laws)
@@ -208,33 +192,34 @@ def settled_records(
     )
     return [
         bound(
-            CASE, f"{name}: first harmonic against integration, begun at its end",
-            np.max(np.abs(same.harmonics[1] - first)) / size, 1e-4, source,
+            CASE,
+            f"{name}: first harmonic against integration, begun at its end",
+            np.max(np.abs(same.harmonics[1] - first)) / size,
+            1e-4,
+            source,
         ),
         bound(
-            CASE, f"{name}: the same, both from one start (residual tractions may differ)",
-            np.max(np.abs(own.harmonics[1] - first)) / size, 2e-3, source,
+            CASE,
+            f"{name}: the same, both from one start (residual tractions may differ)",
+            np.max(np.abs(own.harmonics[1] - first)) / size,
+            2e-3,
+            source,
         ),
         bound(
-            CASE, f"{name}: periods of shooting over periods of integration",
-            own.periods / settled.periods, 0.2, source,
+            CASE, f"{name}: periods of shooting over periods of integration", own.periods / settled.periods, 0.2, source
         ),
         decay_record(name, system, load, omega, own),
-    ]  # fmt: skip
+    ]
 
 
-def decay_record(
-    name: str, system: System, load: HarmonicLoad, omega: float, found: ShootingResult
-) -> Record:
+def decay_record(name: str, system: System, load: HarmonicLoad, omega: float, found: ShootingResult) -> Record:
     """Compare the decay of a small disturbance over ten periods of integration with the largest multiplier.
 
     The disturbance is the mode of the largest multiplier that is not neutral, so that the others do not mix in. It is small enough to
     leave nearly all steps in their contact states.
     """
     interface, periods, small = system.interface, 10, 1e-6
-    marcher = prepared(
-        system.plain_structure, interface.gap_operator, interface.laws, load, omega, DEFAULT
-    )
+    marcher = prepared(system.plain_structure, interface.gap_operator, interface.laws, load, omega, DEFAULT)
     mapping, state = period_map(marcher, found.final)
     values, modes = np.linalg.eig(mapping.derivative(state).monodromy)
     chosen = int(np.argmin(np.abs(values - found.floquet.multipliers[found.floquet.neutral])))
@@ -246,9 +231,7 @@ def decay_record(
     expected = size * (values[chosen] ** periods * mode).real
     off = np.linalg.norm(disturbed - state - expected) / np.linalg.norm(expected)
     source = f"Floquet multiplier of modulus {abs(values[chosen]):.6f}"
-    return bound(
-        CASE, f"{name}: a disturbance after {periods} periods of integration", off, 0.02, source
-    )
+    return bound(CASE, f"{name}: a disturbance after {periods} periods of integration", off, 0.02, source)
 
 
 def run() -> list[Record]:
@@ -257,9 +240,7 @@ def run() -> list[Record]:
     (system, load), omega = blades_and_damper(), HZ * 163.0
     start, judged = balance_start(system, load, 163.0)
     found = refined(system, load, omega, start, STEPS)
-    records.append(
-        digits(CASE, "B6 at 163 Hz: |y2|, m", abs(extrapolated(found)[0]), "2.273072e-4", B6)
-    )
+    records.append(digits(CASE, "B6 at 163 Hz: |y2|, m", abs(extrapolated(found)[0]), "2.273072e-4", B6))
     records += order_records("B6 at 163 Hz", system, load, omega, found, judged, slow=True)
     still = rest(system.structure.n, system.interface.laws)
     records += settled_records("B6 at 163 Hz", system, load, omega, still)

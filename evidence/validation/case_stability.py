@@ -83,9 +83,7 @@ class Outcome:
     @property
     def shot_otherwise(self) -> bool:
         """Whether shooting has another verdict."""
-        return self.shot and (self.refined > 1 + UNIT_TOLERANCE) != (
-            self.shooting > 1 + UNIT_TOLERANCE
-        )
+        return self.shot and (self.refined > 1 + UNIT_TOLERANCE) != (self.shooting > 1 + UNIT_TOLERANCE)
 
 
 def distance(found: ComplexArray, expected: ComplexArray) -> float:
@@ -102,9 +100,7 @@ def distance(found: ComplexArray, expected: ComplexArray) -> float:
 
 def growth(multipliers: ComplexArray) -> float:
     """Return the largest modulus of those that are not neutral."""
-    return float(
-        np.max(np.abs(multipliers[np.abs(multipliers - 1.0) > UNIT_TOLERANCE]), initial=0.0)
-    )
+    return float(np.max(np.abs(multipliers[np.abs(multipliers - 1.0) > UNIT_TOLERANCE]), initial=0.0))
 
 
 def by_flow_map(motion: Motion) -> list[ComplexArray]:
@@ -137,9 +133,15 @@ def by_shooting(motion: Motion, point: ForcedPoint) -> tuple[ComplexArray, float
     found = []
     for steps in STEPS:
         shot = shoot(
-            system.plain_structure, interface.gap_operator, interface.laws, motion.load, point.omega,
-            system.outputs, start, TimeStepping(steps, max_periods=300, tolerance=1e-9),
-        )  # fmt: skip
+            system.plain_structure,
+            interface.gap_operator,
+            interface.laws,
+            motion.load,
+            point.omega,
+            system.outputs,
+            start,
+            TimeStepping(steps, max_periods=300, tolerance=1e-9),
+        )
         if not shot.converged:
             return None
         start = shot.final
@@ -169,11 +171,7 @@ def outcome(seed: int, number: int) -> Outcome:
     try:
         with at_most(2 * FLOW_SECONDS):
             theirs, again = by_flow_map(motion)
-        values |= {
-            "flow": growth(theirs),
-            "off_flow": distance(with_ones, theirs),
-            "judge": distance(again, theirs),
-        }
+        values |= {"flow": growth(theirs), "off_flow": distance(with_ones, theirs), "judge": distance(again, theirs)}
     except (OutOfTimeError, RuntimeError) as error:
         reason.append(f"flow map: {str(error) or 'too long'}")
     if motion.refined is not None:
@@ -196,9 +194,16 @@ def outcome(seed: int, number: int) -> Outcome:
                 "apart": shot[1],
             }
     return Outcome(
-        number, note, motion.system.structure.n, ours.transitions, ours.resting, ours.grazing, **values,
-        seconds=process_time() - began, reason="; ".join(reason),
-    )  # fmt: skip
+        number,
+        note,
+        motion.system.structure.n,
+        ours.transitions,
+        ours.resting,
+        ours.grazing,
+        **values,
+        seconds=process_time() - began,
+        reason="; ".join(reason),
+    )
 
 
 def table(outcomes: list[Outcome]) -> str:
@@ -246,7 +251,7 @@ def run() -> list[Record]:
     return [
         bound(CASE, f"multipliers of motion {o.number} ({o.note}), largest distance", o.off_flow, CLOSE, SOURCE)
         for o in flow
-    ] + [record(CASE, "other verdicts", sum(o.disagrees for o in flow), 0.0, 0.0, SOURCE)]  # fmt: skip
+    ] + [record(CASE, "other verdicts", sum(o.disagrees for o in flow), 0.0, 0.0, SOURCE)]
 
 
 if __name__ == "__main__":

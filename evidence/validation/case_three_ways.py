@@ -105,9 +105,15 @@ def by_shooting(motion: Motion, point: ForcedPoint) -> tuple[float, float] | Non
     interface = system.interface
     start = start_from_harmonics(amplitudes, point.omega, interface.gap_operator, interface.laws)
     shot = shoot(
-        system.plain_structure, interface.gap_operator, interface.laws, motion.load, point.omega,
-        system.outputs, start, TimeStepping(STEPS, max_periods=300, tolerance=1e-9),
-    )  # fmt: skip
+        system.plain_structure,
+        interface.gap_operator,
+        interface.laws,
+        motion.load,
+        point.omega,
+        system.outputs,
+        start,
+        TimeStepping(STEPS, max_periods=300, tolerance=1e-9),
+    )
     if not shot.converged:
         return None
     harmonics = shot.harmonics[: len(amplitudes)]
@@ -147,9 +153,15 @@ def outcome(seed: int, number: int) -> Outcome:
                 reason.append("Hill with 20 harmonics gave nothing")
     grazing = motion.found.grazing
     return Outcome(
-        number, f"{motion.family}, {motion.laws}", motion.system.structure.n, motion.found.transitions, grazing,
-        missing=missing, reason="; ".join(reason), **values,
-    )  # fmt: skip
+        number,
+        f"{motion.family}, {motion.laws}",
+        motion.system.structure.n,
+        motion.found.transitions,
+        grazing,
+        missing=missing,
+        reason="; ".join(reason),
+        **values,
+    )
 
 
 def table(outcomes: list[Outcome]) -> str:
@@ -190,7 +202,7 @@ def run() -> list[Record]:
     return [
         record(CASE, "verdicts of Hill's method unlike the monodromy's", sum(o.other for o in found), 0.0, 0.0, SOURCE),
         record(CASE, "verdicts of shooting unlike the others", sum(o.other_shot for o in found), 0.0, 0.0, SOURCE),
-    ]  # fmt: skip
+    ]
 
 
 if __name__ == "__main__":

@@ -24,11 +24,7 @@ CASE = "Two blades and a damper"
 FIVE = "Two blades and a damper, five harmonics"
 TOLERANCE = 0.01  # issue of the first release: first-harmonic amplitude at H = 5
 PERIODS = 300  # a blade damped by 0.3 % forgets its start: 2 % of what was off is left where the average begins
-ORDERS = (
-    15,
-    25,
-    41,
-)  # of the balance that tells which side is wrong, raised until its amplitude no longer changes
+ORDERS = (15, 25, 41)  # of the balance that tells which side is wrong, raised until its amplitude no longer changes
 UNCHANGED = 3e-3  # relative
 
 
@@ -46,9 +42,7 @@ def converged(question: Question, point: ForcedPoint) -> ForcedPoint | None:
     return found
 
 
-def compare(
-    question: Question, ratio: float, accepted: Accepted, where: str, level: Level
-) -> list[Record]:
+def compare(question: Question, ratio: float, accepted: Accepted, where: str, level: Level) -> list[Record]:
     """Compare the balance with many harmonics, and what a run accepts and judges with a level, with the integration."""
     problem, point, output = question.problem, accepted.point, question.model.peak_output
     many = converged(question, point)
@@ -66,16 +60,18 @@ def compare(
     at = f"F_CL/F_HE = {ratio:g}, {where}, {point.omega / HZ:.2f} Hz: first harmonic"
     own = problem.amplitude(point, output)
     known = problem.amplitude(many, output) if many else None
-    rows = [few_harmonics(f"{at}, H = {point.order}, {level}", own / reference - 1, known and own / known - 1, level, source)]  # fmt: skip
+    rows = [
+        few_harmonics(
+            f"{at}, H = {point.order}, {level}", own / reference - 1, known and own / known - 1, level, source
+        )
+    ]
     if many and known:
         name = f"{at}, H = {many.order}, m"
         rows.append(record(CASE, name, known, reference, TOLERANCE, source))
     return rows
 
 
-def few_harmonics(
-    name: str, error: float, stated: float | None, level: Level, source: str
-) -> Record:
+def few_harmonics(name: str, error: float, stated: float | None, level: Level, source: str) -> Record:
     """Ask that an error is the one that more harmonics state, None where these find no solution, and that a large one is not trusted."""
     told = "none found with more" if stated is None else f"{stated:+.2%} stated by more"
     quantity = f"{name}: relative error, {told}"
@@ -91,8 +87,7 @@ def places(response: Response) -> list[tuple[str, Accepted]]:
     if response.top is None:
         return []
     named = [
-        ("below the peak" if a.point.omega < response.top.point.omega else "above the peak", a)
-        for a in response.flanks
+        ("below the peak" if a.point.omega < response.top.point.omega else "above the peak", a) for a in response.flanks
     ]
     return [("peak", response.top), *named]
 

@@ -7,9 +7,7 @@ Record = dict[str, Any]
 ROUNDING = 1e-12  # of the reference, added to half a unit of its last digit: both sides are binary fractions
 
 
-def record(
-    case: str, quantity: str, ours: float, reference: float, tolerance: float, source: str
-) -> Record:
+def record(case: str, quantity: str, ours: float, reference: float, tolerance: float, source: str) -> Record:
     """Compare relative to the reference; absolutely where the reference is zero, which the quantity then says."""
     ours, reference = float(ours), float(reference)
     if reference == 0.0:
@@ -32,9 +30,7 @@ def left_out(case: str, reason: str, source: str) -> Record:
     return {**record(case, reason, 0.0, 0.0, 0.0, source), "quantity": reason, "holds": "left out"}
 
 
-def digits(
-    case: str, quantity: str, ours: float, printed: str, source: str, least: float = 0.0
-) -> Record:
+def digits(case: str, quantity: str, ours: float, printed: str, source: str, least: float = 0.0) -> Record:
     """Compare with a reference as it is printed: half a unit of its last digit is the tolerance, or `least` if that is more.
 
     `least` is relative: what the reference is good to where that is less than its digits promise.

@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent / "out"
 
 def go_on(
     name: str, doc: str | None, kind: Callable[..., T], judge: Callable[[int, int], T], table: Callable[[list[T]], str]
-) -> None:  # fmt: skip
+) -> None:
     """Judge motions of a seed until there are so many, or the time is up; print the table.
 
     Parameters

@@ -34,9 +34,16 @@ OUT = Path(__file__).parent / "out"
 PAGE = ROOT / "docs" / "validation_run.md"
 # comparisons with time integration and with many more harmonics, which take the longest
 IN_TIME = (
-    "case_b3_blade_with_damper", "case_b6_blade_damper_blade", "case_few_harmonics", "case_laws_in_time", "case_shipped_example",
-    "case_shooting", "case_stability", "case_three_ways", "case_two_blades",
-)  # fmt: skip
+    "case_b3_blade_with_damper",
+    "case_b6_blade_damper_blade",
+    "case_few_harmonics",
+    "case_laws_in_time",
+    "case_shipped_example",
+    "case_shooting",
+    "case_stability",
+    "case_three_ways",
+    "case_two_blades",
+)
 
 
 MUTANTS = 20  # drawn, of the day's seed
@@ -124,9 +131,7 @@ def _tests(file: str, word: str, _workers: int) -> Counter[str]:
 
 
 def _comparisons(names: Iterable[str]) -> list[Piece]:
-    return [
-        Piece(name, partial(_compared, name), (f"evidence/validation/{name}.py",)) for name in names
-    ]
+    return [Piece(name, partial(_compared, name), (f"evidence/validation/{name}.py",)) for name in names]
 
 
 def _compared(name: str, _workers: int) -> Counter[str]:
@@ -166,7 +171,17 @@ def _mutants() -> list[Piece]:
 
 def _drawn(workers: int) -> Counter[str]:
     """Draw mutants; where enough are noticed, those that survive count as left out for a person to judge, else as failures."""
-    command = [sys.executable, "-m", "evidence.mutants", "--n", str(MUTANTS), "--seed", f"{datetime.now(UTC):%Y%m%d}", "--workers", str(workers)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "evidence.mutants",
+        "--n",
+        str(MUTANTS),
+        "--seed",
+        f"{datetime.now(UTC):%Y%m%d}",
+        "--workers",
+        str(workers),
+    ]
     ended = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     print(ended.stdout, flush=True)
     said = NOTICED.search(ended.stdout)
@@ -180,15 +195,17 @@ def _drawn(workers: int) -> Counter[str]:
 PARTS = {
     "tests": Part("slow tests, faults apart", _slow_tests),
     "faults": Part("damaged files, kills, full disks, little memory", _faults),
-    "kernels": Part("numeric tests on every LAPACK kernel, one and two threads", _kernels, whole=True, notes=kernels.told),
+    "kernels": Part(
+        "numeric tests on every LAPACK kernel, one and two threads", _kernels, whole=True, notes=kernels.told
+    ),
     "literature": Part("closed forms, other programs, the literature", _literature),
     "in-time": Part("time integration and many harmonics", _in_time),
     "mutants": Part("one-point changes of the library that a test has to notice", _mutants, whole=True),
-}  # fmt: skip
+}
 
 
 def _git(*words: str) -> str:
-    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()  # fmt: skip
+    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def commit() -> str:
@@ -216,7 +233,7 @@ def _ran(part: str, piece: str) -> Ran | None:
 def _done(part: str, piece: Piece) -> bool:
     """Whether a piece has run on the files of the last commit, and all of it holds."""
     one = _ran(part, piece.name)
-    return one is not None and not one.failed and one.commit[-1] != "+" and one.files == _files(piece)  # fmt: skip
+    return one is not None and not one.failed and one.commit[-1] != "+" and one.files == _files(piece)
 
 
 def _run(part: str, workers: int, piece: Piece) -> None:
@@ -224,7 +241,7 @@ def _run(part: str, workers: int, piece: Piece) -> None:
     began, date, at, files = monotonic(), f"{datetime.now(UTC):%Y-%m-%d}", commit(), _files(piece)
     found = piece.run(workers)
     minutes = round((monotonic() - began) / 60.0, 2)
-    one = Ran(piece.name, date, at, files, minutes, found["passed"], found["failed"], found["left_out"])  # fmt: skip
+    one = Ran(piece.name, date, at, files, minutes, found["passed"], found["failed"], found["left_out"])
     path = _path(part, piece.name)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(asdict(one)) + "\n", encoding="utf-8")
@@ -290,7 +307,7 @@ def _empty(name: str, part: Part) -> str:
 
 def main() -> int:
     """Run what the command line asks for, and end with a line for each part; 1 if anything fails."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)  # fmt: skip
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--fresh", action="store_true", help="run pieces that have run, too")
@@ -305,7 +322,7 @@ def main() -> int:
             if one.failed:
                 print(f"{name}, {one.name}: {one.failed} fail")
         failed += sum(one.failed for one in pieces)
-        print(f"{name}: {sum(one.passed for one in pieces)} hold, {sum(one.failed for one in pieces)} fail")  # fmt: skip
+        print(f"{name}: {sum(one.passed for one in pieces)} hold, {sum(one.failed for one in pieces)} fail")
     return 1 if failed else 0
 
 

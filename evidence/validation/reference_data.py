@@ -75,9 +75,7 @@ def nlvib(name: str, *, complete: bool) -> NlvibCase:
     # all coordinates are retained, so that our unknowns are the source's
     problem = System(problem.structure, problem.interface, problem.outputs, free=np.arange(n))
     turning = tuple(row - 1 for row in run["turning_point_rows"]) if complete else ()
-    return NlvibCase(
-        balance_of(problem, load, case["H"], case["N"]), table[:, 0], table[:, 1:], turning
-    )
+    return NlvibCase(balance_of(problem, load, case["H"], case["N"]), table[:, 0], table[:, 1:], turning)
 
 
 def contact2d(*, complete: bool) -> list[dict[str, float]]:
@@ -99,6 +97,4 @@ def contact2d_balance() -> HarmonicBalance:
     gap[0, 0], gap[2, 1] = 1.0, -1.0
     law = ElasticCoulomb(k_t=800.0, k_w=0.0, k_n=2000.0, mu=0.4)
     load = HarmonicLoad(np.array([0.0, 40.0]), {1: np.array([6.0 + 0j, 3.0])})
-    return balance_of(
-        system(lumped(np.eye(2), 5e-4 * stiffness, stiffness), [law], gap), load, 7, 512
-    )
+    return balance_of(system(lumped(np.eye(2), 5e-4 * stiffness, stiffness), [law], gap), load, 7, 512)

@@ -58,18 +58,12 @@ def growing(case: Rubbing, omega: float, orders: Sequence[int]) -> list[RigidMot
     motions = []
     for order in orders:
         made = case.problem(order)
-        solution = newton(
-            lambda v, made=made: made.linearise(v, omega),
-            made.unknowns(q),
-            Newton(max_iterations=60),
-        )
+        solution = newton(lambda v, made=made: made.linearise(v, omega), made.unknowns(q), Newton(max_iterations=60))
         if not solution.status.converged:
             raise RuntimeError(f"omega = {omega}, H = {order}: {solution.status.advice}")
         q = made.coefficients(solution.x)
         state = made.contacts(solution.x, omega).state[0, 0]
-        motions.append(
-            RigidMotion(order, made.linear.recover(omega, q), float(np.mean(state == 0)))
-        )
+        motions.append(RigidMotion(order, made.linear.recover(omega, q), float(np.mean(state == 0))))
     return motions
 
 

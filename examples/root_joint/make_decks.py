@@ -12,10 +12,8 @@ from stickslip.model import CalculixRun, SolidMesh, write_deck
 
 HALF_WIDTH = (0.012, 0.007)  # m, of the root at its foot and at its neck
 ROOT_HEIGHT, BLADE_HEIGHT, DEPTH, LUG = 0.008, 0.07, 0.02, 0.01  # m
-CORNERS = np.array(
-    [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]]
-)
-EDGES = ((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7))  # fmt: skip
+CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]])
+EDGES = ((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7))
 
 
 def block(lines, place=lambda at: at, sets=None, quadratic=True):
@@ -71,11 +69,7 @@ def blade(across=2, along=2, up=2, above=4):
     heights = [*np.linspace(0, ROOT_HEIGHT, up + 1)]
     heights += [*np.linspace(ROOT_HEIGHT, BLADE_HEIGHT, above + 1)][1:]
     lines = (np.linspace(-1, 1, across + 1), np.linspace(0, DEPTH, along + 1), heights)
-    return block(
-        lines,
-        place,
-        {"left": flank(-1), "right": flank(1), "tip": lambda at: at[:, 2] == BLADE_HEIGHT},
-    )
+    return block(lines, place, {"left": flank(-1), "right": flank(1), "tip": lambda at: at[:, 2] == BLADE_HEIGHT})
 
 
 def lug(side, across=1, along=3, up=1):
@@ -87,7 +81,7 @@ def lug(side, across=1, along=3, up=1):
 
     # from the outer face inwards on the left, or bricks would be inside out
     x = np.linspace(0, 1, across + 1)
-    lines = (x if side > 0 else x[::-1], np.linspace(0, DEPTH, along + 1), np.linspace(0, ROOT_HEIGHT, up + 1))  # fmt: skip
+    lines = (x if side > 0 else x[::-1], np.linspace(0, DEPTH, along + 1), np.linspace(0, ROOT_HEIGHT, up + 1))
     name = "right" if side > 0 else "left"
     return block(lines, place, {name: lambda at: at[:, 0] == 0, "held": lambda at: at[:, 0] == 1})
 

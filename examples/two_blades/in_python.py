@@ -8,9 +8,7 @@ damper = ss.FlatCurvedDamper()
 points, body = damper.contact_points(), damper.body()
 blades = ss.model.assemble_solid(ss.model.mesh_blade_pair(ss.BladePair(), points), ss.Material())
 keep = np.concatenate([blades.sets[name] for name in ("contact", "force", "output")])
-blades = ss.model.rayleigh_damping(
-    ss.craig_bampton(blades, keep, n_modes=25), 0.0075, (150.0, 300.0)
-)
+blades = ss.model.rayleigh_damping(ss.craig_bampton(blades, keep, n_modes=25), 0.0075, (150.0, 300.0))
 both = ss.model.join(blades=blades, damper=body.structure())
 
 flat = ss.ElasticCoulomb(k_t=75e6, k_w=75e6, k_n=520e6 / 6, mu=0.6)

@@ -35,13 +35,9 @@ StudyKind = Annotated[
     ),
 ]
 OtherMachines = Annotated[
-    str,
-    typer.Option(metavar="KIND", help="dask=ADDRESS, slurm, flux or executorlib: docs/cluster.md."),
+    str, typer.Option(metavar="KIND", help="dask=ADDRESS, slurm, flux or executorlib: docs/cluster.md.")
 ]
-Share = Annotated[
-    str | None,
-    typer.Option(metavar="I/N", help="Do a share of the jobs; the last to end joins all."),
-]
+Share = Annotated[str | None, typer.Option(metavar="I/N", help="Do a share of the jobs; the last to end joins all.")]
 
 
 def main() -> None:
@@ -51,12 +47,7 @@ def main() -> None:
 
 
 @app.callback(invoke_without_command=True)
-def common(
-    *,
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version and leave.")
-    ] = False,
-) -> None:
+def common(*, version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False) -> None:
     """Vibration of bladed disks coupled by friction joints."""
     if version:
         typer.echo(f"stickslip {__version__}")
@@ -68,8 +59,7 @@ def run(
     study: StudyFile,
     *,
     only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Answer this analysis alone; may be repeated."),
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Answer this analysis alone; may be repeated.")
     ] = None,
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=256, help="Processes; the numbers stay the same.")
@@ -88,34 +78,30 @@ def run(
     ] = False,
     fresh: Annotated[
         bool,
-        typer.Option(
-            "--fresh",
-            help="Start over: remove what runs wrote into the results folder, and no other file.",
-        ),
+        typer.Option("--fresh", help="Start over: remove what runs wrote into the results folder, and no other file."),
     ] = False,
     results: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of the results; left out: that of the study."),
+        Path | None, typer.Option(metavar="DIR", help="Folder of the results; left out: that of the study.")
     ] = None,
-    report: Annotated[
-        bool, typer.Option("--report/--no-report", help="Write the HTML report.")
-    ] = True,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
     verbose: Annotated[
         bool,
-        typer.Option(
-            "--verbose",
-            "-v",
-            help="Say what jobs say on their way, points and checks, and every verdict.",
-        ),
+        typer.Option("--verbose", "-v", help="Say what jobs say on their way, points and checks, and every verdict."),
     ] = False,
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
         with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
             result = read(study).run(
-                workers=workers, only=only or (), fresh=fresh, verify=verify,
-                verify_harmonics=verify_harmonics, folder=results, executor=executor, shard=shard,
-            )  # fmt: skip
+                workers=workers,
+                only=only or (),
+                fresh=fresh,
+                verify=verify,
+                verify_harmonics=verify_harmonics,
+                folder=results,
+                executor=executor,
+                shard=shard,
+            )
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
@@ -142,9 +128,7 @@ def check(study: StudyFile) -> None:
 
 
 @app.command()
-def new(
-    name: Annotated[Path, typer.Argument(help="A folder to make.")], *, kind: StudyKind = "blades"
-) -> None:
+def new(name: Annotated[Path, typer.Argument(help="A folder to make.")], *, kind: StudyKind = "blades") -> None:
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
         from stickslip.study.file.example import example_text
@@ -152,9 +136,7 @@ def new(
 
         target = name / "study.toml"
         if os.path.lexists(target):
-            raise input_error(
-                str(target), "exists already", "Give another name: nothing is overwritten."
-            )
+            raise input_error(str(target), "exists already", "Give another name: nothing is overwritten.")
         try:
             name.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -167,9 +149,7 @@ def new(
 
 @app.command()
 def report(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")
-    ],
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")],
 ) -> None:
     """Write the HTML report of a result."""
     with _errors_as_text():
@@ -180,28 +160,20 @@ def report(
 
 @app.command()
 def export(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")
-    ],
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")],
     *,
     to: Annotated[
-        Literal["vtu", "frd", "uff"],
-        typer.Option(help="vtu: ParaView; frd: CalculiX's viewer; uff: test software."),
+        Literal["vtu", "frd", "uff"], typer.Option(help="vtu: ParaView; frd: CalculiX's viewer; uff: test software.")
     ] = "vtu",
     case: Annotated[int, typer.Option(min=0, help="Which case of \\[vary], from 0.")] = 0,
-    hz: Annotated[
-        float | None, typer.Option(help="The point nearest to this frequency; left out: the peak.")
-    ] = None,
+    hz: Annotated[float | None, typer.Option(help="The point nearest to this frequency; left out: the peak.")] = None,
     steps: Annotated[int, typer.Option(min=1, max=1000, help="Instants of the period (vtu).")] = 24,
     wheel: Annotated[bool, typer.Option("--wheel", help="Write all sectors, not one.")] = False,
     out: Annotated[Path | None, typer.Option(help="The folder; left out: beside the file.")] = None,
     units: Annotated[str, typer.Option(help="Unit system of an frd file, such as mm-t-s.")] = "SI",
-    of: Annotated[
-        Path | None, typer.Option(help="Folder of the study, where the result was moved away.")
-    ] = None,
+    of: Annotated[Path | None, typer.Option(help="Folder of the study, where the result was moved away.")] = None,
     analysis: Annotated[
-        str,
-        typer.Option(help="forced_response, nonlinear_mode or limit_cycle; left out: the first."),
+        str, typer.Option(help="forced_response, nonlinear_mode or limit_cycle; left out: the first.")
     ] = "",
     number: Annotated[int, typer.Option(min=0, help="Which mode or limit cycle, from 0.")] = 0,
     amplitude_mm: Annotated[
@@ -214,9 +186,18 @@ def export(
 
         with on_screen(Screen(console())):
             files = Result.open(result).export(
-                to, out, case=case, hz=hz, steps=steps, wheel=wheel, units=units, of=of,
-                analysis=analysis, number=number, amplitude_mm=amplitude_mm,
-            )  # fmt: skip
+                to,
+                out,
+                case=case,
+                hz=hz,
+                steps=steps,
+                wheel=wheel,
+                units=units,
+                of=of,
+                analysis=analysis,
+                number=number,
+                amplitude_mm=amplitude_mm,
+            )
         more = f"and {len(files) - FILES_TOLD} more" if len(files) > FILES_TOLD else ""
         say_lines("Files", [*map(str, files[:FILES_TOLD]), *filter(None, [more])])
 
@@ -234,9 +215,7 @@ def compare(
     *,
     name: Annotated[
         list[str] | None,
-        typer.Option(
-            "--name", help="What to call each, in the same order; left out: by folders and files."
-        ),
+        typer.Option("--name", help="What to call each, in the same order; left out: by folders and files."),
     ] = None,
     page: Annotated[Path, typer.Option(help="The page to write.")] = Path("comparison.html"),
 ) -> None:
@@ -255,15 +234,9 @@ def compare(
 def inspect(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of a finite-element model.")],
     *,
-    units: Annotated[
-        str, typer.Option(help="Its unit system: SI, mm-t-s, mm-kg-s, mm-kg-ms, inch-lbf-s, ...")
-    ] = "SI",
-    frequencies: Annotated[
-        int, typer.Option(min=0, max=200, help="Natural frequencies to compute.")
-    ] = 10,
-    mesh: Annotated[
-        Path | None, typer.Option(help="Where the nodes lie, beside matrices that do not say.")
-    ] = None,
+    units: Annotated[str, typer.Option(help="Its unit system: SI, mm-t-s, mm-kg-s, mm-kg-ms, inch-lbf-s, ...")] = "SI",
+    frequencies: Annotated[int, typer.Option(min=0, max=200, help="Natural frequencies to compute.")] = 10,
+    mesh: Annotated[Path | None, typer.Option(help="Where the nodes lie, beside matrices that do not say.")] = None,
 ) -> None:
     """Say what is in a file of a finite-element model: dofs, sets, mass, size, first frequencies."""
     with _errors_as_text():
@@ -278,32 +251,22 @@ def inspect(
 @app.command()
 def fit(
     loops: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOOPS.csv", help="Columns displacement_um (_mm, _m) and force_n (_kn)."
-        ),
+        Path, typer.Argument(metavar="LOOPS.csv", help="Columns displacement_um (_mm, _m) and force_n (_kn).")
     ],
     *,
     normal_load: Annotated[
         float | None, typer.Option(metavar="N", help="Constant normal force; left out: not known.")
     ] = None,
-    normal_load_deviation: Annotated[
-        float, typer.Option(metavar="N", help="Its standard deviation.")
-    ] = 0.0,
+    normal_load_deviation: Annotated[float, typer.Option(metavar="N", help="Its standard deviation.")] = 0.0,
     machine_stiffness: Annotated[
-        float | None,
-        typer.Option(metavar="N/m", help="What lies in series with the contact; left out: rigid."),
+        float | None, typer.Option(metavar="N/m", help="What lies in series with the contact; left out: rigid.")
     ] = None,
     offset: Annotated[
-        bool,
-        typer.Option("--offset/--no-offset", help="Whether the force may have an unknown offset."),
+        bool, typer.Option("--offset/--no-offset", help="Whether the force may have an unknown offset.")
     ] = True,
-    drift: Annotated[
-        bool, typer.Option("--drift", help="Let the force drift, linearly in time.")
-    ] = False,
+    drift: Annotated[bool, typer.Option("--drift", help="Let the force drift, linearly in time.")] = False,
     page: Annotated[
-        Path | None,
-        typer.Option(help="The page to write; left out: LOOPS.fit.html beside the file."),
+        Path | None, typer.Option(help="The page to write; left out: LOOPS.fit.html beside the file.")
     ] = None,
 ) -> None:
     """Fit friction coefficient and tangential stiffness to measured hysteresis loops."""
@@ -312,9 +275,13 @@ def fit(
 
         with on_screen(Screen(console())):
             found = fit_file(
-                loops, normal_load=normal_load, normal_load_deviation=normal_load_deviation,
-                machine_stiffness=machine_stiffness, offset=offset, drift=drift,
-            )  # fmt: skip
+                loops,
+                normal_load=normal_load,
+                normal_load_deviation=normal_load_deviation,
+                machine_stiffness=machine_stiffness,
+                offset=offset,
+                drift=drift,
+            )
         from stickslip.report.loop_fit import write_loop_page
 
         target = page or loops.with_suffix(".fit.html")
@@ -322,9 +289,7 @@ def fit(
         write_loop_page(found, loops, target, told, lines)
         for line in told:
             say(line)
-        say_lines(
-            "What the loops cannot tell, and what is doubtful", [f"{n}." for n in found.notes]
-        )
+        say_lines("What the loops cannot tell, and what is doubtful", [f"{n}." for n in found.notes])
         say_lines("For the table of a contact in the study file", lines)
         say_lines("Files", [str(target)])
 

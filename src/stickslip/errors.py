@@ -5,9 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 from string import Template
 
 # controls, marks of direction, and what is no character
-_STEERING = re.compile(
-    r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]"
-)
+_STEERING = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]")
 LONGEST_MESSAGE = 1900  # bytes
 LONGEST_TEXT = 600  # characters of a place, a problem or a remedy
 

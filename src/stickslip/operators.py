@@ -83,9 +83,7 @@ class Elimination(Protocol):
         """Return S, (size, size), as a new array in Fortran order."""
         ...
 
-    def reduced(
-        self, right: FloatArray, *, transposed: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+    def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return the right sides (size, j) that are left of `right` (n, j), and ``J_RR⁻¹ b_R`` (n, j), zero at what is left."""
         ...
 

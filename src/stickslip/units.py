@@ -13,11 +13,7 @@ DEG = math.pi / 180  # rad
 MM = 1e-3  # m
 
 TO_SI = {"hz": HZ, "rpm": RPM, "deg": DEG, "mm": MM}  # of units that keys end with; others are SI
-PER_AREA = {
-    "n_per_m": "n_per_m3",
-    "n": "pa",
-    "n_per_m3": "n_per_m5",
-}  # of what is shared, given for a square metre
+PER_AREA = {"n_per_m": "n_per_m3", "n": "pa", "n_per_m3": "n_per_m5"}  # of what is shared, given for a square metre
 _METADATA = "quantity"
 
 

@@ -5,11 +5,7 @@ disagreement come from the evidence.
 """
 
 from evidence.figures.evidence import Evidence
-from evidence.figures.statements.cost import (
-    statement_of_control,
-    statement_of_passages,
-    statements_of_cost,
-)
+from evidence.figures.statements.cost import statement_of_control, statement_of_passages, statements_of_cost
 from evidence.figures.statements.coupling import statements_of_coupling
 from evidence.figures.statements.errors import statements_of_errors
 from evidence.figures.statements.jacobians import statements_of_jacobians
@@ -23,8 +19,14 @@ def statements(evidence: Evidence) -> list[Statement]:
     before = statements_before(evidence)
     adequate = [row for row in before if row.section == "4.5.2"]
     return [
-        *statements_of_coupling(evidence), statement_of_passages(evidence), *adequate, statement_of_control(evidence),
+        *statements_of_coupling(evidence),
+        statement_of_passages(evidence),
+        *adequate,
+        statement_of_control(evidence),
         *(row for row in before if row.section != "4.5.2"),
-        *statements_in_time(evidence), *statements_of_errors(evidence), *statements_of_jacobians(evidence),
-        *statements_of_cost(evidence), *statements_of_second_damper(evidence),
-    ]  # fmt: skip
+        *statements_in_time(evidence),
+        *statements_of_errors(evidence),
+        *statements_of_jacobians(evidence),
+        *statements_of_cost(evidence),
+        *statements_of_second_damper(evidence),
+    ]

@@ -34,11 +34,15 @@ def _stuck(e: Evidence) -> Statement:
     stuck = [p for p in e.every_pair if p.stuck]
     noise = max((max(p.predicted, p.real) for p in stuck), default=np.nan)
     return Statement(
-        section="6.2", place="Fig. 6", claim="Predicted and actual errors are zero where the contacts are in full stick", number="0",
+        section="6.2",
+        place="Fig. 6",
+        claim="Predicted and actual errors are zero where the contacts are in full stick",
+        number="0",
         own=f"{len(stuck)} frequencies in full stick: at most {percent(noise, 2)}",
-        verdict=judged(noise < 1e-6) if stuck else "not tested", by="" if stuck else "0 frequencies in full stick",
+        verdict=judged(noise < 1e-6) if stuck else "not tested",
+        by="" if stuck else "0 frequencies in full stick",
         why=f"What is left, {percent(noise, 2)}, is the tolerance of the solver.",
-    )  # fmt: skip
+    )
 
 
 def _weak(e: Evidence) -> Statement:
@@ -50,11 +54,15 @@ def _weak(e: Evidence) -> Statement:
     asked = [p.hertz for p in found if p.predicted > THRESHOLD]
     accepted = [p for p in some if p.predicted <= THRESHOLD]
     return Statement(
-        section="6.2", place="Fig. 6a", claim=f"F_CL/F_HE = {ratio:g}: both errors stay below 5 %, one harmonic is enough", number="slip in [179, 185] Hz",
+        section="6.2",
+        place="Fig. 6a",
+        claim=f"F_CL/F_HE = {ratio:g}: both errors stay below 5 %, one harmonic is enough",
+        number="slip in [179, 185] Hz",
         own=f"slip at {interval([p.hertz for p in some])} ({len(some)} of {len(found)} frequencies); largest error {percent(error)}; the alert asks at {len(asked)}",
-        verdict="not tested" if not some else judged(error < THRESHOLD), by="" if some else "0 frequencies slip",
+        verdict="not tested" if not some else judged(error < THRESHOLD),
+        by="" if some else "0 frequencies slip",
         why=f"At {worst.hertz:.2f} Hz contacts slip for {percent(worst.slip, 2)} and are open for {percent(worst.opened, 2)} of the time, where one harmonic is accepted for {percent(median([p.slip for p in accepted]), 2)} (median): this ratio is not weak here.",
-    )  # fmt: skip
+    )
 
 
 def _strong(e: Evidence) -> Statement:
@@ -79,13 +87,17 @@ def _strong(e: Evidence) -> Statement:
     same = all(verdicts) or not any(verdicts)
     names = [f"{r:g}" for r in sorted({e.plan.strong, e.plan.strongest}, reverse=True)]
     verdict: Verdict = judged(all(verdicts)) if same else "undecided"
-    told = ", ".join(
-        f"{'holds' if v else 'does not hold'} at {r}" for v, r in zip(verdicts, names, strict=True)
-    )
+    told = ", ".join(f"{'holds' if v else 'does not hold'} at {r}" for v, r in zip(verdicts, names, strict=True))
     return Statement(
-        section="6.2", place="Fig. 6b", claim="Strong case (2 in the caption, 5 in the text): five harmonics are needed in one interval around the resonance, and not outside it",
-        number="[171, 177] Hz", own="; ".join(own), verdict=verdict, by="" if same else told, why=_gaps(e),
-    )  # fmt: skip
+        section="6.2",
+        place="Fig. 6b",
+        claim="Strong case (2 in the caption, 5 in the text): five harmonics are needed in one interval around the resonance, and not outside it",
+        number="[171, 177] Hz",
+        own="; ".join(own),
+        verdict=verdict,
+        by="" if same else told,
+        why=_gaps(e),
+    )
 
 
 def _gaps(e: Evidence) -> str:
@@ -102,12 +114,12 @@ def _gaps(e: Evidence) -> str:
             f"at {ratio:g} {percent(p.predicted, 2)} are predicted at the end of the range, {p.hertz:.2f} Hz"
             for p in ends
         ]
-        between = [p for p in found if min(hertz) < p.hertz < max(hertz) and p.predicted <= THRESHOLD]  # fmt: skip
+        between = [p for p in found if min(hertz) < p.hertz < max(hertz) and p.predicted <= THRESHOLD]
         if between:
             said.append(
                 f"accepted between alarms at {ratio:g}: {interval([p.hertz for p in between])} ({len(between)}), predicted up to {percent(max(p.predicted for p in between), 2)}, actual up to {percent(max(p.real for p in between), 2)}"
             )
-    return sentence("; ".join(said) or "0 frequencies between alarms are accepted, but the peak lies outside")  # fmt: skip
+    return sentence("; ".join(said) or "0 frequencies between alarms are accepted, but the peak lies outside")
 
 
 def _sides(e: Evidence) -> list[Statement]:
@@ -121,26 +133,41 @@ def _sides(e: Evidence) -> list[Statement]:
     largest = max((p.real for p in loud), default=np.nan)
     return [
         Statement(
-            section="6.2", place="Fig. 6, 7a", claim="Where the predicted error is below 5 % the actual one is, too", number="always",
+            section="6.2",
+            place="Fig. 6, 7a",
+            claim="Where the predicted error is below 5 % the actual one is, too",
+            number="always",
             own=f"{len(broken)} of {len(accepted)} accepted frequencies break it" + _broken(broken),
-            verdict=judged(not broken), why=sentence(states_said(kept, broken)),
+            verdict=judged(not broken),
+            why=sentence(states_said(kept, broken)),
         ),
         Statement(
-            section="6.2", place="Fig. 6", claim="In most cases the actual error is below the predicted one", number="most",
-            own=f"{len(lower)} of {len(some)} slipping frequencies", verdict=judged(len(lower) > len(some) / 2), by=percent(len(lower) / len(some)),
+            section="6.2",
+            place="Fig. 6",
+            claim="In most cases the actual error is below the predicted one",
+            number="most",
+            own=f"{len(lower)} of {len(some)} slipping frequencies",
+            verdict=judged(len(lower) > len(some) / 2),
+            by=percent(len(lower) / len(some)),
             why=sentence(states_said(lower, higher)),
         ),
         Statement(
-            section="6.2", place="Fig. 7a", claim="The actual error exceeds the predicted one only below 0.05 %", number="0.05 %",
-            own=f"at {len(higher)} frequencies, {len(loud)} of them above 0.05 %" + (f"; largest actual error among them {percent(largest)}" if loud else ""),
+            section="6.2",
+            place="Fig. 7a",
+            claim="The actual error exceeds the predicted one only below 0.05 %",
+            number="0.05 %",
+            own=f"at {len(higher)} frequencies, {len(loud)} of them above 0.05 %"
+            + (f"; largest actual error among them {percent(largest)}" if loud else ""),
             verdict=judged(not loud),
             why=f"The prediction is the first Newton step from one harmonic; what it leaves out has either sign, + at {len(loud)} and - at {sum(p.real > FAINT for p in lower)} of the frequencies above 0.05 %; it is {percent(median([abs(p.real / p.predicted - 1) for p in loud]), 2)} of the prediction at the former (median).",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _broken(broken: Sequence[Pair]) -> str:
-    return "".join(f"; {p.hertz:.2f} Hz at {p.ratio:g}: {percent(p.predicted)} predicted, {percent(p.real)} actual" for p in broken)  # fmt: skip
+    return "".join(
+        f"; {p.hertz:.2f} Hz at {p.ratio:g}: {percent(p.predicted)} predicted, {percent(p.real)} actual" for p in broken
+    )
 
 
 def _diagonal(e: Evidence) -> list[Statement]:
@@ -156,24 +183,38 @@ def _diagonal(e: Evidence) -> list[Statement]:
     spread = [_middle_half(v) for v in (quotient, wide)]
     return [
         Statement(
-            section="6.2", place="Fig. 7a", claim="Between 0.5 and 5 % all points lie on the diagonal", number="all",
+            section="6.2",
+            place="Fig. 7a",
+            claim="Between 0.5 and 5 % all points lie on the diagonal",
+            number="all",
             own=f"{len(on)} of {len(band)} within {percent(DIAGONAL, 2)} of it; actual/predicted {span_of}, median {median(list(quotient)):.3g}",
-            verdict="not tested" if not band else judged(not off), by="" if band else "0 frequencies in the band", why=sentence(states_said(on, off)),
+            verdict="not tested" if not band else judged(not off),
+            by="" if band else "0 frequencies in the band",
+            why=sentence(states_said(on, off)),
         ),
         Statement(
-            section="6.2", place="Fig. 7a", claim="There the actual error is slightly lower", number="slightly",
+            section="6.2",
+            place="Fig. 7a",
+            claim="There the actual error is slightly lower",
+            number="slightly",
             own=f"lower at {int(np.sum(quotient < 1))} of {len(band)}, median of actual/predicted {median(list(quotient)):.3g}",
-            verdict="not tested" if not band else judged(bool(np.median(quotient) < 1.0 and np.sum(quotient < 1) > len(band) / 2)),
-            by="" if band else "0 frequencies in the band", why=f"It is lower at {int(np.sum(quotient < 1))}, higher at {int(np.sum(quotient >= 1))} of {len(band)}; median {median(list(quotient)):.3g}.",
+            verdict="not tested"
+            if not band
+            else judged(bool(np.median(quotient) < 1.0 and np.sum(quotient < 1) > len(band) / 2)),
+            by="" if band else "0 frequencies in the band",
+            why=f"It is lower at {int(np.sum(quotient < 1))}, higher at {int(np.sum(quotient >= 1))} of {len(band)}; median {median(list(quotient)):.3g}.",
         ),
         Statement(
-            section="6.2", place="Fig. 7a", claim="Above 5 % the proportionality is lost", own=
-            f"{len(above)} frequencies: actual/predicted {beyond}, in the band {span_of}; their middle halves spread over factors of {np.exp(spread[1]):.2g} and {np.exp(spread[0]):.2g} (judged by these, as ranges grow with the number of frequencies)",
-            verdict="not tested" if not above else judged(spread[1] > spread[0]), by="" if above else "0 alarms",
+            section="6.2",
+            place="Fig. 7a",
+            claim="Above 5 % the proportionality is lost",
+            own=f"{len(above)} frequencies: actual/predicted {beyond}, in the band {span_of}; their middle halves spread over factors of {np.exp(spread[1]):.2g} and {np.exp(spread[0]):.2g} (judged by these, as ranges grow with the number of frequencies)",
+            verdict="not tested" if not above else judged(spread[1] > spread[0]),
+            by="" if above else "0 alarms",
             why=f"The middle half of the quotients spreads over a factor of {np.exp(spread[1]):.2g} above 5 % and of {np.exp(spread[0]):.2g} in the band.",
         ),
         _other_damper(e),
-    ]  # fmt: skip
+    ]
 
 
 def _middle_half(quotient: FloatArray) -> float:
@@ -185,19 +226,16 @@ def _middle_half(quotient: FloatArray) -> float:
 
 
 def _other_damper(e: Evidence) -> Statement:
-    second = [
-        p for found in e.second_pairs.values() for p in found if not p.stuck and SMALL <= p.predicted <= LARGE
-    ]  # fmt: skip
+    second = [p for found in e.second_pairs.values() for p in found if not p.stuck and SMALL <= p.predicted <= LARGE]
     on = [p for p in second if abs(p.real / p.predicted - 1) <= DIAGONAL]
     off = [p for p in second if p not in on]
     other = [p.real / p.predicted for p in second]
-    said = (
-        f"actual/predicted {min(other):.2g} to {max(other):.2g}, median {median(other):.3g}"
-        if other
-        else "none"
-    )
+    said = f"actual/predicted {min(other):.2g} to {max(other):.2g}, median {median(other):.3g}" if other else "none"
     return Statement(
-        section="6.2", claim="The interval of proportionality does not depend on the damper", own=f"second damper, {len(second)} frequencies that slip in the band: {said}",
-        verdict="not tested" if not second else judged(not off), by="" if second else "0 frequencies of the second damper lie in the band",
+        section="6.2",
+        claim="The interval of proportionality does not depend on the damper",
+        own=f"second damper, {len(second)} frequencies that slip in the band: {said}",
+        verdict="not tested" if not second else judged(not off),
+        by="" if second else "0 frequencies of the second damper lie in the band",
         why=sentence(states_said(on, off)),
-    )  # fmt: skip
+    )

@@ -144,8 +144,9 @@ def states_said(alike: Sequence[Pair], apart: Sequence[Pair]) -> str:
     """Say how much the contact states of one and five harmonics differ, where a prediction is right and where it is not."""
     parts = [
         f"{percent(median([p.states for p in some]), 2)} where it {word} ({len(some)} frequencies)"
-        for word, some in (("does not hold", apart), ("holds", alike)) if some
-    ]  # fmt: skip
+        for word, some in (("does not hold", apart), ("holds", alike))
+        if some
+    ]
     return (
         "share of contact directions and instants whose state differs between one and five harmonics, medians: "
         + ", ".join(parts)

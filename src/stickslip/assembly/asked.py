@@ -6,13 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.forces import (
-    Labels,
-    amplitude,
-    error_names,
-    force_of,
-    output_labels,
-)
+from stickslip.assembly.forces import Labels, amplitude, error_names, force_of, output_labels
 from stickslip.assembly.held import refuse_unheld
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
@@ -74,16 +68,12 @@ def asked(model: Model, harmonics: int) -> Asked:
     _refuse_beyond(driven, model.loads, harmonics)
     labels = output_labels(model.places, model.outputs, model.loads)
     if not labels.names:
-        raise input_error(
-            "output.points", "there is none", "Name a point whose motion is reported."
-        )
+        raise input_error("output.points", "there is none", "Name a point whose motion is reported.")
     points = contact_labels(model)
     names = error_names(labels, points, model.loads, model.alert_over)
     watched = _joined(labels, points, _body_labels(model)).of(names, "alert_over")
     if not model.pairs.names:
-        raise input_error(
-            "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
-        )
+        raise input_error("contact", "there is none: no coordinate would be left to solve for", "Give a contact.")
     refuse_rigid(model)
     refuse_unheld(model)
     refuse_pulled(model, static_forces(model, forces))
@@ -122,11 +112,7 @@ def _body_labels(model: Model) -> Labels:
 
 def static_forces(model: Model, forces: Mapping[str, Matrix]) -> dict[str, FloatArray]:
     """Return the static forces (N,) on the dofs of all parts, by the keys that give them."""
-    static = {
-        f"load.{name}": np.real(force)
-        for name, force in forces.items()
-        if model.loads[name].harmonic == 0
-    }
+    static = {f"load.{name}": np.real(force) for name, force in forces.items() if model.loads[name].harmonic == 0}
     if model.centrifugal and model.speed > 0:
         static["rotation.speed_rpm"] = centrifugal_of_bodies(model)
         for name, part in model.parts.items():
@@ -147,9 +133,5 @@ def centrifugal_of_bodies(model: Model) -> FloatArray:
 
 def excitation(model: Model) -> float:
     """Return the amplitude by which responses are divided, N; NaN where nothing vibrates."""
-    driven = [
-        amplitude(model.places, name, load)
-        for name, load in model.loads.items()
-        if load.harmonic > 0
-    ]
+    driven = [amplitude(model.places, name, load) for name, load in model.loads.items() if load.harmonic > 0]
     return max(driven, default=float("nan")) or float("nan")

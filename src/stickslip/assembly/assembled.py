@@ -78,9 +78,7 @@ class Frequencies:
         return [
             f"{what} mode {i + 1}: full {full:.4f} Hz, reduced {reduced:.4f} Hz, {100 * error:+.5f} %"
             for what, fulls, reduceds in self._pairs()
-            for i, (full, reduced, error) in enumerate(
-                zip(fulls, reduceds, _errors(fulls, reduceds), strict=True)
-            )
+            for i, (full, reduced, error) in enumerate(zip(fulls, reduceds, _errors(fulls, reduceds), strict=True))
         ]
 
     def warnings(self, up_to_hz: float = np.inf) -> list[str]:

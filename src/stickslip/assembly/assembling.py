@@ -9,12 +9,7 @@ from stickslip.assembly.reduced import Store, in_memory
 
 
 def assemble(
-    model: Model,
-    harmonics: int,
-    store: Store = in_memory,
-    *,
-    wave_number: int | None = None,
-    every_wave: bool = False,
+    model: Model, harmonics: int, store: Store = in_memory, *, wave_number: int | None = None, every_wave: bool = False
 ) -> Assembled:
     """Reduce the parts of a model, join them, pair the contacts, and place all under the static loads.
 

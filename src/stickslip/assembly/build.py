@@ -144,13 +144,7 @@ def system_of(model: Model, linear: Linear, what: Asked) -> tuple[System, System
 
 
 def linear_side(
-    model: Model,
-    order: int,
-    harmonics: int,
-    kept: IntArray,
-    stay: IntArray,
-    store: Store,
-    more: Sequence[int] = (),
+    model: Model, order: int, harmonics: int, kept: IntArray, stay: IntArray, store: Store, more: Sequence[int] = ()
 ) -> Linear:
     """Reduce a model.
 
@@ -174,9 +168,7 @@ def linear_side(
     if model.neighbours is None:
         return _of_one(model, (kept, needed, np.concatenate([stay, bodies])), store)
     if model.interface_modes is not None:
-        raise input_error(
-            KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
-        )
+        raise input_error(KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel.")
     flow = flow_around(model, store)
     found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store, more, flow)
     at = model.coordinates
@@ -236,10 +228,7 @@ def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
 def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Store) -> Linear:
     """Reduce a single structure; `dofs` are those kept, those that no shapes replace, and those that stay coordinates."""
     kept, needed, stay = dofs
-    mine = {
-        name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name)
-        for name in model.parts
-    }
+    mine = {name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name) for name in model.parts}
     parts = reduced_parts(model.parts, mine, model.spin(model.speed), model.steady, store)
     ids = []
     for name, part in parts.items():
@@ -310,9 +299,7 @@ def _first(model: Model) -> int:
 def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the (p, 3) gaps (m) and contact forces (N) under a static load."""
     if not system.retained.size:
-        raise input_error(
-            "contact", "touches no coordinate that can move", "Name surfaces that are not clamped."
-        )
+        raise input_error("contact", "touches no coordinate that can move", "Name surfaces that are not clamped.")
     moved = preload(system, static_load)
     gap = (system.interface.gap_operator[:, system.retained] @ moved).reshape(-1, 3)
     return gap, static_contact_force(system.springs, gap)
@@ -343,9 +330,7 @@ def _pressed(model: Model) -> BoolArray:
     return pressed_by(system.springs.laws, force)
 
 
-def frequencies(
-    model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store
-) -> Frequencies:
+def frequencies(model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store) -> Frequencies:
     """Compare natural frequencies of the full and the reduced model, contacts open and stuck; of a wheel, of the first harmonic that is driven."""
     number = 0 if order is None else excited_wave(order, model.sectors, _first(model))
     reduced, gaps, place = linear.of_wave(number)
@@ -357,9 +342,7 @@ def frequencies(
     hows: tuple[Literal["open", "stuck"], ...] = ("open", "stuck")
     full = [partial(model.at, model.speed, number, how) for how in hows]
     found = [_lowest(model, at(), count, store) for at in full]
-    return Frequencies(
-        found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count)
-    )
+    return Frequencies(found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count))
 
 
 def _without(structure: Structure, dofs: IntArray) -> Structure:

@@ -9,9 +9,7 @@ from stickslip.errors import input_error
 GROUND = "ground"
 NEXT = "next."  # prefix of a surface of the neighbouring sector, in the sense of rotation
 PairingKind = Literal["node_to_node", "node_to_segment", "segment_to_segment"]
-SPATIAL: Literal["spatial_harmonics"] = (
-    "spatial_harmonics"  # wheels of different numbers of sectors
-)
+SPATIAL: Literal["spatial_harmonics"] = "spatial_harmonics"  # wheels of different numbers of sectors
 Share = Literal["interface", "point", "area"]
 # of stages that such a join couples
 ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."

@@ -100,9 +100,7 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
         arm = np.linalg.norm(part.axis.arm(structure.dofs.position[own]), axis=1)
         own = own[arm > beyond]
     if not own.size or part.body is not None:
-        raise input_error(
-            place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part."
-        )
+        raise input_error(place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part.")
     K, M = (scipy.sparse.csr_array(m) for m in (structure.stiffness, structure.mass))
     wide = picked(first + np.arange(structure.n), n)
     sector = faces_of(head, part) if part.sectors > 1 else None
@@ -120,9 +118,7 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
     # a dof of the low face is also the high face of the sector before, whose matrices act on it, too
     here, there = own_and_onward(sector, own)
     behind = (there.T @ K @ wide).tocsr() if there.nnz else None
-    stiffness, mass = (
-        scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M)
-    )
+    stiffness, mass = (scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M))
     rows = scipy.sparse.csr_array(here.T @ K @ wide)
     return Blade(stiffness, mass, rows, whole=False, behind=behind)
 
@@ -130,9 +126,7 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
 def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> IntArray:
     """Return the dofs of a blade without those of the high face, which are the next one's."""
     if np.isin(own, sector.shared).any():
-        raise input_error(
-            place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out."
-        )
+        raise input_error(place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out.")
     left = np.setdiff1d(own, sector.high)
     if np.setdiff1d(leaders(sector, own), left).size:
         raise input_error(
@@ -147,9 +141,7 @@ def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
     """Return squares (r,) of the circular frequencies and shapes (b, r) of the lowest modes of a blade by itself, rigid ones left out."""
     b = blade.stiffness.shape[0]
     every = int(np.count_nonzero(blade.mass.diagonal()))
-    structure = Structure(
-        blade.mass, scipy.sparse.csr_array((b, b)), blade.stiffness, numbered_dofs(b)
-    )
+    structure = Structure(blade.mass, scipy.sparse.csr_array((b, b)), blade.stiffness, numbered_dofs(b))
     squares: FloatArray = np.zeros(0)
     shapes: FloatArray = np.zeros((b, 0))
     asked = 0
@@ -161,9 +153,7 @@ def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
     return squares, shapes
 
 
-def blade_alone_hz(
-    model: Model, of: str, number: int, place: str, beyond: float | None = None
-) -> FloatArray:
+def blade_alone_hz(model: Model, of: str, number: int, place: str, beyond: float | None = None) -> FloatArray:
     """Return the lowest natural frequencies (r,) of a blade by itself in Hz."""
     squares, _ = blade_alone(blade_of(model, of, place, beyond), number)
     return np.asarray(np.sqrt(squares) / HZ)
@@ -226,8 +216,7 @@ def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
     before, after = (damped(one.part, p, at_speed(one.part, p, spin, rest)) for p in (old, one.by))
     kinds = ("mass", "damping", "stiffness")
     change = {
-        kind: scipy.sparse.csr_array(getattr(after, kind))
-        - scipy.sparse.csr_array(getattr(before, kind))
+        kind: scipy.sparse.csr_array(getattr(after, kind)) - scipy.sparse.csr_array(getattr(before, kind))
         for kind in kinds
     }
     touched: IntArray = np.unique(stacked(abs(m).tocsr().nonzero()[1] for m in change.values()))

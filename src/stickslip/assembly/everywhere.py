@@ -70,9 +70,7 @@ def nodes_of(model: Model) -> tuple[Nodes, ...]:
     """
     found = [own for name in model.parts if (own := _nodes(model, name)) is not None]
     if not found:
-        raise input_error(
-            "export", "no part has nodes with a place in space", "Give the matrices their nodes."
-        )
+        raise input_error("export", "no part has nodes with a place in space", "Give the matrices their nodes.")
     return tuple(found)
 
 
@@ -119,9 +117,7 @@ class Everywhere:
     alike: bool
     _expand: Callable[[Matrix, int], Matrix]
 
-    def fields(
-        self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is
-    ) -> ComplexArray:
+    def fields(self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is) -> ComplexArray:
         """Return the (s, H+1, N) motion of all dofs: of each sector on the axes of the first one turned to it, of one where they are alike.
 
         Parameters
@@ -145,9 +141,7 @@ class Everywhere:
         return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
 
 
-def everywhere(
-    model: Model, harmonics: int, *, every_wave: bool = False, wave_number: int | None = None
-) -> Everywhere:
+def everywhere(model: Model, harmonics: int, *, every_wave: bool = False, wave_number: int | None = None) -> Everywhere:
     """Reduce a model again, with the way back to all its dofs.
 
     Parameters

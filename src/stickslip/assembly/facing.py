@@ -67,9 +67,7 @@ def refuse_without_facets(key: str, contact: Contact, a: Surface, b: Surface) ->
     elif len(b.facets):
         points, remedy = one, f"{MEET_FACETS}."
     raise input_error(
-        f"{key}.between",
-        f"{points!r} has points and no facets, as {contact.pairing} needs them there",
-        remedy,
+        f"{key}.between", f"{points!r} has points and no facets, as {contact.pairing} needs them there", remedy
     )
 
 
@@ -80,9 +78,7 @@ def with_pairing(error: InputError, contact: Contact, a: Surface, b: Surface) ->
     return input_error(error.place, error.problem, f"{MEET_FACETS}.")
 
 
-def tilt_warning(
-    key: str, contact: Contact, part: str, mine: Normals, theirs: Normals | None
-) -> tuple[str, ...]:
+def tilt_warning(key: str, contact: Contact, part: str, mine: Normals, theirs: Normals | None) -> tuple[str, ...]:
     """Warn of a rigid part no point of which lies flat on the other surface; arguments as of `refuse_averted`."""
     if theirs is None or not len(mine[0]):
         return ()
@@ -113,9 +109,7 @@ def _mean(normals: FloatArray) -> str:
     return f"({', '.join(f'{x + 0.0:.2f}' for x in unit.round(2))})"
 
 
-def overlap_warning(
-    key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]
-) -> tuple[str, ...]:
+def overlap_warning(key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]) -> tuple[str, ...]:
     """Warn of surfaces that as they are placed overlap by more than their facets can be off and the contact says, or nowhere touch."""
     sizes = [float(np.median(facet_balls(side)[1])) for side in sides if len(side.facets)]
     worst = int(np.argmin(pairing.initial_gap))
@@ -260,10 +254,7 @@ def _distance(surface: Surface, points: FloatArray) -> float:
 
 
 def named(
-    key: str,
-    contact: Contact | Join,
-    pair: Callable[[], Found],
-    surfaces: tuple[Surface, Surface] | None = None,
+    key: str, contact: Contact | Join, pair: Callable[[], Found], surfaces: tuple[Surface, Surface] | None = None
 ) -> Found:
     """Say of which contact a complaint is, and how far its surfaces lie apart."""
     from scipy.spatial import cKDTree
@@ -276,9 +267,7 @@ def named(
         if surfaces is not None and contact.pairing != "node_to_node" and "rim" not in error.words:
             a, b = (side.points[side.used] for side in surfaces)
             nearest = float(cKDTree(b).query(a)[0].min())
-            problem = (
-                f"{told.problem}; the nearest nodes or points of both lie {nearest:.3g} m apart"
-            )
+            problem = f"{told.problem}; the nearest nodes or points of both lie {nearest:.3g} m apart"
             told = InputError(told.place, problem, told.advice, told.words, told.others)
         raise told.inside(f"{key} (side A: {one}, side B: {two})") from None
     return found

@@ -137,10 +137,7 @@ def _near(middle: FloatArray, points: FloatArray) -> IntArray:
 
 
 def _best(
-    surface: Surface,
-    points: FloatArray,
-    candidates: IntArray,
-    side: tuple[FloatArray, FloatArray, float, float] | None,
+    surface: Surface, points: FloatArray, candidates: IntArray, side: tuple[FloatArray, FloatArray, float, float] | None
 ) -> Feet:
     """Return the best of some facets (n, k) for each point; `side`: normals of facets and points, their sense, the reach."""
     n = len(points)

@@ -113,9 +113,7 @@ class Flow:
         faces = [own[part.structure.sets[f]] for f in part.faces if f in part.structure.sets]
         free = np.setdiff1d(own, np.concatenate([held, *faces]))
         whole = self._whole
-        mass, damping, stiffness = (
-            _taken(m, free) for m in (whole.mass, whole.damping, whole.stiffness)
-        )
+        mass, damping, stiffness = (_taken(m, free) for m in (whole.mass, whole.damping, whole.stiffness))
         alone = Structure(mass, damping, stiffness, whole.dofs.take(free))
         shapes, patterns = np.zeros((2, whole.n, len(self.given.modes)))
         shapes[free] = self._modes(alone, f"modes of {clamped!r} held")
@@ -159,28 +157,13 @@ class Flow:
     @cached_property
     def _content(self) -> str:
         given, model = self.given, self.model
-        what = (
-            given.shapes,
-            given.nodal_diameter,
-            given.clamped,
-            given.largest_displacement,
-            given.over,
-        )
+        what = (given.shapes, given.nodal_diameter, given.clamped, given.largest_displacement, given.over)
         here, pairs = model.neighbours, model.pairs
         pressed = self.holds if given.contacts == "static" and pairs.names else None
         met = (pairs.own, pairs.following, repr(pairs.laws), given.contacts, pressed)
         faces = () if here is None else (here.low, here.high, here.weights)
         tie = model.coordinates.tie
-        return content_hash(
-            "aero: phases of own dofs",
-            self._whole,
-            model.sectors,
-            given.modes,
-            what,
-            met,
-            faces,
-            tie,
-        )
+        return content_hash("aero: phases of own dofs", self._whole, model.sectors, given.modes, what, met, faces, tie)
 
 
 def own_dofs(model: Model) -> IntArray:
@@ -210,8 +193,7 @@ def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
     names = list(dict.fromkeys(zip(parts[along], table.node[along].tolist(), strict=True)))
     place: dict[Any, int] = {name: i for i, name in enumerate(names)}
     index = np.array(
-        [place[p, n] for p, n in zip(parts[along], table.node[along].tolist(), strict=True)],
-        dtype=np.int64,
+        [place[p, n] for p, n in zip(parts[along], table.node[along].tolist(), strict=True)], dtype=np.int64
     )
     sums = np.zeros((len(names), shapes.shape[1]))
     np.add.at(sums, index, squares[along])

@@ -90,9 +90,7 @@ def _unit(key: str, load: Load) -> FloatArray:
     vector = np.asarray(load.direction, dtype=float)
     length = float(np.linalg.norm(vector))
     if vector.shape != (3,) or not 0 < length < np.inf:
-        raise input_error(
-            f"{key}.direction", f"is no direction: {load.direction}", "Give three numbers."
-        )
+        raise input_error(f"{key}.direction", f"is no direction: {load.direction}", "Give three numbers.")
     return np.asarray(vector if abs(length - 1.0) < 1e-12 else vector / length)
 
 
@@ -179,9 +177,7 @@ class Labels:
         at = dict(zip(self.names, self.dofs, strict=True))
         for name in names:
             if name not in at:
-                raise input_error(
-                    place, f"there is no place {name!r}", did_you_mean(name, list(at))
-                )
+                raise input_error(place, f"there is no place {name!r}", did_you_mean(name, list(at)))
         return np.array([at[name] for name in names], dtype=np.int64)
 
 
@@ -291,9 +287,7 @@ def _nearest(places: Places, output: Output, key: str) -> IntArray:
     return np.asarray(places.rows(output.on, table.node[known[[int(np.argmin(away))]]])[0])
 
 
-def error_names(
-    labels: Labels, contacts: Labels, loads: Mapping[str, Load], over: tuple[str, ...]
-) -> tuple[str, ...]:
+def error_names(labels: Labels, contacts: Labels, loads: Mapping[str, Load], over: tuple[str, ...]) -> tuple[str, ...]:
     """Return the labels over which the error of missing harmonics is taken: by default all outputs."""
     if over in (*ANSWER, ("outputs",)):
         return labels.names

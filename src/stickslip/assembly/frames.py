@@ -72,13 +72,7 @@ def normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | 
 
 
 def direction(
-    key: str,
-    contact: Contact,
-    law: ContactLaw,
-    first: Spot,
-    a: Surface,
-    second: Spot | None,
-    b: Surface | None,
+    key: str, contact: Contact, law: ContactLaw, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Any:
     """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
     from scipy.spatial import cKDTree

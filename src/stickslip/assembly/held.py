@@ -78,8 +78,7 @@ def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
     if np.all(pressed):
         return ()
     return tuple(
-        f"{error} The mean of its vibration is known only where contacts close."
-        for error in unheld(model, pressed)
+        f"{error} The mean of its vibration is known only where contacts close." for error in unheld(model, pressed)
     )
 
 
@@ -164,9 +163,7 @@ def _with_all_sectors(part: Part, dofs: IntArray, motions: FloatArray) -> FloatA
     turning = np.cross(axis.unit, table.position - np.asarray(axis.origin))
     column = [("x", "y", "z").index(c) if c in ("x", "y", "z") else -1 for c in table.component]
     rows = np.arange(len(column))
-    alike = np.column_stack(
-        [np.tile(axis.unit, (len(column), 1))[rows, column], turning[rows, column]]
-    )
+    alike = np.column_stack([np.tile(axis.unit, (len(column), 1))[rows, column], turning[rows, column]])
     alike = np.where(np.array(column)[:, None] >= 0, np.nan_to_num(alike), 0.0)
     kept = [v / np.abs(v).max() for v in alike.T if np.any(v) and _inside(v, motions)]
     return np.column_stack(kept) if kept else motions[:, :0]
@@ -180,10 +177,7 @@ def _inside(vector: FloatArray, motions: FloatArray) -> bool:
 def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
     """Return rows on the dofs of all parts that vanish where nothing is strained."""
     pairs, ties = model.pairs, model.ties
-    stiff = [
-        np.ones(3, dtype=bool) if isinstance(law, RigidCoulomb) else holding_directions(law)
-        for law in pairs.laws
-    ]
+    stiff = [np.ones(3, dtype=bool) if isinstance(law, RigidCoulomb) else holding_directions(law) for law in pairs.laws]
     rows = np.flatnonzero(np.repeat(holds, 3) & np.array(stiff, dtype=bool).reshape(-1))
     n = model.places.n
     found = [
@@ -202,18 +196,10 @@ def _complaint(model: Model, body: Loose, shapes: FloatArray, *, at_rest: bool) 
     if part.sectors > 1 and shapes.shape[1] == 2 and _alike(part):
         words = "moving along the axis and turning about it"
     whole = body.dofs.size == part.structure.n
-    which = (
-        ""
-        if whole
-        else f"the body of {_label(part, body.dofs[0] - model.places.own(body.part)[0])} "
-    )
+    which = "" if whole else f"the body of {_label(part, body.dofs[0] - model.places.own(body.part)[0])} "
     what = "no closed contact, support" if at_rest else "no support, contact"
     add = "press its contacts by a static load" if at_rest else "add a contact with stiffness"
-    spring = (
-        "give [retention] a stiffness"
-        if part.body is not None
-        else "give it a spring to the ground"
-    )
+    spring = "give [retention] a stiffness" if part.body is not None else "give it a spring to the ground"
     return input_error(
         f"part.{body.part}",
         f"{which}is held by nothing{' at rest' if at_rest else ''}: {what} or join keeps it from {words}",

@@ -53,19 +53,11 @@ class Load:
         for name, least in (("harmonic", 0), ("engine_order", 0)):
             value = getattr(self, name)
             if value is not None and (not isinstance(value, int | np.integer) or value < least):
-                raise input_error(
-                    f"Load.{name}",
-                    f"must be an integer from {least} on, got {value!r}",
-                    "Give a count.",
-                )
+                raise input_error(f"Load.{name}", f"must be an integer from {least} on, got {value!r}", "Give a count.")
         if not (math.isfinite(self.newton) and math.isfinite(self.phase)):
-            raise input_error(
-                "Load",
-                f"has {self.newton} N and a phase of {self.phase} rad",
-                "Give finite numbers.",
-            )
+            raise input_error("Load", f"has {self.newton} N and a phase of {self.phase} rad", "Give finite numbers.")
         own = [v for v in (self.omega, self.omega_ratio) if v is not None]
-        if len(own) > 1 or any(not (math.isfinite(v) and v > 0.0) for v in own) or (own and not self.harmonic):  # fmt: skip
+        if len(own) > 1 or any(not (math.isfinite(v) and v > 0.0) for v in own) or (own and not self.harmonic):
             raise input_error(
                 "Load.omega",
                 f"is {self.omega} rad/s, its ratio {self.omega_ratio}, of a load in harmonic {self.harmonic}",
@@ -73,9 +65,7 @@ class Load:
             )
         if self.harmonic == 0 and self.phase:
             raise input_error(
-                "Load.phase",
-                f"is {self.phase:g} rad of a static load",
-                "Leave it out, or give a harmonic from 1 on.",
+                "Load.phase", f"is {self.phase:g} rad of a static load", "Leave it out, or give a harmonic from 1 on."
             )
 
     @property

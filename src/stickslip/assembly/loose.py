@@ -26,9 +26,7 @@ def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
     index = np.flatnonzero(stays)
     if not index.size:
         raise input_error(
-            "part",
-            "nothing is left without free rigid bodies",
-            "Let contacts stick, or give a part that is held.",
+            "part", "nothing is left without free rigid bodies", "Let contacts stick, or give a part that is held."
         )
     into = picked(np.where(stays, np.cumsum(stays) - 1, -1), index.size)
     if structure.basis is None:

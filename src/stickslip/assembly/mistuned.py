@@ -96,9 +96,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
     )
 
 
-def system_of_all(
-    model: Model, what: Asked, store: Store
-) -> tuple["AllSectors", tuple[System, System], HarmonicLoad]:
+def system_of_all(model: Model, what: Asked, store: Store) -> tuple["AllSectors", tuple[System, System], HarmonicLoad]:
     """Return a wheel with all its sectors, its system without and with the retention, and the loads on it."""
     alike, wheel = replace(model, mistuning=None), all_sectors(model, what, store)
     refuse_mixed_gaps(alike, wheel.gaps[: 3 * len(alike.pairs.names)])
@@ -214,9 +212,7 @@ class AllSectors:
 
         def field(name: str, harmonic: int) -> Matrix:
             k = excited_wave(order, n, harmonic)
-            return travelling(
-                self.sector.field(self.model.spread.index(name), k), wave(k, n).phase_angle, n
-            )
+            return travelling(self.sector.field(self.model.spread.index(name), k), wave(k, n).phase_angle, n)
 
         return Linear(self.side, self.gaps, np.tile(own, n), self.of_dofs, load, None, field)
 
@@ -281,13 +277,9 @@ def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | f
 def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedSector, Matrix]:
     """Return all waves on coordinates that contacts know, and the gaps of all sectors: gaps where waves can be written in them."""
     at, n = model.coordinates, model.sectors
-    pairs = replace(
-        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
-    )
+    pairs = replace(model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following))
     bodies = model.places.bodies()
-    shown, held = (
-        at.of_dofs(np.unique(d), model.places.dofs, "output.points") for d in (what.stay, bodies)
-    )
+    shown, held = (at.of_dofs(np.unique(d), model.places.dofs, "output.points") for d in (what.stay, bodies))
     found = wheel_of(waves.sector, waves.kept, waves.waves, (0, 0), pairs, (shown, held))
     if not found.wheel.multipliers.size:
         return waves.with_forces(found), repeated([found.gaps], n)
@@ -297,9 +289,7 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
     same = scipy.sparse.eye_array(size, format="csr")
     plain = TunedWheel(own, n, 0, 0)
     steady = np.real(waves.waves[0][1])
-    sector = ReducedSector(
-        waves.sector, waves.kept, dict.fromkeys(own, same), waves.waves, plain, found.gaps, steady
-    )
+    sector = ReducedSector(waves.sector, waves.kept, dict.fromkeys(own, same), waves.waves, plain, found.gaps, steady)
     return waves.with_forces(sector), _shifted_gaps(waves, pairs, size)
 
 

@@ -15,9 +15,7 @@ ContactQuantity = Literal["friction_coefficient", "slip_limit", "stiffness", "pr
 LARGEST = 0.5  # relative deviation of a frequency or a stiffness; beyond, a blade is another blade
 
 
-def pattern(
-    sectors: int, distribution: Distribution, standard_deviation: float, seed: int
-) -> FloatArray:
+def pattern(sectors: int, distribution: Distribution, standard_deviation: float, seed: int) -> FloatArray:
     """Return random deviations (n_s,) with a mean of zero in distribution; the same for the same seed.
 
     Parameters
@@ -182,9 +180,7 @@ class Mistuning:
                 each = enumerate(one.deviations.T)
                 found |= {f"{name}, mode {i + 1}": own for i, own in each}
         gap = ", gap in m"
-        return found | {
-            name + gap * (one.quantity == "gap"): one.values for name, one in self.contacts.items()
-        }
+        return found | {name + gap * (one.quantity == "gap"): one.values for name, one in self.contacts.items()}
 
     def require(self, sectors: int) -> None:
         """Refuse deviations of another number of blades than `sectors`, sectors that are not there, and two parts in one place."""

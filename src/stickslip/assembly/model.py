@@ -112,9 +112,7 @@ class Model:
                     "Give a part its number of sectors, or leave the table out.",
                 )
             if is_staged(self.joins):
-                raise input_error(
-                    name, "is of one wheel, and a join couples several", "Leave one out."
-                )
+                raise input_error(name, "is of one wheel, and a join couples several", "Leave one out.")
             one.require(self.sectors)
         refuse_contacts_of_dofs(self.places, self.contacts)
 
@@ -250,9 +248,7 @@ class Model:
         """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
         if self.joins and self._has_mesh:
             loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
-            return joined_displacements(
-                self.places, self.coordinates, (self.neighbours, self.ties), loose
-            )
+            return joined_displacements(self.places, self.coordinates, (self.neighbours, self.ties), loose)
         ties = {} if self.neighbours is None else self.neighbours.ties
         return {name: steady_of(part, ties.get(name)) for name, part in self.parts.items()}
 
@@ -298,11 +294,7 @@ class Model:
             way = structure.basis
             operators = [operator @ way for operator in operators]
             tie = way if tie is None else tie @ way
-        holds = (
-            np.full(len(self.pairs.names), contacts == "stuck")
-            if isinstance(contacts, str)
-            else contacts
-        )
+        holds = np.full(len(self.pairs.names), contacts == "stuck") if isinstance(contacts, str) else contacts
         largest = float(np.abs(structure.stiffness.diagonal()).max())
         stiffness = np.where(np.repeat(holds, 3), self._springs(holds, STIFF * largest), 0.0)
         if holds.any():
@@ -313,13 +305,8 @@ class Model:
 
     def _springs(self, holds: BoolArray, stiff: float) -> FloatArray:
         """Return the (3 p,) stiffnesses t, w, n of contacts that hold; `stiff` of rigid ones."""
-        laws = [
-            law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in self.pairs.laws
-        ]
-        rows = [
-            law.stuck_stiffness() if hold else np.zeros(3)
-            for law, hold in zip(laws, holds, strict=True)
-        ]
+        laws = [law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in self.pairs.laws]
+        rows = [law.stuck_stiffness() if hold else np.zeros(3) for law, hold in zip(laws, holds, strict=True)]
         return np.array(rows, dtype=float).reshape(-1)
 
     def _loose(self, holds: BoolArray) -> IntArray:

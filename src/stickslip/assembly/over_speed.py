@@ -55,8 +55,7 @@ def with_engine_order(model: Model, order: int) -> Model:
     if model.sectors == 1:
         return model
     loads = {
-        name: replace(load, engine_order=order) if load.harmonic > 0 else load
-        for name, load in model.loads.items()
+        name: replace(load, engine_order=order) if load.harmonic > 0 else load for name, load in model.loads.items()
     }
     return replace(model, loads=loads)
 
@@ -92,11 +91,7 @@ def over_speed(
         If there is no such engine order, or the model is mistuned or reduced to different coordinates at different speeds.
     """
     if not 0.0 < speeds[0] < speeds[1]:
-        raise input_error(
-            "run_up",
-            f"goes from {speeds[0]:g} to {speeds[1]:g} rad/s",
-            "Give growing speeds above 0.",
-        )
+        raise input_error("run_up", f"goes from {speeds[0]:g} to {speeds[1]:g} rad/s", "Give growing speeds above 0.")
     if model.aerodynamics is not None:
         raise input_error(
             "run_up",
@@ -104,9 +99,7 @@ def over_speed(
             "Leave [aero] out, or compute forced responses at single speeds.",
         )
     if model.mistuning is not None:
-        raise input_error(
-            "run_up", "is of tuned wheels, and the model is mistuned", "Leave [mistuning] out."
-        )
+        raise input_error("run_up", "is of tuned wheels, and the model is mistuned", "Leave [mistuning] out.")
     if engine_order < 1:
         raise input_error(
             "run_up",
@@ -126,12 +119,7 @@ def over_speed(
 
 
 def _assembled(
-    model: Model,
-    engine_order: int,
-    speeds: tuple[float, float],
-    harmonics: int,
-    store: Store,
-    tolerance: float,
+    model: Model, engine_order: int, speeds: tuple[float, float], harmonics: int, store: Store, tolerance: float
 ) -> OverSpeed:
     refuse_whole("run_up", model)
     known: dict[float, Assembled] = {}
@@ -184,9 +172,7 @@ def _difference(line: SpeedLine, speed: float, true: Assembled) -> float:
     """Return how far a line is from a model at a speed."""
     mine, theirs = line.at(speed), _at_rest(true)
     orders = range(1 + (line.harmonics or 0))
-    pairs = {
-        id(theirs.of_harmonic(h)): (mine.of_harmonic(h), theirs.of_harmonic(h)) for h in orders
-    }
+    pairs = {id(theirs.of_harmonic(h)): (mine.of_harmonic(h), theirs.of_harmonic(h)) for h in orders}
     found = [_of_structures(a, b, line.engine_order * speed) for a, b in pairs.values()]
     load = true.load.coefficients(max(line.loads))
     for h in line.loads:
@@ -200,11 +186,7 @@ def _of_structures(mine: Structure, theirs: Structure, omega: float) -> float:
     """Return the largest relative difference of ``K + iωC - ω²M``, in the energy of any motion, ``K + ω²M``."""
     change = [
         _dense(a) - _dense(b)
-        for a, b in (
-            (mine.stiffness, theirs.stiffness),
-            (mine.damping, theirs.damping),
-            (mine.mass, theirs.mass),
-        )
+        for a, b in ((mine.stiffness, theirs.stiffness), (mine.damping, theirs.damping), (mine.mass, theirs.mass))
     ]
     size = _dense(theirs.stiffness) + omega**2 * _dense(theirs.mass)
     factors = 1.0, omega, omega**2

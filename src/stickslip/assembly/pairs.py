@@ -27,12 +27,7 @@ from stickslip.assembly.frames import direction, normals_of, whole, with_normals
 from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
 from stickslip.assembly.shares import at_rest, shared
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.pairing import (
-    Pairing,
-    node_to_node,
-    node_to_segment,
-    segment_to_segment,
-)
+from stickslip.contact.pairing import Pairing, node_to_node, node_to_segment, segment_to_segment
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
@@ -243,13 +238,7 @@ def refuse_itself(place: str, first: Spot, second: Spot) -> None:
 
 
 def _paired(
-    places: Places,
-    key: str,
-    contact: Contact,
-    law: ContactLaw,
-    first: Spot,
-    second: Spot | None,
-    turn: Turn | None,
+    places: Places, key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
 ) -> tuple[Pairing, tuple[str, ...]]:
     """Pair two surfaces, and say what is doubtful; the dofs of the next sector follow those of this one where there is a turn."""
     assert first.surface is not None
@@ -285,15 +274,11 @@ def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairin
     if contact.pairing == "node_to_node":
         return node_to_node(a, b, tolerance=NEAR if reach is None else reach, direction=along)
     if contact.pairing == "node_to_segment":
-        return node_to_segment(
-            a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along
-        )
+        return node_to_segment(a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along)
     return segment_to_segment(a, b, reach=reach, direction=along)
 
 
-def widened(
-    first: Surface, second: Spot | None, turn: Turn | None
-) -> tuple[Surface, Surface | None]:
+def widened(first: Surface, second: Spot | None, turn: Turn | None) -> tuple[Surface, Surface | None]:
     """Return both surfaces, the second turned to where the next sector has it, on the dofs of this sector and then of the next."""
     if second is None:
         return first, None
@@ -306,20 +291,11 @@ def widened(
     own = scipy.sparse.hstack([first.displacement, empty[0]], format="csr")
     theirs = scipy.sparse.hstack([empty[1], turned], format="csr")
     normals = None if b.normals is None else b.normals @ turn.matrix.T
-    return (
-        replace(first, displacement=own),
-        Surface(turn.points(b.points), theirs, b.facets, normals, b.numbers),
-    )
+    return (replace(first, displacement=own), Surface(turn.points(b.points), theirs, b.facets, normals, b.numbers))
 
 
 def _single_dofs(
-    places: Places,
-    name: str,
-    contact: Contact,
-    law: ContactLaw,
-    first: Spot,
-    second: Spot | None,
-    turn: Turn | None,
+    places: Places, name: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
 ) -> Pairs:
     """Pair single dofs, in the order in which they are named."""
     key = f"contact.{name}"
@@ -337,9 +313,7 @@ def _single_dofs(
     row = 3 * np.arange(p) + ROWS[contact.acts]
 
     def rows(dofs: Any, sign: float) -> Matrix:
-        return scipy.sparse.csr_array(
-            (np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n)
-        )
+        return scipy.sparse.csr_array((np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n))
 
     own, theirs = rows(one, -1.0), rows(two, 1.0)
     if turn is not None and second is not None:

@@ -185,9 +185,7 @@ class Places:
         hits = np.flatnonzero((table.node == number) & (np.array(table.component) == found[2]))
         return Spot(name, head, None, self.offset(head) + hits) if hits.size == 1 else None
 
-    def _nodal(
-        self, name: str, head: str, numbers: IntArray, points: FloatArray, facets: IntArray
-    ) -> Spot:
+    def _nodal(self, name: str, head: str, numbers: IntArray, points: FloatArray, facets: IntArray) -> Spot:
         """Return nodes of a part: x, y, z where the part has them; what it has not is held."""
         table = self.parts[head].structure.dofs
         rows = node_rows(table, numbers)[:, :3]
@@ -206,9 +204,7 @@ def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
     """Return the complaint about a name that a part does not have."""
     if name.partition(".")[2].upper() in map(str.upper, part.clamped_sets):
         return input_error(
-            place,
-            f"every node of {name!r} is clamped",
-            "Name a set whose nodes can move, or clamp less.",
+            place, f"every node of {name!r} is clamped", "Name a set whose nodes can move, or clamp less."
         )
     table, n = part.structure.dofs, part.structure.n
     numbered = [is_numbered(component) for component in table.component]

@@ -82,9 +82,16 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
         body = body.moved(whole.turn, whole.move)
     surfaces = {name: _moved_points(points, whole) for name, points in template.surfaces.items()}
     return replace(
-        part, structure=structure, mesh=mesh, solid=solid, body=body, surfaces=surfaces,
-        template=template, place=whole, **others,
-    )  # fmt: skip
+        part,
+        structure=structure,
+        mesh=mesh,
+        solid=solid,
+        body=body,
+        surfaces=surfaces,
+        template=template,
+        place=whole,
+        **others,
+    )
 
 
 def placed_body(part: Part, place: Place) -> Part:
@@ -136,6 +143,12 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
     mesh = moved_mesh(solid.mesh, place)
     load: FloatArray = solid.nodal_mass @ solid.axis.arm(mesh.points)
     return RotatingSolid(
-        structure, mesh, solid.material, solid.axis, solid.quadrature, solid.moving,
-        solid.nodal_mass, np.asarray(load).ravel()[solid.moving],
-    )  # fmt: skip
+        structure,
+        mesh,
+        solid.material,
+        solid.axis,
+        solid.quadrature,
+        solid.moving,
+        solid.nodal_mass,
+        np.asarray(load).ravel()[solid.moving],
+    )

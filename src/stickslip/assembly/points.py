@@ -35,9 +35,7 @@ def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequenc
     moved = scipy.sparse.csr_array(gaps @ scipy.sparse.diags_array(1.0 - fixed))
     moved.eliminate_zeros()
     touched = np.unique(moved.indices)
-    if scipy.sparse.issparse(structure.stiffness) or touched.size <= np.count_nonzero(
-        np.diff(moved.indptr)
-    ):
+    if scipy.sparse.issparse(structure.stiffness) or touched.size <= np.count_nonzero(np.diff(moved.indptr)):
         return same
     try:
         written, own = in_relative_coordinates(replace(structure, basis=None), moved, names)

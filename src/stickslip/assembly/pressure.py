@@ -10,12 +10,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.clamped_rim import with_rim
 from stickslip.assembly.facing_field import Feet, between_sides, nearest, on_sides, unit_normals
 from stickslip.assembly.places import Places, Spot
-from stickslip.contact.facets import (
-    corner_counts,
-    interpolation,
-    normals,
-    positions,
-)
+from stickslip.contact.facets import corner_counts, interpolation, normals, positions
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
@@ -58,14 +53,10 @@ class PressureField:
     def __post_init__(self) -> None:
         n = len(self.points)
         shapes = (self.points.shape, np.shape(self.pressure))
-        if (
-            shapes != ((n, 3), (n,))
-            or n < 3
-            or (self.area is not None and self.area.shape != (n, 3))
-        ):
+        if shapes != ((n, 3), (n,)) or n < 3 or (self.area is not None and self.area.shape != (n, 3)):
             raise input_error(
                 self.source, f"has {shapes[0]} points for {shapes[1]} pressures", "Give (n, 3) and (n,), n from 3 on."
-            )  # fmt: skip
+            )
 
     def on(self, places: Places, name: str, place: str) -> "Projected":
         """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the key that names the surface.
@@ -78,7 +69,7 @@ class PressureField:
         spot = places.spot(name, place)
         surface = _with_facets(spot, place)
         moves = scipy.sparse.csr_array(surface.displacement)
-        key = (name, places.n, surface.points.tobytes(), moves.indptr.tobytes(), moves.indices.tobytes())  # fmt: skip
+        key = (name, places.n, surface.points.tobytes(), moves.indptr.tobytes(), moves.indices.tobytes())
         if key not in self.memo:
             self.memo[key] = put_on(self, with_rim(places, spot), name)
         found: Projected = self.memo[key]

@@ -75,9 +75,7 @@ def _friction(law: ContactLaw) -> FloatArray:
     return np.where(law.stuck_stiffness()[:2] > 0, getattr(law, "mu", STEEP), 0.0)
 
 
-def _fewest(
-    model: Model, work: tuple[FloatArray, float], resisted: FloatArray, moves: FloatArray
-) -> FloatArray | None:
+def _fewest(model: Model, work: tuple[FloatArray, float], resisted: FloatArray, moves: FloatArray) -> FloatArray | None:
     """Return a motion that loads drive and contacts do not resist, of one part where there is such a one; None of none."""
     for name in model.parts:
         others = np.delete(moves, model.places.own(name), axis=0)
@@ -87,14 +85,10 @@ def _fewest(
     return _driven(work, resisted, moves[:0])
 
 
-def _driven(
-    work: tuple[FloatArray, float], resisted: FloatArray, still: FloatArray
-) -> FloatArray | None:
+def _driven(work: tuple[FloatArray, float], resisted: FloatArray, still: FloatArray) -> FloatArray | None:
     """Return a motion that does more than the least work, for which rows are not positive and others vanish."""
     own, least = work
     few = np.linalg.qr(still, mode="r") if len(still) else still
     none = np.zeros(len(few))
-    found = scipy.optimize.linprog(
-        -own, resisted, np.zeros(len(resisted)), few, none, bounds=(-1.0, 1.0)
-    )
+    found = scipy.optimize.linprog(-own, resisted, np.zeros(len(resisted)), few, none, bounds=(-1.0, 1.0))
     return np.asarray(found.x) if found.status == 0 and -found.fun > least else None

@@ -221,9 +221,7 @@ def _root(part: Part, spin: Spin, rest: Steady) -> Part:
     return part if turns and not alike else part.template
 
 
-def _reduced(
-    name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store
-) -> ReducedPart:
+def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store) -> ReducedPart:
     changes = part.solid is not None or part.body is not None
     spin, rest = turning if changes else (Spin(), ALONE)
     shared = None if rest.unit is None else rest.unit.tobytes()
@@ -311,15 +309,10 @@ def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
     return own | {"steady": steady}
 
 
-def unpacked(
-    values: Mapping[str, Any], full: Structure, kept: IntArray
-) -> tuple[Structure, Matrix]:
+def unpacked(values: Mapping[str, Any], full: Structure, kept: IntArray) -> tuple[Structure, Matrix]:
     """Return both from the arrays: the table of its dofs and its sets follow from the full structure."""
     mass, loss = np.asarray(values["mass"]), values.get("loss")
-    dofs, sets = (
-        with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size),
-        surviving_sets(full, kept),
-    )
+    dofs, sets = (with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size), surviving_sets(full, kept))
     own = mass, values["damping"], values["stiffness"]
     return Structure(*own, dofs, sets, None, loss), np.asarray(values["steady"])
 

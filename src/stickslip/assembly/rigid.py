@@ -117,9 +117,7 @@ def refuse_rigid(model: Model) -> None:
         if not isinstance(law, RigidCoulomb):
             continue
         rows = np.repeat([group == name for group in pairs.groups], 3)
-        used = np.unique(
-            np.concatenate([m[rows].nonzero()[1] for m in (pairs.own, pairs.following)])
-        )
+        used = np.unique(np.concatenate([m[rows].nonzero()[1] for m in (pairs.own, pairs.following)]))
         bodies = np.intersect1d(used, model.places.bodies())
         if bodies.size:
             body = model.places.dofs.part[int(bodies[0])]
@@ -128,9 +126,7 @@ def refuse_rigid(model: Model) -> None:
                 f"is {law_name(law)}, and the rigid body {body!r} has no stiffness of its own to hold it where it slips",
                 "Give the contact a stiffness, such as elastic_coulomb.",
             )
-        if law.preload is None and not np.any(
-            np.diff(pairs.own.indptr)[np.flatnonzero(rows)[2::3]]
-        ):
+        if law.preload is None and not np.any(np.diff(pairs.own.indptr)[np.flatnonzero(rows)[2::3]]):
             raise input_error(
                 f"contact.{name}.preload_n",
                 f"is missing: the law {law_name(law)} takes its pressure from the motion along the normal, and there is none",

@@ -36,12 +36,8 @@ def joined_displacements(
         tie = tie @ here.sector(rest, at).wave_tie(0)
     moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
     tie = scipy.sparse.csr_array(tie[:, moves])
-    stiffness = scipy.sparse.block_diag(
-        [scipy.sparse.csr_array(part.structure.stiffness) for part in parts.values()]
-    )
-    load = [
-        np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal for p in parts.values()
-    ]
+    stiffness = scipy.sparse.block_diag([scipy.sparse.csr_array(part.structure.stiffness) for part in parts.values()])
+    load = [np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal for p in parts.values()]
     solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
     moved = tie @ solve(tie.T @ np.concatenate(load))
     shared = {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}

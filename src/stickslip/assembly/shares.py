@@ -67,9 +67,7 @@ def _at_rest_alike(
     word = preload if contact.preload else "gap_m" if contact.gap > 0.0 else "interference_m"
     given = f"preload={contact.preload:g}" if contact.preload else f"gap={contact.gap:g}"
     return input_error(
-        f"{key}.{word}",
-        f"is given (in Python {given}), and the law {law_name(contact.law)} {why}",
-        remedy,
+        f"{key}.{word}", f"is given (in Python {given}), and the law {law_name(contact.law)} {why}", remedy
     )
 
 

@@ -17,9 +17,7 @@ def is_staged(joins: Mapping[str, Join]) -> bool:
     return any(join.pairing == SPATIAL for join in joins.values())
 
 
-def stages_of(
-    places: Places, joins: Mapping[str, Join], contacts: Collection[str], speed: float
-) -> Multistage | None:
+def stages_of(places: Places, joins: Mapping[str, Join], contacts: Collection[str], speed: float) -> Multistage | None:
     """Return the wheels of a model whose joins couple several; None where none does.
 
     Parameters
@@ -40,17 +38,11 @@ def stages_of(
         return None
     for name, join in joins.items():
         if join.pairing != SPATIAL:
-            raise input_error(
-                f"join.{name}.pairing", f"is {join.pairing} beside joins by {SPATIAL}", ALONE
-            )
+            raise input_error(f"join.{name}.pairing", f"is {join.pairing} beside joins by {SPATIAL}", ALONE)
     if contacts:
-        raise input_error(
-            f"contact.{next(iter(contacts))}", "is between stages or within one", ALONE
-        )
+        raise input_error(f"contact.{next(iter(contacts))}", "is between stages or within one", ALONE)
     if speed > 0:
-        raise input_error(
-            "rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE
-        )
+        raise input_error("rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE)
     flanges = [_flange(places, f"join.{name}", join) for name, join in joins.items()]
     used = {stage for flange in flanges for stage in flange.stages}
     sectors = {}
@@ -70,9 +62,7 @@ def _flange(places: Places, key: str, join: Join) -> Flange:
     names, dofs = [], []
     for surface in join.between:
         if surface.startswith(NEXT):
-            raise input_error(
-                f"{key}.between", f"{surface!r} is on the next sector", "Name the stages."
-            )
+            raise input_error(f"{key}.between", f"{surface!r} is on the next sector", "Name the stages.")
         spot = places.spot(surface, f"{key}.between")
         if spot.nodes is None:
             raise input_error(f"{key}.between", f"{surface!r} holds no nodes", "Name a node set.")

@@ -49,9 +49,7 @@ class StaticState:
         return not small  # nor is what is no number small
 
 
-def static_state(
-    parts: Mapping[str, Part], displacement: Mapping[str, FloatArray], speed: float
-) -> StaticState | None:
+def static_state(parts: Mapping[str, Part], displacement: Mapping[str, FloatArray], speed: float) -> StaticState | None:
     """Return the static state of the parts whose meshes have a displacement (nodes, 3) in m at a speed in rad/s; None of none."""
     rows = []
     for name, moved in displacement.items():

@@ -85,17 +85,11 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
         key = f"join.{name}"
         if join.pairing == SPATIAL:
             raise input_error(
-                f"{key}.pairing",
-                f"is {SPATIAL}, and of wheels coupled so only the modes are known",
-                ALONE,
+                f"{key}.pairing", f"is {SPATIAL}, and of wheels coupled so only the modes are known", ALONE
             )
         first, second, ahead = sides(places, key, join, turn)
         if second is None or first.surface is None or second.surface is None:
-            raise input_error(
-                f"{key}.between",
-                "needs two surfaces",
-                "Clamp a part to hold it against the ground.",
-            )
+            raise input_error(f"{key}.between", "needs two surfaces", "Clamp a part to hold it against the ground.")
         found = _followed(key, join, first, second, ahead)
         if ahead is not None:
             ahead_of |= {dof: row for dof, row in found.items() if dof not in ahead_of}
@@ -103,9 +97,7 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
         _refuse_twice(places, key, found, rows)
         rows |= found
     followers = np.array(sorted(rows), dtype=np.int64)
-    weights = scipy.sparse.vstack(
-        [scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr"
-    )
+    weights = scipy.sparse.vstack([scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr")
     weights = _resolved(places, followers, weights, len(joins))
     onward = scipy.sparse.vstack([scipy.sparse.csr_array((0, n)), *ahead_of.values()], format="csr")
     low = np.unique(onward.indices).astype(np.int64)
@@ -113,9 +105,7 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
     return Ties(followers, weights, low, high, onward[:, low])
 
 
-def _followed(
-    key: str, join: Join, first: Spot, second: Spot, turn: Turn | None
-) -> dict[int, Matrix]:
+def _followed(key: str, join: Join, first: Spot, second: Spot, turn: Turn | None) -> dict[int, Matrix]:
     """Return each dof of the first side with its row of weights; of the next sector, in its own axes."""
     assert first.surface is not None
     assert second.surface is not None
@@ -128,11 +118,7 @@ def _followed(
     a, b = first.surface, second.surface
     if turn is not None:
         b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
-    theirs = (
-        _in_the_mean(key, join, a, b)
-        if join.pairing == MEAN
-        else _by_nodes(key, join, _towards(a, b), b)
-    )
+    theirs = _in_the_mean(key, join, a, b) if join.pairing == MEAN else _by_nodes(key, join, _towards(a, b), b)
     theirs.data[np.abs(theirs.data) < TINY] = 0.0
     theirs.eliminate_zeros()
     dofs = first.nodes.ravel()
@@ -194,9 +180,7 @@ def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> No
         )
 
 
-def _refuse_twice(
-    places: Places, key: str, found: Mapping[int, Matrix], rows: Mapping[int, Matrix]
-) -> None:
+def _refuse_twice(places: Places, key: str, found: Mapping[int, Matrix], rows: Mapping[int, Matrix]) -> None:
     for dof in found:
         if dof in rows:
             raise input_error(
@@ -214,9 +198,7 @@ def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int)
             return weights
         keep = np.ones(weights.shape[1])
         keep[followers] = 0.0
-        weights = scipy.sparse.csr_array(
-            weights @ scipy.sparse.diags_array(keep) + chained @ weights
-        )
+        weights = scipy.sparse.csr_array(weights @ scipy.sparse.diags_array(keep) + chained @ weights)
         weights.eliminate_zeros()
     dof = int(followers[weights[:, followers].nonzero()[1][0]])
     raise input_error(

@@ -40,13 +40,7 @@ def unlike_faces(part: Part) -> CyclicSector:
         )
     low, high = (_face(part, name) for name in part.faces)
     pitch = 2 * np.pi / part.sectors
-    ahead = Surface(
-        part.axis.turned(low[0].points, pitch),
-        low[0].displacement,
-        low[0].facets,
-        None,
-        low[0].numbers,
-    )
+    ahead = Surface(part.axis.turned(low[0].points, pitch), low[0].displacement, low[0].facets, None, low[0].numbers)
     at_rest = np.all(high[1] < 0, axis=1)
     try:
         weights = mortar_tie(high[0], ahead, held=at_rest)
@@ -55,9 +49,7 @@ def unlike_faces(part: Part) -> CyclicSector:
     moves = np.flatnonzero(~at_rest), np.flatnonzero(np.all(low[1] >= 0, axis=1))
     block = scipy.sparse.kron(weights[moves[0]][:, moves[1]], np.eye(3))
     dofs = low[1][moves[1]].ravel(), high[1][moves[0]].ravel()
-    return CyclicSector(
-        part.structure, part.sectors, *dofs, part.axis, scipy.sparse.csr_array(block)
-    )
+    return CyclicSector(part.structure, part.sectors, *dofs, part.axis, scipy.sparse.csr_array(block))
 
 
 def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
@@ -87,9 +79,7 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
             "Match the faces node by node, or give the disk a bore.",
         )
     nothing = scipy.sparse.csr_array((3 * nodes.size, part.structure.n))
-    surface = Surface(
-        mesh.points[nodes], nothing, place.reshape(facets.shape), numbers=mesh.numbers[nodes]
-    )
+    surface = Surface(mesh.points[nodes], nothing, place.reshape(facets.shape), numbers=mesh.numbers[nodes])
     return surface, rows
 
 
@@ -103,8 +93,6 @@ def _told(part: Part, error: InputError) -> InputError:
     low, high = part.faces
     return input_error(
         KEY,
-        error.problem.replace("side A", repr(high)).replace(
-            "side B", f"{low!r} of the next sector"
-        ),
+        error.problem.replace("side A", repr(high)).replace("side B", f"{low!r} of the next sector"),
         "Check that the faces have the same outline, the number of sectors and the axis.",
     )

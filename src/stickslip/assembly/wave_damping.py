@@ -42,9 +42,7 @@ class DampingOfParts:
             others = np.flatnonzero(owner != name)
             _refuse_joined(name, moving, np.ix_(rows, others))
             square = np.ix_(rows, rows)
-            mass, skew, stiffness = (
-                _dense(m)[square] for m in (moving.mass, moving.damping, moving.stiffness)
-            )
+            mass, skew, stiffness = (_dense(m)[square] for m in (moving.mass, moving.damping, moving.stiffness))
             alone = Structure(mass, skew, stiffness, moving.dofs.take(rows))
             damping[square] = _dense(own.of_modes(alone).damping)
         sparse = scipy.sparse.issparse(moving.stiffness)

@@ -25,14 +25,7 @@ from stickslip.assembly.reduced import (
     with_ways_back,
 )
 from stickslip.assembly.wave_damping import DampingOfParts
-from stickslip.assembly.wheel import (
-    ReducedSector,
-    leaders,
-    modes_of_wave,
-    reduced_wave,
-    wave_numbers,
-    wheel_of,
-)
+from stickslip.assembly.wheel import ReducedSector, leaders, modes_of_wave, reduced_wave, wave_numbers, wheel_of
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
@@ -77,12 +70,8 @@ def reduced_sector(
     numbers = sorted({*wave_numbers(model.sectors, *order), *more})
     found = sector_waves(model, numbers, kept, store, flow=flow)
     at = model.coordinates
-    pairs = replace(
-        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
-    )
-    shown, bodies = (
-        at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
-    )
+    pairs = replace(model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following))
+    shown, bodies = (at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay)
     wheel = wheel_of(found.sector, found.kept, found.waves, order, pairs, (shown, bodies))
     return found.with_forces(wheel)
 
@@ -162,9 +151,7 @@ def sector_waves(
     if rows is not None:
         columns = scipy.sparse.csr_array(at.columns(rows).T)
         loads = scipy.sparse.hstack([scipy.sparse.csr_array(loads[:, None]), columns], format="csr")
-    wheel = (
-        sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights,
-    )  # fmt: skip
+    wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights)
     like = () if reduction is None else spin.references
     own = _content_of(model, like, wheel[1:], kept)
     content = content_hash("wave", *wheel, kept, damping, loads, own)
@@ -227,9 +214,7 @@ def _spread(model: Model) -> FloatArray:
     return np.hstack([forces.real, forces.imag])
 
 
-def _columns(
-    at: Coordinates, loads: Matrix, flow: Flow | None, spread: FloatArray, k: int
-) -> tuple[Matrix, str]:
+def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, spread: FloatArray, k: int) -> tuple[Matrix, str]:
     """Return loads with the patterns of the aerodynamic force on a wave and the spread loads behind them, and what tells these apart."""
     if flow is None and not spread.size:
         return loads, ""
@@ -300,11 +285,7 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts
     if not ways:
         return None, damping, empty
     high = empty if model.neighbours is None else model.neighbours.high
-    whole = [
-        np.setdiff1d(model.places.own(name), high)
-        for name, part in model.parts.items()
-        if part.reduction is None
-    ]
+    whole = [np.setdiff1d(model.places.own(name), high) for name, part in model.parts.items() if part.reduction is None]
     return _one_of(ways), damping, np.concatenate([empty, *whole])
 
 
@@ -325,13 +306,9 @@ def _one_of(ways: Mapping[str, Any]) -> Reduction:
     return Reduction(total, one.method)
 
 
-def damping_by_modes(
-    parts: Mapping[str, Part], *, reduced: bool
-) -> Damping | DampingOfParts | None:
+def damping_by_modes(parts: Mapping[str, Part], *, reduced: bool) -> Damping | DampingOfParts | None:
     """Return the damping by modes of the waves of a sector; None for none."""
-    found = [
-        part.damping if part.damping and part.damping.is_modal else None for part in parts.values()
-    ]
+    found = [part.damping if part.damping and part.damping.is_modal else None for part in parts.values()]
     for name, own in zip(parts, found, strict=True):
         if own != found[0]:
             if not reduced:

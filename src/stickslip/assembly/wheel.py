@@ -104,9 +104,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
         tied.append((sector.low + first, sector.high + first, sector.weights))
     axis = axes[0] if axes else parts[next(iter(counts))].axis
     if any((a is None) != (axis is None) or (a is not None and a != axis) for a in axes):
-        raise input_error(
-            "part", "turn about different axes", "Give all parts of a wheel one axis."
-        )
+        raise input_error("part", "turn about different axes", "Give all parts of a wheel one axis.")
     turn = Turn(next(iter(counts.values())), axis)
     return Neighbours(turn, *_one_after_the_other(tied), ties, tuple(warnings))
 
@@ -167,9 +165,7 @@ def faces_of(name: str, part: Part) -> CyclicSector | None:
             return unlike_faces(part)
         if part.mesh is None and not _in_space(part.structure, low):
             return CyclicSector(part.structure, part.sectors, low, high, axis=None)
-        return cyclic_sector(
-            part.structure, part.sectors, low=part.faces[0], high=part.faces[1], axis=part.axis
-        )
+        return cyclic_sector(part.structure, part.sectors, low=part.faces[0], high=part.faces[1], axis=part.axis)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
 
@@ -201,9 +197,7 @@ def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix
     tie = sector.tie[:, np.searchsorted(sector.independent, dofs)]
     high = np.zeros(sector.structure.n)
     high[sector.high] = 1.0
-    own, onward = (
-        scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - high, high)
-    )
+    own, onward = (scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - high, high))
     onward.eliminate_zeros()
     return own, onward
 
@@ -282,9 +276,7 @@ class ReducedSector:
         single = np.diff(rows.indptr) == 1
         if not single.all():
             name = self.sector.structure.dofs.labels[int(dofs[np.flatnonzero(~single)[0]])]
-            raise input_error(
-                place, f"{name} takes part in a contact", "Take a place beside the contact."
-            )
+            raise input_error(place, f"{name} takes part in a contact", "Take a place beside the contact.")
         return np.asarray(rows.indices, dtype=np.int64)
 
 

@@ -36,9 +36,7 @@ class WheelModes:
     wave_share: FloatArray
 
 
-def wheel_modes(
-    model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory
-) -> WheelModes:
+def wheel_modes(model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory) -> WheelModes:
     """Return the lowest modes of a mistuned wheel.
 
     Parameters
@@ -59,9 +57,7 @@ def wheel_modes(
     return _shares(model, wheel, found.frequencies_hz[strained], np.real(found.shapes[:, strained]))
 
 
-def wheel_in_flow(
-    model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory
-) -> ComplexArray:
+def wheel_in_flow(model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory) -> ComplexArray:
     """Return the eigenvalues (r,), 1/s, of the lowest modes of a mistuned wheel in a flow, with its damping; least damped first.
 
     Parameters
@@ -103,14 +99,8 @@ def _bound(model: Model, contacts: ContactsAs, store: Store) -> tuple[AllSectors
 def _springs(model: Model, structure: Structure, holds: BoolArray) -> FloatArray:
     """Return the (3 p n_s,) stiffnesses of contacts that hold, each sector's own."""
     stiff = STIFF * float(np.abs(structure.stiffness.diagonal()).max())
-    laws = [
-        law.softened(stiff) if isinstance(law, RigidCoulomb) else law
-        for law in pairs_of_all(model).laws
-    ]
-    rows = [
-        law.stuck_stiffness() if hold else np.zeros(3)
-        for law, hold in zip(laws, holds, strict=True)
-    ]
+    laws = [law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in pairs_of_all(model).laws]
+    rows = [law.stuck_stiffness() if hold else np.zeros(3) for law, hold in zip(laws, holds, strict=True)]
     return np.array(rows, dtype=float).reshape(-1)
 
 
@@ -118,9 +108,6 @@ def _shares(model: Model, wheel: AllSectors, hertz: FloatArray, shapes: FloatArr
     n = model.sectors
     moved = wheel.side.of_harmonic(0).mass @ shapes
     each = (shapes * moved).reshape(n, -1, hertz.size).sum(axis=1)
-    waves, driven = (
-        np.fft.fft(rows.reshape(n, -1, hertz.size), axis=0, norm="ortho")
-        for rows in (shapes, moved)
-    )
+    waves, driven = (np.fft.fft(rows.reshape(n, -1, hertz.size), axis=0, norm="ortho") for rows in (shapes, moved))
     by_wave = np.real(waves.conj() * driven).sum(axis=1)
     return WheelModes(hertz, (each / each.sum(axis=0)).T, (by_wave / by_wave.sum(axis=0)).T)

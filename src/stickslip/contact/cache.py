@@ -40,9 +40,7 @@ def njit(*asked: Any, cache: bool = False, **options: Any) -> Any:
     return partial(_compiled, signatures=asked, cache=cache, options=options)
 
 
-def _compiled(
-    function: Callable[..., Any], signatures: tuple[Any, ...], cache: bool, options: dict[str, Any]
-) -> Any:
+def _compiled(function: Callable[..., Any], signatures: tuple[Any, ...], cache: bool, options: dict[str, Any]) -> Any:
     made: Any = numba.njit(**options)(function)
     if not isinstance(made, Dispatcher):  # NUMBA_DISABLE_JIT
         return made

@@ -103,9 +103,7 @@ class CheckedCache(FunctionCache):
         super().__init__(py_func)  # type: ignore[no-untyped-call]
         stamp = self._impl.locator.get_source_stamp(), _contents(Path(getfile(py_func)))
         self._cache_file = CheckedFiles(
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=stamp,
+            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=stamp
         )  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

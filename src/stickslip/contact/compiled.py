@@ -95,9 +95,7 @@ def checked_weights(weights: FloatArray, n: int) -> FloatArray:
 
 
 def compile_contacts(
-    laws: Sequence[ContactLaw],
-    weights: FloatArray | None = None,
-    evaluator: Evaluator = "intervals",
+    laws: Sequence[ContactLaw], weights: FloatArray | None = None, evaluator: Evaluator = "intervals"
 ) -> CompiledContacts:
     """Sort `laws` by evaluator and lay their parameters out in arrays.
 
@@ -173,7 +171,5 @@ def _marched(laws: Sequence[ContactLaw], contacts: IntArray, kernel: Any) -> Mar
         contacts,
         kernel,
         np.array([laws[c].parameters() for c in contacts], dtype=float),
-        np.array([laws[c].initial_state() for c in contacts], dtype=float).reshape(
-            contacts.size, -1
-        ),
+        np.array([laws[c].initial_state() for c in contacts], dtype=float).reshape(contacts.size, -1),
     )

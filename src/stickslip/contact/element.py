@@ -33,9 +33,7 @@ def element(
 element_step = kernel_in("element")
 
 
-def slider_start(
-    residual_traction: float | None, slider: tuple[float, float] | None = None
-) -> FloatArray:
+def slider_start(residual_traction: float | None, slider: tuple[float, float] | None = None) -> FloatArray:
     """Return the (2,) slider positions before t = 0: `slider`, zero without one, or NaN where a residual traction decides."""
     if residual_traction is not None:
         return np.full(2, np.nan)

@@ -12,17 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.cache import njit
 from stickslip.contact.element import K_N, MU, PRELOAD, UNILATERAL
 from stickslip.contact.law import NN, SLIP, STICK, TN, TT
-from stickslip.contact.slider import (
-    ANCHOR,
-    BY_NORMAL,
-    NO_ANCHOR,
-    PERIOD,
-    PLACE,
-    SIGN,
-    START,
-    STATE,
-    scratch,
-)
+from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, PLACE, SIGN, START, STATE, scratch
 from stickslip.contact.trigonometric import add_means, harmonics_at, product_matrix
 
 UNKEPT = -1  # count of events that found no room: round-off made more than such gaps have
@@ -57,9 +47,7 @@ class Events:
     @property
     def none(self) -> bool:
         """Whether no state changes: then forces are linear in the gaps, and have no harmonics that these have not."""
-        return bool(
-            self.whole and np.all(self.n_crossings == 0) and np.max(self.n_segments, initial=0) <= 1
-        )
+        return bool(self.whole and np.all(self.n_crossings == 0) and np.max(self.n_segments, initial=0) <= 1)
 
 
 def room_for_events(order: int, elements: int) -> Events:
@@ -205,7 +193,7 @@ def keep_rows(values, count, kept):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _integrate_events(  # type: ignore[no-untyped-def]
     polynomials, elements, first, crossings, n_crossings, starts_open, segments, n_segments, coefficients, blocks
-):  # fmt: skip
+):
     """Fill coefficients and derivatives of all contacts from their events; the gaps may have more coefficients than there were."""
     work = scratch(polynomials.shape[2], 0, 0)
     for c in range(polynomials.shape[0]):
@@ -215,17 +203,21 @@ def _integrate_events(  # type: ignore[no-untyped-def]
             row, normal = elements[e], polynomials[c, 2]
             limit_slope = fill_limit(normal, row, work)
             keep_rows(crossings[e], n_crossings[e], work.roots[0])
-            add_normal_force(
-                normal, row, n_crossings[e], starts_open[e], work, coefficients[c, 2], blocks[c, NN]
-            )
+            add_normal_force(normal, row, n_crossings[e], starts_open[e], work, coefficients[c, 2], blocks[c, NN])
             for d in range(2):
                 if row[d] == 0.0:
                     continue
                 count = keep_rows(segments[e, d], n_segments[e, d], work.segments)
                 integrate_spring(
-                    polynomials[c, d], row[d], limit_slope, count, work,
-                    coefficients[c, d], blocks[c, TT + d], blocks[c, TN + d],
-                )  # fmt: skip
+                    polynomials[c, d],
+                    row[d],
+                    limit_slope,
+                    count,
+                    work,
+                    coefficients[c, d],
+                    blocks[c, TT + d],
+                    blocks[c, TN + d],
+                )
 
 
 def integrated(
@@ -257,7 +249,15 @@ def integrated(
     coefficients = np.empty_like(polynomials)
     blocks = np.empty((n, pairs, m, m))
     _integrate_events(
-        polynomials, elements, first, events.crossings, events.n_crossings, events.starts_open, events.segments,
-        events.n_segments, coefficients, blocks,
-    )  # fmt: skip
+        polynomials,
+        elements,
+        first,
+        events.crossings,
+        events.n_crossings,
+        events.starts_open,
+        events.segments,
+        events.n_segments,
+        coefficients,
+        blocks,
+    )
     return coefficients.reshape(3 * n, m).T, blocks

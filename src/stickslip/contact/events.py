@@ -27,16 +27,7 @@ from stickslip.contact.event_integrals import (
     room_for_events,
 )
 from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT
-from stickslip.contact.slider import (
-    PERIOD,
-    PLACE,
-    SIGN,
-    START,
-    STATE,
-    find_segments,
-    scratch,
-    zeros,
-)
+from stickslip.contact.slider import PERIOD, PLACE, SIGN, START, STATE, find_segments, scratch, zeros
 from stickslip.contact.steps.element import normal_contact
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import search_grid
@@ -74,7 +65,7 @@ def _sample_tangent(gap, k, limit, count, segments, force, state):  # type: igno
 @njit(cache=True)
 def _element(  # type: ignore[no-untyped-def]
     polynomials, row, e, gap, grid, n_x, work, coefficients, blocks, force, state, kept
-):  # fmt: skip
+):
     """Add coefficients, derivatives and samples of elementary contact `e`; its states are written to `state`, its events kept."""
     crossings, n_crossings, begins_open, segments, n_segments = kept
     limit_slope = fill_limit(polynomials[2], row, work)
@@ -94,16 +85,14 @@ def _element(  # type: ignore[no-untyped-def]
         count = find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work)
         if keeps:
             n_segments[e, d] = keep_rows(work.segments, count, segments[e, d])
-        integrate_spring(
-            x, k, limit_slope, count, work, coefficients[d], blocks[TT + d], blocks[TN + d]
-        )
+        integrate_spring(x, k, limit_slope, count, work, coefficients[d], blocks[TT + d], blocks[TN + d])
         _sample_tangent(gap[d], k, work.pressure, count, work.segments, force[d], state[d])
 
 
 @njit(cache=True)
 def _contact(  # type: ignore[no-untyped-def]
     polynomials, elements, start, end, gap, grid, work, n_x, other, coefficients, blocks, force, state, kept
-):  # fmt: skip
+):
     """Evaluate one contact, the sum of elements `start` to before `end`; it slips where their states differ."""
     coefficients[:] = 0.0
     blocks[:] = 0.0
@@ -111,20 +100,7 @@ def _contact(  # type: ignore[no-untyped-def]
     n_x[:] = -1
     for e in range(start, end):
         own = state if e == start else other
-        _element(
-            polynomials,
-            elements[e],
-            e,
-            gap,
-            grid,
-            n_x,
-            work,
-            coefficients,
-            blocks,
-            force,
-            own,
-            kept,
-        )
+        _element(polynomials, elements[e], e, gap, grid, n_x, work, coefficients, blocks, force, own, kept)
         if e > start:
             for d in range(2):
                 for i in range(gap.shape[1]):
@@ -135,7 +111,7 @@ def _contact(  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _contacts(  # type: ignore[no-untyped-def]
     start, end, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
-):  # fmt: skip
+):
     """Evaluate the contacts from `start` to before `end`."""
     samples = gap.shape[2]
     work = scratch(polynomials.shape[2], grid.shape[1], samples)
@@ -143,15 +119,27 @@ def _contacts(  # type: ignore[no-untyped-def]
     other = np.empty((2, samples), np.int64)
     for c in range(start, end):
         _contact(
-            polynomials[c], elements, first[c], first[c + 1], gap[c], grid, work, n_x, other,
-            coefficients[c], blocks[c], force[c], state[c], kept,
-        )  # fmt: skip
+            polynomials[c],
+            elements,
+            first[c],
+            first[c + 1],
+            gap[c],
+            grid,
+            work,
+            n_x,
+            other,
+            coefficients[c],
+            blocks[c],
+            force[c],
+            state[c],
+            kept,
+        )
 
 
 @njit(cache=True)
 def contact_events(  # type: ignore[no-untyped-def]
     polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
-):  # fmt: skip
+):
     """Evaluate all contacts over one period, exactly.
 
     Parameters
@@ -178,23 +166,30 @@ def contact_events(  # type: ignore[no-untyped-def]
     kept
         Out: the arrays of `Events` after the polynomials, or empty ones.
     """
-    _contacts(
-        0, gap.shape[0],
-        polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept,
-    )  # fmt: skip
+    _contacts(0, gap.shape[0], polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept)
 
 
 @njit(cache=True, parallel=True)
 def contact_events_threads(  # type: ignore[no-untyped-def]
     shares, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
-):  # fmt: skip
+):
     """Do the same as `contact_events` in `shares` that threads take in turn."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(
-            share * n // shares, (share + 1) * n // shares,
-            polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept,
-        )  # fmt: skip
+            share * n // shares,
+            (share + 1) * n // shares,
+            polynomials,
+            elements,
+            first,
+            grid,
+            gap,
+            coefficients,
+            blocks,
+            force,
+            state,
+            kept,
+        )
 
 
 @lru_cache(maxsize=32)
@@ -248,7 +243,7 @@ def exact_period(
         return coefficients.reshape(width, m).T, blocks, force, state
     room = room_for_events(0, 0) if kept is None else kept
     out = room.crossings, room.n_crossings, room.starts_open, room.segments, room.n_segments
-    arrays = (polynomials, elements, first, _grid((m - 1) // 2), gap, coefficients, blocks, force, state, out)  # fmt: skip
+    arrays = (polynomials, elements, first, _grid((m - 1) // 2), gap, coefficients, blocks, force, state, out)
     shares = thread_shares(n)
     if shares > 1:
         contact_events_threads(shares, *arrays)

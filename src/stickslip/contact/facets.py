@@ -17,9 +17,7 @@ REFERENCE_NODES = {
     3: np.array([[0, 0], [1, 0], [0, 1]], dtype=float),
     4: np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float),
     6: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]),
-    8: np.array(
-        [[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]], dtype=float
-    ),
+    8: np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]], dtype=float),
 }
 CENTRE = {kind: nodes[: CORNERS[kind]].mean(axis=0) for kind, nodes in REFERENCE_NODES.items()}
 

@@ -90,9 +90,7 @@ class Interface:
             state = law.initial_state()
             jac = np.zeros((3 + state.size, 6 + state.size))
             status = np.empty(2, dtype=np.int64)
-            law.kernel(
-                rest, rest, state, law.parameters(), force, np.empty_like(state), jac, status
-            )
+            law.kernel(rest, rest, state, law.parameters(), force, np.empty_like(state), jac, status)
         return (self.factors[:, None] * out).reshape(-1)
 
     @property
@@ -102,9 +100,7 @@ class Interface:
 
     def sprung(self, stiffness: float) -> "Interface":
         """Return the interface with springs of a stiffness (N/m) in place of rigid contacts."""
-        laws = (
-            law.softened(stiffness) if isinstance(law, RigidCoulomb) else law for law in self.laws
-        )
+        laws = (law.softened(stiffness) if isinstance(law, RigidCoulomb) else law for law in self.laws)
         return replace(self, laws=tuple(laws))
 
     def coordinates(self) -> IntArray:
@@ -201,10 +197,7 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
     n_contacts, n_pairs, m, _ = blocks.shape
     width = columns.shape[1]
     local = np.empty((3, 3))
-    stride, place = (
-        np.uintp(n),
-        columns.astype(np.uintp),
-    )  # no sign to be looked at in the inner loop
+    stride, place = (np.uintp(n), columns.astype(np.uintp))  # no sign to be looked at in the inner loop
     for c in range(n_contacts):
         b, own = values[c], place[c]
         for q in range(m):
@@ -224,6 +217,4 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
                     row_n = local[2, 0] * b[0, j] + local[2, 1] * b[1, j] + local[2, 2] * b[2, j]
                     col = np.uintp(q) * stride + own[j]
                     for i in range(width):
-                        jac[np.uintp(p) * stride + own[i], col] += (
-                            b[0, i] * row_t + b[1, i] * row_w + b[2, i] * row_n
-                        )
+                        jac[np.uintp(p) * stride + own[i], col] += b[0, i] * row_t + b[1, i] * row_w + b[2, i] * row_n

@@ -43,11 +43,7 @@ def prefix_sums(order: int, samples: int) -> tuple[FloatArray, FloatArray, Float
     basis[:, 1::2] = cos[:, 1 : order + 1]
     basis[:, 2::2] = sin[:, 1 : order + 1]
     zero = np.zeros((1, 2 * order + 1))
-    return (
-        basis,
-        np.vstack([zero, np.cumsum(cos, axis=0)]),
-        np.vstack([zero, np.cumsum(sin, axis=0)]),
-    )
+    return (basis, np.vstack([zero, np.cumsum(cos, axis=0)]), np.vstack([zero, np.cumsum(sin, axis=0)]))
 
 
 @njit(cache=True)
@@ -145,7 +141,7 @@ def _march_tangent(x, limit, is_open, k, start, force, state, spans, signs):  # 
 @njit(cache=True)
 def _tangent_blocks(  # type: ignore[no-untyped-def]
     spans, signs, count, k, limit_slope, basis, cos_table, sin_table, sums, block_x, block_n
-):  # fmt: skip
+):
     """Add the derivatives of one tangential force by its own displacement and by the normal gap, from its intervals."""
     n = basis.shape[0]
     order = (basis.shape[1] - 1) // 2
@@ -231,12 +227,10 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
             for i in range(n):
                 state[d, i] = OPEN if is_open[i] else STICK
             continue
-        count = _march_tangent(
-            gap[d], limit, is_open, k, row[RESIDUAL], force[d], state[d], spans, signs
-        )
+        count = _march_tangent(gap[d], limit, is_open, k, row[RESIDUAL], force[d], state[d], spans, signs)
         _tangent_blocks(
             spans, signs, count, k, limit_slope, basis, cos_table, sin_table, sums, blocks[TT + d], blocks[TN + d]
-        )  # fmt: skip
+        )
 
 
 @njit(cache=True)
@@ -251,23 +245,24 @@ def _merge(state, other):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _contacts(  # type: ignore[no-untyped-def]
     start, end, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
-):  # fmt: skip
+):
     """Evaluate the contacts from `start` to before `end`."""
     n = gap.shape[2]
     size = cos_table.shape[1]
     work = (
-        np.empty(n), np.empty(n, np.bool_), np.empty((n, 3), np.int64), np.empty(n),
+        np.empty(n),
+        np.empty(n, np.bool_),
+        np.empty((n, 3), np.int64),
+        np.empty(n),
         (np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
-    )  # fmt: skip
+    )
     other = np.empty((2, n), np.int64)
     for c in range(start, end):
         force[c] = 0.0
         blocks[c] = 0.0
         for e in range(first[c], first[c + 1]):
             own = state[c] if e == first[c] else other
-            _element_period(
-                gap[c], elements[e], basis, cos_table, sin_table, force[c], own, blocks[c], work
-            )
+            _element_period(gap[c], elements[e], basis, cos_table, sin_table, force[c], own, blocks[c], work)
             if e > first[c]:
                 _merge(state[c], other)
 
@@ -294,19 +289,26 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
         Out: (n_contacts, P, m, m) derivatives of Fourier coefficients of the force by those of the gap, m = 2 order + 1, of which the
         first five differ from zero: t by t, w by w, n by n, t by n, w by n.
     """
-    _contacts(
-        0, gap.shape[0], gap, elements, first, basis, cos_table, sin_table, force, state, blocks
-    )
+    _contacts(0, gap.shape[0], gap, elements, first, basis, cos_table, sin_table, force, state, blocks)
 
 
 @njit(cache=True, parallel=True)
 def contact_period_threads(  # type: ignore[no-untyped-def]
     shares, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
-):  # fmt: skip
+):
     """Do the same as `contact_period` in `shares` that threads take in turn."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(
-            share * n // shares, (share + 1) * n // shares,
-            gap, elements, first, basis, cos_table, sin_table, force, state, blocks,
-        )  # fmt: skip
+            share * n // shares,
+            (share + 1) * n // shares,
+            gap,
+            elements,
+            first,
+            basis,
+            cos_table,
+            sin_table,
+            force,
+            state,
+            blocks,
+        )

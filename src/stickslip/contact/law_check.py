@@ -14,9 +14,7 @@ KINK = 1e-3  # difference of both sides, relative to the largest outcome, at whi
 WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides is a hundred times smaller
 
 
-def check_law(
-    law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0
-) -> None:
+def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0) -> None:
     """Compare the derivatives of a law with differences along a random path, and its normal force and stuck stiffness with them.
 
     A positive normal gap is open: the pressure ``N = -force[2]`` must not grow with it. A law that never opens, such as a spring of negative
@@ -47,26 +45,19 @@ def check_law(
     state = np.asarray(law.initial_state(), dtype=float)
     path = []
     for _ in range(steps):
-        point = np.concatenate(
-            [size * rng.standard_normal(3), rate * rng.standard_normal(3), state]
-        )
+        point = np.concatenate([size * rng.standard_normal(3), rate * rng.standard_normal(3), state])
         out, jac, _ = _step(law, point)
         if not np.any(np.isnan(state)):
             path.append((point, out, jac))
         state = out[3:]
     out_scale = np.concatenate(
-        [
-            np.full(3, np.max([np.abs(o[:3]) for _, o, _ in path])),
-            np.max([np.abs(o[3:]) for _, o, _ in path], axis=0),
-        ]
+        [np.full(3, np.max([np.abs(o[:3]) for _, o, _ in path])), np.max([np.abs(o[3:]) for _, o, _ in path], axis=0)]
     )
     out_scale[out_scale == 0.0] = 1.0
     in_scale = np.concatenate([np.full(3, size), np.full(3, rate), out_scale[3:]])
     compared = sum(_compare(law, *stop, out_scale, in_scale) for stop in path)
     if compared == 0:
-        raise _refused(
-            law, "each point of the path is next to a kink", "Give another `size` or `rate`."
-        )
+        raise _refused(law, "each point of the path is next to a kink", "Give another `size` or `rate`.")
     stops = [point for point, _, _ in path] + _at_rest(law, size)
     _check_normal(law, stops, size)
     _check_stuck(law, stops)
@@ -139,19 +130,12 @@ def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray, I
     if np.any(status < 0) or np.any(np.isnan(out)):
         names = ["status"] if np.any(status < 0) else []
         names += [_output(int(i)) for i in np.flatnonzero(np.isnan(out))]
-        raise _refused(
-            law, f"the step does not fill {', '.join(names)}", "Fill every output in every branch."
-        )
+        raise _refused(law, f"the step does not fill {', '.join(names)}", "Fill every output in every branch.")
     return out, jac, status
 
 
 def _compare(
-    law: ContactLaw,
-    point: FloatArray,
-    out: FloatArray,
-    jac: FloatArray,
-    out_scale: FloatArray,
-    in_scale: FloatArray,
+    law: ContactLaw, point: FloatArray, out: FloatArray, jac: FloatArray, out_scale: FloatArray, in_scale: FloatArray
 ) -> int:
     """Compare all derivatives at one point and return how many columns were not at a kink."""
     for pair in PAIRS[law.pairs : FULLY_COUPLED]:

@@ -15,13 +15,7 @@ _FOURTH = math.sqrt(70.0)  # standard deviation of fourth differences of noise o
 
 
 def doubts(
-    model: LoopModel,
-    fitted: FloatArray,
-    slips: FloatArray,
-    *,
-    k_t: float,
-    limit: float,
-    least: tuple[float, float],
+    model: LoopModel, fitted: FloatArray, slips: FloatArray, *, k_t: float, limit: float, least: tuple[float, float]
 ) -> list[str]:
     """Return a sentence for each thing that the loops cannot tell or that is doubtful.
 
@@ -112,9 +106,7 @@ def _trend(model: LoopModel, away: FloatArray) -> list[str]:
         noise = float(np.std(part - slope * t)) / math.sqrt(float(t @ t))
         if abs(slope) > DRIFTS * grow * noise and abs(slope) > 1e-9 * model.swing:
             of = f" of recording {j + 1}" * (len(model.loops) > 1)
-            return [
-                f"The force{of} drifts by {2 * slope:.3g} N from its first to its last sample: fit with a drift"
-            ]
+            return [f"The force{of} drifts by {2 * slope:.3g} N from its first to its last sample: fit with a drift"]
     return []
 
 

@@ -19,10 +19,7 @@ SURE = 5.0  # standard deviations beyond which a slope has a sign
 FLOOR = 1e-9  # of the force's swing: residuals below are rounding
 KEPT = 1e-7  # singular value, relative to the largest, below which a combination of unknowns is not told
 TOLD = 1e-3  # part of a parameter in such a combination from which on it is not told
-TRIED = (
-    np.geomspace(1.0, 300.0, 24),
-    np.linspace(0.4, 1.0, 13),
-)  # stiffnesses and limits, in those of the loop
+TRIED = (np.geomspace(1.0, 300.0, 24), np.linspace(0.4, 1.0, 13))  # stiffnesses and limits, in those of the loop
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -138,9 +135,7 @@ def fit_loops(
     least = _least(model, found)
     variance = found.squares / max(model.measured.size - found.unknowns, 1)
     k_t, covariance = _without_machine(found, machine_stiffness)
-    told = doubts(
-        model, found.fitted, found.slips, k_t=found.stiffness, limit=found.limit, least=least
-    )
+    told = doubts(model, found.fitted, found.slips, k_t=found.stiffness, limit=found.limit, least=least)
     return LoopFit(
         k_t=k_t,
         limit=found.limit,
@@ -182,9 +177,15 @@ def _checked(loops: Sequence[Loop]) -> tuple[Loop, ...]:
 def _check_numbers(load: float | None, deviation: float, machine: float | None) -> None:
     for name, value in (("normal_load", load), ("machine_stiffness", machine)):
         if value is not None and not (math.isfinite(value) and value > 0):
-            raise input_error(f"fit_loops: {name}", f"must be positive, got {value:g}", "Leave it out where it is not known.")  # fmt: skip
+            raise input_error(
+                f"fit_loops: {name}", f"must be positive, got {value:g}", "Leave it out where it is not known."
+            )
     if not (math.isfinite(deviation) and deviation >= 0):
-        raise input_error("fit_loops: normal_load_deviation", f"must not be negative, got {deviation:g}", "Give the standard deviation in N.")  # fmt: skip
+        raise input_error(
+            "fit_loops: normal_load_deviation",
+            f"must not be negative, got {deviation:g}",
+            "Give the standard deviation in N.",
+        )
 
 
 def _simplest(model: LoopModel) -> _Found:
@@ -217,7 +218,7 @@ def _stuck(model: LoopModel) -> _Found:
     fit = model.line()
     covariance = np.diag([fit.deviation**2, math.nan])
     slips = np.zeros(fit.fitted.size)
-    return _Found(float(fit.values[0]), math.nan, covariance, fit.squares, fit.values.size, fit.fitted, slips)  # fmt: skip
+    return _Found(float(fit.values[0]), math.nan, covariance, fit.squares, fit.values.size, fit.fitted, slips)
 
 
 def _slipping(model: LoopModel) -> _Found:
@@ -245,7 +246,7 @@ def _both(model: LoopModel) -> _Found:
     lowest[:2] = 1e-6
     solved = least_squares(
         residual, start, jac="3-point", bounds=(lowest, np.inf), x_scale=1.0, xtol=1e-12, ftol=1e-12, gtol=1e-12
-    )  # fmt: skip
+    )
     z = solved.x
     units = np.array([k_unit, unit])
     freedom = max(model.measured.size - z.size, 1)
@@ -328,9 +329,7 @@ def _of_setup(load: float | None, machine: float | None, found: _Found) -> list[
     """Say what no loop tells."""
     told = []
     if load is None and math.isfinite(found.limit):
-        told.append(
-            "The normal load is not given: the limit force is told, the friction coefficient is not"
-        )
+        told.append("The normal load is not given: the limit force is told, the friction coefficient is not")
     if machine is None and math.isfinite(found.stiffness):
         told.append(
             "The stiffness is that of everything between the two places whose relative displacement was measured: a loop cannot tell "

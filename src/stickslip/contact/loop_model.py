@@ -107,8 +107,12 @@ class LoopModel:
         """Fit a contact that never slips; the first value is the stiffness."""
         moved = np.concatenate([x - x.mean() for x, _ in self.loops])
         intercepts = [self._only(j, np.ones(x.size)) for j, (x, _) in enumerate(self.loops)]
-        drifts = [self.sensor[:, 1 + 2 * j] if self.offset else self.sensor[:, j] for j in range(len(self.loops))] if self.drift else []  # fmt: skip
-        return _line(np.stack([moved / self.stroke, *intercepts, *drifts], axis=1), self.measured, self.stroke)  # fmt: skip
+        drifts = (
+            [self.sensor[:, 1 + 2 * j] if self.offset else self.sensor[:, j] for j in range(len(self.loops))]
+            if self.drift
+            else []
+        )
+        return _line(np.stack([moved / self.stroke, *intercepts, *drifts], axis=1), self.measured, self.stroke)
 
     def direction(self) -> "Line":
         """Fit a contact that always slips; the first value is the limit. First samples tell nothing of it."""

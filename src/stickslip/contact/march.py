@@ -21,7 +21,9 @@ from stickslip.contact.law import PAIRS
 MAX_PERIODS = 400
 ROUNDING = 1e-14  # change over a period that counts as none, as a share of the state's range
 SETTLED = 1e-12  # largest distance from the periodic state, in the same measure
-NOISE = 10.0  # times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
+NOISE = (
+    10.0  # times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
+)
 ROWS = 1e3  # the same two numbers are larger by this factor for derivatives
 KEPT = 1e-11  # singular value below which a direction is said to keep its memory for ever
 
@@ -109,19 +111,43 @@ def _workspace(n_state, n_pairs, n_samples, m):  # type: ignore[no-untyped-def]
     """Arrays that a march writes on: of a sample, of derivatives, the ranges of the state, and derivatives of the force on samples."""
     of_state = (n_state, 3, m)
     return (
-        (np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(n_state),
-         np.empty((3 + n_state, 6 + n_state)), np.empty(2, np.int64)),
+        (
+            np.empty(3),
+            np.empty(3),
+            np.empty(3),
+            np.empty(3),
+            np.empty(n_state),
+            np.empty((3 + n_state, 6 + n_state)),
+            np.empty(2, np.int64),
+        ),
         (np.empty(of_state), np.empty(n_state), np.empty((3, 3, m)), np.empty(3), np.empty((n_state, n_state))),
         (np.empty(n_state), np.empty(n_state)),
         np.empty((n_pairs, n_samples, m)),
-    )  # fmt: skip
+    )
 
 
 @njit(cache=True)
 def _one_period(  # type: ignore[no-untyped-def]
-    step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map, work,
-    record, track, force, state, by_omega,
-):  # fmt: skip
+    step,
+    parameters,
+    c,
+    first,
+    gap,
+    velocity,
+    basis,
+    basis_rate,
+    omega,
+    s,
+    rows,
+    s_omega,
+    period_map,
+    work,
+    record,
+    track,
+    force,
+    state,
+    by_omega,
+):
     """March one contact over a period from the state `s`; its derivatives, and with `track` the `period_map`, go along."""
     u, v, v_by_omega, f, new, jac, status = work[0]
     new_rows, new_omega, force_rows, f_omega, new_map = work[1]
@@ -138,9 +164,9 @@ def _one_period(  # type: ignore[no-untyped-def]
         _load(c, i, gap, velocity, omega, u, v, v_by_omega)
         jac[:] = 0.0
         step(u, v, s, parameters[c], f, new, jac, status)
-        _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, new_rows, new_omega, 3, n_state)  # fmt: skip
+        _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, new_rows, new_omega, 3, n_state)
         if record:
-            _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, force_rows, f_omega, 0, 3)  # fmt: skip
+            _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, force_rows, f_omega, 0, 3)
             for k in range(force_history.shape[0]):
                 force_history[k, i] = force_rows[_PAIRS[k, 0], _PAIRS[k, 1]]
             for a in range(3):
@@ -207,9 +233,8 @@ def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # typ
 
 @njit(cache=True)
 def _settle(  # type: ignore[no-untyped-def]
-    step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work,
-    force, state, by_omega,
-):  # fmt: skip
+    step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work, force, state, by_omega
+):
     """March contact `c` from the state `s` until it is periodic; return the periods this took, or -1."""
     n_state = s.size
     scale, row_scale = np.empty(n_state), np.empty(n_state)
@@ -218,15 +243,53 @@ def _settle(  # type: ignore[no-untyped-def]
     safe, safe_rows, safe_omega = s.copy(), rows.copy(), s_omega.copy()
     last, plain, patience = np.inf, 0, 1
     memory = n_state > 0
-    _one_period(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
-                work, not memory, False, force, state, by_omega)  # fmt: skip
+    _one_period(
+        step,
+        parameters,
+        c,
+        first,
+        gap,
+        velocity,
+        basis,
+        basis_rate,
+        omega,
+        s,
+        rows,
+        s_omega,
+        period_map,
+        work,
+        not memory,
+        False,
+        force,
+        state,
+        by_omega,
+    )
     if not memory:
         return 1
     for period in range(1, MAX_PERIODS):
         before, rows_before, omega_before = s.copy(), rows.copy(), s_omega.copy()
         track = period > 1
-        _one_period(step, parameters, c, 0, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
-                    work, True, track, force, state, by_omega)  # fmt: skip
+        _one_period(
+            step,
+            parameters,
+            c,
+            0,
+            gap,
+            velocity,
+            basis,
+            basis_rate,
+            omega,
+            s,
+            rows,
+            s_omega,
+            period_map,
+            work,
+            True,
+            track,
+            force,
+            state,
+            by_omega,
+        )
         _scales(work[2], largest_gap, scale, row_scale, rows)
         change, row_change, omega_change = s - before, rows - rows_before, s_omega - omega_before
         moved, turned = _largest(change, scale), _largest(row_change, row_scale)
@@ -237,9 +300,7 @@ def _settle(  # type: ignore[no-untyped-def]
         _to_fixed_point(period_map, scale, change, row_change, omega_change)
         distance, row_distance = _largest(change, scale), _largest(row_change, row_scale)
         noise = NOISE * ROUNDING if last < np.inf else ROUNDING
-        if (moved <= noise or distance <= SETTLED) and (
-            turned <= ROWS * noise or row_distance <= ROWS * SETTLED
-        ):
+        if (moved <= noise or distance <= SETTLED) and (turned <= ROWS * noise or row_distance <= ROWS * SETTLED):
             return period + 1
         if plain > 0:
             plain -= 1
@@ -250,7 +311,7 @@ def _settle(  # type: ignore[no-untyped-def]
         else:
             last = moved
             safe[:], safe_rows[:], safe_omega[:] = s, rows, s_omega
-            s[:], rows[:], s_omega[:] = before + change, rows_before + row_change, omega_before + omega_change  # fmt: skip
+            s[:], rows[:], s_omega[:] = before + change, rows_before + row_change, omega_before + omega_change
     return -1
 
 
@@ -261,8 +322,8 @@ def period_march() -> Any:
 
 
 def march_period(  # type: ignore[no-untyped-def]
-    address, parameters, start, gap, velocity, basis, basis_rate, omega, force, state, blocks, by_omega, periods,
-):  # fmt: skip
+    address, parameters, start, gap, velocity, basis, basis_rate, omega, force, state, blocks, by_omega, periods
+):
     """March contacts of one law until they are periodic; forces and derivatives are those of the last period.
 
     Parameters
@@ -298,6 +359,22 @@ def march_period(  # type: ignore[no-untyped-def]
         s_omega[:] = 0.0
         rows[:] = 0.0
         first = -1 if np.any(np.isnan(s)) else 0
-        periods[c] = _settle(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega,
-                             work, force, state, by_omega)  # fmt: skip
+        periods[c] = _settle(
+            step,
+            parameters,
+            c,
+            first,
+            gap,
+            velocity,
+            basis,
+            basis_rate,
+            omega,
+            s,
+            rows,
+            s_omega,
+            work,
+            force,
+            state,
+            by_omega,
+        )
         _blocks_of(work[3], basis, blocks[c])

@@ -13,9 +13,7 @@ COVERED = 1e-3  # share of side A that may stand beyond side B
 TINY = 1e-14  # weights below are rounding
 
 
-def mortar_tie(
-    a: Surface, b: Surface, *, reach: float | None = None, held: BoolArray | None = None
-) -> Matrix:
+def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: BoolArray | None = None) -> Matrix:
     """Return the weights by which the nodes of side A follow those of side B.
 
     The difference of both sides' displacements vanishes in the mean over side A, weighted by each of its shape functions:
@@ -45,9 +43,7 @@ def mortar_tie(
     loose = np.setdiff1d(np.arange(len(a.points)), a.used)
     if loose.size or not len(a.facets):
         assert a.numbers is not None
-        named = (
-            f"node {a.numbers[loose[0]]} of side A spans no facet, {loose.size} such nodes in all"
-        )
+        named = f"node {a.numbers[loose[0]]} of side A spans no facet, {loose.size} such nodes in all"
         raise input_error(
             "segment_to_segment",
             named if loose.size else "side A has no facets",
@@ -72,7 +68,5 @@ def mortar_tie(
     moves = np.arange(len(a.points)) if held is None else np.flatnonzero(~held)
     weighted = (on_a[:, moves] * found.weight[:, None]).T
     weights = np.zeros((len(a.points), len(b.points)))
-    weights[moves] = np.linalg.solve(
-        (weighted @ on_a[:, moves]).toarray(), (weighted @ on_b).toarray()
-    )
+    weights[moves] = np.linalg.solve((weighted @ on_a[:, moves]).toarray(), (weighted @ on_b).toarray())
     return scipy.sparse.csr_array(np.where(np.abs(weights) > TINY, weights, 0.0))

@@ -71,13 +71,7 @@ def neighbour_interface(
 
 
 def neighbour_gaps(
-    sector: Structure,
-    sectors: int,
-    *,
-    low: str,
-    high: str,
-    axis: Axis = Z_AXIS,
-    normal: FloatArray | None = None,
+    sector: Structure, sectors: int, *, low: str, high: str, axis: Axis = Z_AXIS, normal: FloatArray | None = None
 ) -> tuple[Matrix, Matrix]:
     """Return the gaps between a sector's high face and the low face of the next sector.
 
@@ -101,15 +95,10 @@ def neighbour_gaps(
     """
     to_frame = _frame(sector, (low, high), axis, normal).T
     turned = to_frame @ axis.rotation(2 * np.pi / sectors)
-    return (
-        -_rows(_nodes(sector, high), to_frame, sector.n),
-        _rows(_nodes(sector, low), turned, sector.n),
-    )
+    return (-_rows(_nodes(sector, high), to_frame, sector.n), _rows(_nodes(sector, low), turned, sector.n))
 
 
-def _frame(
-    structure: Structure, names: tuple[str, str], axis: Axis, normal: FloatArray | None
-) -> FloatArray:
+def _frame(structure: Structure, names: tuple[str, str], axis: Axis, normal: FloatArray | None) -> FloatArray:
     """Return the (3, 3) columns t, w, n of the high face of sector 0."""
     low, high = names
     own, partner = _nodes(structure, high), _nodes(structure, low)
@@ -128,9 +117,7 @@ def _frame(
 def _rows(nodes: IntArray, to_frame: FloatArray, n: int) -> Matrix:
     """Return the (3 p, n) operator to the displacements of nodes (p, 3) in a frame."""
     row = np.arange(nodes.size)
-    pick = scipy.sparse.csr_array(
-        (np.ones(nodes.size), (row, nodes.ravel())), shape=(nodes.size, n)
-    )
+    pick = scipy.sparse.csr_array((np.ones(nodes.size), (row, nodes.ravel())), shape=(nodes.size, n))
     turn = scipy.sparse.kron(scipy.sparse.eye_array(len(nodes)), to_frame, format="csr")
     return scipy.sparse.csr_array(turn @ pick)
 

@@ -11,9 +11,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.facets import (
-    positions,
-)
+from stickslip.contact.facets import positions
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.projection import facet_balls, project
@@ -92,12 +90,7 @@ def contact_frames(normal: FloatArray, direction: Direction) -> FloatArray:
 
 
 def node_to_node(
-    a: Surface,
-    b: Surface,
-    *,
-    tolerance: float,
-    direction: Direction = (1.0, 0.0, 0.0),
-    outside: Outside = "error",
+    a: Surface, b: Surface, *, tolerance: float, direction: Direction = (1.0, 0.0, 0.0), outside: Outside = "error"
 ) -> Pairing:
     """Pair each node of side A with the nearest node of side B: for matching meshes.
 
@@ -125,9 +118,13 @@ def node_to_node(
     lost = distance > tolerance
     if lost.any() and (outside == "error" or lost.all()):
         raise _without_partner(
-            "node_to_node", a, nodes[lost], distance[lost], f"node of side B nearer than {tolerance:g} m",
+            "node_to_node",
+            a,
+            nodes[lost],
+            distance[lost],
+            f"node of side B nearer than {tolerance:g} m",
             "Raise the tolerance, match the meshes, or pair by node_to_segment$outside.",
-        )  # fmt: skip
+        )
     nodes, partner = nodes[~lost], partner[~lost]
     twice, count = np.unique(partner, return_counts=True)
     if np.any(count > 1):
@@ -194,16 +191,23 @@ def node_to_segment(
         beyond = feet.overhang[lost]
         if np.isfinite(beyond).all():
             raise _without_partner(
-                "node_to_segment", a, nodes[lost], beyond, "facet of side B under them: they stand beyond its rim",
+                "node_to_segment",
+                a,
+                nodes[lost],
+                beyond,
+                "facet of side B under them: they stand beyond its rim",
                 "Give $rim, or make side B the larger one$outside.",
                 rim="a tolerance of the largest of these distances, or more",
-            )  # fmt: skip
+            )
         raise _without_partner(
-            "node_to_segment", a, nodes[lost], beyond,
+            "node_to_segment",
+            a,
+            nodes[lost],
+            beyond,
             f"facet of side B that faces them within {reach:.3g} m",
             "Check that both sides' normals point outward, raise $reach, or make side B the larger one$outside.",
             reach="reach or tolerance",
-        )  # fmt: skip
+        )
     kept, facet, reference = nodes[~lost], feet.facet[~lost], feet.reference[~lost]
     facets = b.facets[facet]
     return _pairing(
@@ -304,9 +308,7 @@ def _pairing(
 
 
 def _of_nodes(direction: Direction, nodes: IntArray) -> Direction:
-    return (
-        direction[nodes] if isinstance(direction, np.ndarray) and direction.ndim > 1 else direction
-    )
+    return direction[nodes] if isinstance(direction, np.ndarray) and direction.ndim > 1 else direction
 
 
 def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
@@ -315,13 +317,7 @@ def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
 
 
 def _without_partner(
-    place: str,
-    a: Surface,
-    nodes: IntArray,
-    distance: FloatArray,
-    partner: str,
-    remedy: str,
-    **words: str,
+    place: str, a: Surface, nodes: IntArray, distance: FloatArray, partner: str, remedy: str, **words: str
 ) -> InputError:
     """Name the nodes of side A without a partner: number, place, and how far the next one is."""
     worst = np.argsort(-distance)[:LISTED]

@@ -21,9 +21,7 @@ _SIGNATURE = types.void(
 )
 
 
-def forces_along(
-    law: ContactLaw, gap: FloatArray, start: FloatArray | None = None
-) -> tuple[FloatArray, IntArray]:
+def forces_along(law: ContactLaw, gap: FloatArray, start: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
     """Return forces and states along a path that is walked slowly: velocities count as zero.
 
     Parameters

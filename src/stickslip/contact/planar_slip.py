@@ -80,13 +80,7 @@ def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
         half = (d_t * (e_w - d_w) - d_w * (e_t - d_t)) / (1.0 + cosine)
         cos, sin, kept, swung = _towards(half, left)
     swung *= -math.expm1(-size) / size
-    return (
-        cos * d_t - sin * d_w,
-        cos * d_w + sin * d_t,
-        kept,
-        -swung * d_w - sin * d_t,
-        swung * d_t - sin * d_w,
-    )
+    return (cos * d_t - sin * d_w, cos * d_w + sin * d_t, kept, -swung * d_w - sin * d_t, swung * d_t - sin * d_w)
 
 
 @njit(cache=True, error_model="numpy")
@@ -131,9 +125,7 @@ def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-u
     if k_t == k_w:
         n_t, n_w, kept, g_t, g_w = turned(e_t, e_w, mean * k_t * way_t, mean * k_t * way_w)
         pulled = k_t * (g_t * way_t + g_w * way_w)
-        return (
-            n_t, n_w, kept, mean * k_t * g_t, mean * k_t * g_w, pulled * mean_first, pulled * mean_last,
-        )  # fmt: skip
+        return (n_t, n_w, kept, mean * k_t * g_t, mean * k_t * g_w, pulled * mean_first, pulled * mean_last)
     rise = last - first
     half, half_first, half_last = _inverse_mean(first, last, 0.5)
     v_t, v_w, turn_t, turn_w, q = _pull(k_t, k_w, e_t, e_w, way_t, way_w, rise)

@@ -205,10 +205,7 @@ def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
 
 
 def add_stiffness(
-    stiffness: FloatArray | ComplexArray,
-    columns: IntArray,
-    values: FloatArray,
-    out: FloatArray | ComplexArray,
+    stiffness: FloatArray | ComplexArray, columns: IntArray, values: FloatArray, out: FloatArray | ComplexArray
 ) -> None:
     """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` a contact.
 

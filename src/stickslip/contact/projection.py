@@ -5,14 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.contact.facets import (
-    REFERENCE_NODES,
-    centres,
-    corner_counts,
-    normals,
-    positions,
-    tangents,
-)
+from stickslip.contact.facets import REFERENCE_NODES, centres, corner_counts, normals, positions, tangents
 from stickslip.contact.surface import Surface
 
 ROUNDS = 40  # of Gauss-Newton: linear convergence with the ratio gap / radius of curvature
@@ -116,9 +109,7 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
     return feet
 
 
-def closest(
-    points: FloatArray, facets: IntArray, target: FloatArray
-) -> tuple[FloatArray, IntArray]:
+def closest(points: FloatArray, facets: IntArray, target: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the closest point of one facet to each target: reference coordinates (p, 2) and its edge (p,), -1 inside.
 
     Gauss-Newton on the distance; where its result lies outside the facet, the best point of the edges.
@@ -149,9 +140,7 @@ def closest(
     return reference, edge
 
 
-def meet(
-    points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatArray
-) -> tuple[FloatArray, IntArray]:
+def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return where the line through each origin across both axes meets a facet, or its continuation.
 
     Parameters
@@ -230,9 +219,7 @@ def _rim(facets: IntArray) -> tuple[BoolArray, IntArray]:
         ends.append(np.column_stack([facets[rows, e], facets[rows, (e + 1) % corners[rows]]]))
         owner.append(np.column_stack([rows, np.full(len(rows), e)]))
     pairs, which = np.concatenate(ends), np.concatenate(owner)
-    _, inverse, count = np.unique(
-        np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
+    _, inverse, count = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True)
     single = count[inverse.ravel()] == 1
     edges = np.zeros((len(facets), 4), dtype=bool)
     edges[tuple(which[single].T)] = True

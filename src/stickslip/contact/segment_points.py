@@ -6,13 +6,7 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.contact.facets import (
-    DEGREE,
-    interpolation,
-    kinds_of,
-    normals,
-    positions,
-)
+from stickslip.contact.facets import DEGREE, interpolation, kinds_of, normals, positions
 from stickslip.contact.projection import facet_balls, meet
 from stickslip.contact.quadrature import HIGHEST_DEGREE
 from stickslip.contact.segmentation import segments
@@ -54,12 +48,7 @@ class SegmentPoints:
 
 
 def segment_points(
-    a: Surface,
-    b: Surface,
-    *,
-    reach: float | None = None,
-    degree: int | None = None,
-    outside: Outside = "error",
+    a: Surface, b: Surface, *, reach: float | None = None, degree: int | None = None, outside: Outside = "error"
 ) -> SegmentPoints:
     """Place quadrature points on the common pieces of two sides' facets; see `segment_to_segment`."""
     need_facets("segment_to_segment", a, b)
@@ -72,9 +61,7 @@ def segment_points(
     facets_a, facets_b = a.facets[found.facet_a], b.facets[found.facet_b]
     on_a, missed_a = meet(a.points, facets_a, found.place, found.axes)
     places = positions(a.points, facets_a, on_a)
-    normal = np.einsum(
-        "pk,pkc->pc", interpolation(facets_a, on_a), a.corner_normals()[found.facet_a]
-    )
+    normal = np.einsum("pk,pkc->pc", interpolation(facets_a, on_a), a.corner_normals()[found.facet_a])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     on_b, missed_b = meet(b.points, facets_b, places, _across(normal))
     _refuse_warped(found.facet_a[np.union1d(missed_a, missed_b)])
@@ -111,9 +98,7 @@ def need_facets(place: str, *sides: Surface) -> None:
     """Refuse sides that have none."""
     for name, side in zip("AB"[-len(sides) :], sides, strict=True):
         if len(side.facets) == 0:
-            raise input_error(
-                place, f"side {name} has no facets", "Give facets, or pair by node_to_node."
-            )
+            raise input_error(place, f"side {name} has no facets", "Give facets, or pair by node_to_node.")
 
 
 def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:

@@ -128,9 +128,7 @@ def clip(subject: FloatArray, window: FloatArray) -> tuple[FloatArray, IntArray]
     return polygon, count
 
 
-def _cut(
-    polygon: FloatArray, count: IntArray, start: FloatArray, along: FloatArray
-) -> tuple[FloatArray, IntArray]:
+def _cut(polygon: FloatArray, count: IntArray, start: FloatArray, along: FloatArray) -> tuple[FloatArray, IntArray]:
     """Keep what lies to the left of the line from `start` along `along`."""
     p, m, _ = polygon.shape
     column = np.arange(m)
@@ -154,9 +152,7 @@ def _cut(
 def _fan(polygons: FloatArray, count: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Split polygons into triangles: their polygon (t,), corners (t, 3, 2) and area (t,)."""
     row, last = np.nonzero(np.arange(2, polygons.shape[1]) < count[:, None])
-    triangles = np.stack(
-        [polygons[row, 0], polygons[row, last + 1], polygons[row, last + 2]], axis=1
-    )
+    triangles = np.stack([polygons[row, 0], polygons[row, last + 1], polygons[row, last + 2]], axis=1)
     first, second = (triangles[:, 1:] - triangles[:, :1]).transpose(1, 0, 2)
     return row, triangles, (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
 
@@ -194,11 +190,7 @@ def _plane_axes(cells: FloatArray, normal: FloatArray) -> FloatArray:
 
 
 def _facing_cells(
-    cells_a: FloatArray,
-    normal_a: FloatArray,
-    cells_b: FloatArray,
-    normal_b: FloatArray,
-    reach: float,
+    cells_a: FloatArray, normal_a: FloatArray, cells_b: FloatArray, normal_b: FloatArray, reach: float
 ) -> tuple[IntArray, IntArray]:
     """Return pairs of cells near each other whose normals point against each other."""
     middle_a, middle_b = cells_a.mean(axis=1), cells_b.mean(axis=1)

@@ -43,13 +43,13 @@ class Scratch(NamedTuple):
     values: FloatArray  # (cells + 1,) on the search grid
     slopes: FloatArray
     cells: FloatArray  # (DEEPEST, 3)
-    roots: FloatArray  # (5, most_sign_changes): of N, extrema of the low wall, of the high wall, of both tangential gaps
+    roots: (
+        FloatArray  # (5, most_sign_changes): of N, extrema of the low wall, of the high wall, of both tangential gaps
+    )
     nodes: FloatArray  # (3, most nodes) time, low and high wall
     kinds: IntArray
     segments: FloatArray  # (most segments, 6)
-    harmonics: (
-        FloatArray  # (3, 2, 2m-1) cos(mτ), sin(mτ) at both ends of a segment and at its anchor
-    )
+    harmonics: FloatArray  # (3, 2, 2m-1) cos(mτ), sin(mτ) at both ends of a segment and at its anchor
     means: FloatArray  # (3, 2, 2m-1) over a segment, over all stick, over all slip
     row: FloatArray
     anchor: FloatArray
@@ -63,12 +63,26 @@ def scratch(m, width, samples):  # type: ignore[no-untyped-def]
     most = most_sign_changes((m - 1) // 2)
     most_nodes = 3 * most + 2
     return Scratch(
-        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
-        np.empty(width), np.empty(width), np.empty((DEEPEST, 3)), np.empty((5, most)),
-        np.empty((3, most_nodes)), np.empty(most_nodes, np.int64), np.empty((2 * most_nodes, 6)),
-        np.empty((3, 2, 2 * m - 1)), np.empty((3, 2, 2 * m - 1)), np.empty(m), np.empty(m), np.empty((m, m)),
+        np.empty(m),
+        np.empty(m),
+        np.empty(m),
+        np.empty(m),
+        np.empty(m),
+        np.empty(m),
+        np.empty(width),
+        np.empty(width),
+        np.empty((DEEPEST, 3)),
+        np.empty((5, most)),
+        np.empty((3, most_nodes)),
+        np.empty(most_nodes, np.int64),
+        np.empty((2 * most_nodes, 6)),
+        np.empty((3, 2, 2 * m - 1)),
+        np.empty((3, 2, 2 * m - 1)),
+        np.empty(m),
+        np.empty(m),
+        np.empty((m, m)),
         np.empty(samples),
-    )  # fmt: skip
+    )
 
 
 @njit(cache=True)
@@ -84,9 +98,7 @@ def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
     """Return the number of extrema, put into `roots`."""
     derivative(polynomial, work.slope)
     derivative(work.slope, work.curvature)
-    return sign_changes(
-        work.slope, work.curvature, grid, work.values, work.slopes, work.cells, roots
-    )
+    return sign_changes(work.slope, work.curvature, grid, work.values, work.slopes, work.cells, roots)
 
 
 @njit(cache=True)
@@ -224,9 +236,7 @@ def _cell(i, z, anchor, by_normal, slip_by_normal, work, count):  # type: ignore
 def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes, work):  # type: ignore[no-untyped-def]
     """Fill ``work.segments`` with the states of the second period; return their number."""
     nodes, kinds = work.nodes, work.kinds
-    z, anchor, by_normal = _settle(
-        z, anchor, by_normal, nodes, kinds, n_nodes, starts_open, slip_by_normal
-    )
+    z, anchor, by_normal = _settle(z, anchor, by_normal, nodes, kinds, n_nodes, starts_open, slip_by_normal)
     if np.isnan(by_normal):
         by_normal = _closing_by_normal(x, work.normal, k, row, anchor)
     is_open = starts_open
@@ -242,9 +252,7 @@ def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes
         if is_open:
             count = _append(work.segments, count, tau, OPEN, 0.0, 0.0, tau, 0.0)
         else:
-            count, z, anchor, by_normal = _cell(
-                i, z, anchor, by_normal, slip_by_normal, work, count
-            )
+            count, z, anchor, by_normal = _cell(i, z, anchor, by_normal, slip_by_normal, work, count)
     return count
 
 
@@ -313,8 +321,6 @@ def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work)
         low_roots, high_roots = work.roots[1], work.roots[2]
         n_low = extrema(work.low, grid, work, low_roots)
         n_high = extrema(work.high, grid, work, high_roots)
-    count = _merge(
-        work.roots[0], n_roots, low_roots, n_low, high_roots, n_high, starts_open, work.nodes[0], work.kinds
-    )  # fmt: skip
+    count = _merge(work.roots[0], n_roots, low_roots, n_low, high_roots, n_high, starts_open, work.nodes[0], work.kinds)
     _evaluate_walls(work.low, work.high, work.nodes, work.kinds, count)
     return _march(x, k, row, z, anchor, by_normal, -limit_slope, starts_open, count, work)

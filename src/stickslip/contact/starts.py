@@ -101,7 +101,7 @@ def starts_of(interface: Interface) -> Starts:
     has = [hasattr(law, "slider") for law in laws]
     stiffness = np.array(
         [law.stuck_stiffness()[:2] if own else np.zeros(2) for law, own in zip(laws, has, strict=True)]
-    ).reshape(-1, 2)  # fmt: skip
+    ).reshape(-1, 2)
     return Starts(
         Interface(names, tuple(laws), operator, weights),
         Interface(names, tuple(given), operator, weights),
@@ -110,7 +110,7 @@ def starts_of(interface: Interface) -> Starts:
         np.array([own and law.pairs > UNCOUPLED_TANGENTS for law, own in zip(laws, has, strict=True)], dtype=bool),
         np.array([getattr(law, "mu", 0.0) if own else 0.0 for law, own in zip(laws, has, strict=True)]),
         np.array([getattr(law, "limit", 0.0) if own else 0.0 for law, own in zip(laws, has, strict=True)]),
-    )  # fmt: skip
+    )
 
 
 def _parts(name: str, law: ContactLaw) -> list[ContactLaw]:

@@ -20,9 +20,7 @@ from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
 
-SMOOTH = np.cos(
-    np.radians(30.0)
-)  # facets that turn further from the mean normal of a node meet at an edge
+SMOOTH = np.cos(np.radians(30.0))  # facets that turn further from the mean normal of a node meet at an edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +205,7 @@ def structure_surface(structure: Structure, facets: IntArray) -> Surface:
     return Surface(surface.points, surface.displacement, surface.facets, numbers=used)
 
 
-def rigid_surface(
-    body: RigidBody, points: FloatArray, dofs: IntArray, n: int, facets: IntArray
-) -> Surface:
+def rigid_surface(body: RigidBody, points: FloatArray, dofs: IntArray, n: int, facets: IntArray) -> Surface:
     """Return a surface of a rigid body.
 
     Parameters

@@ -10,13 +10,13 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.cache import njit
 
-CELLS_PER_ORDER = (
-    8  # of the grid on which the search begins; fewer leave more cells to be cut in two
-)
+CELLS_PER_ORDER = 8  # of the grid on which the search begins; fewer leave more cells to be cut in two
 _NARROWEST = 1e-8  # width at which a cell is no longer cut: what it hides there is below round-off in the polynomial
 _ROUND_OFF = 4e-16
 _NOISE = 4e-16  # of the polynomial's bound, for each term of its sum: smaller values have no sign of their own and count as zero
-_MOST_CUTS = 2000  # of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
+_MOST_CUTS = (
+    2000  # of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
+)
 _MOST_STEPS = 60
 DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
 
@@ -177,14 +177,12 @@ def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type
         if not monotone:
             count = _search(
                 polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
-            )  # fmt: skip
+            )
         elif count == roots.size:
             count -= 1
         else:
             guess = _guess(left, f_left, d_left, right, f_right, d_right)
-            roots[count] = root_between(
-                polynomial, 0.0, left, f_left, right, f_right, guess, size, second
-            )
+            roots[count] = root_between(polynomial, 0.0, left, f_left, right, f_right, guess, size, second)
             count += 1
     return count - count % 2
 
@@ -203,7 +201,7 @@ def on_grid(polynomial, grid, values):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _search(  # type: ignore[no-untyped-def]
     polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
-):  # fmt: skip
+):
     """Append the sign changes of one cell, cutting it in two until each part holds at most one for certain."""
     waiting, cuts = 0, 0
     noise = _NOISE * size * polynomial.size
@@ -211,9 +209,7 @@ def _search(  # type: ignore[no-untyped-def]
         width = right - left
         eighth = 0.125 * width * width
         changes = (f_left < 0.0) != (f_right < 0.0)
-        monotone = (
-            d_left * d_right > 0.0 and min(abs(d_left), abs(d_right)) > eighth * third
-        ) or width < _NARROWEST
+        monotone = (d_left * d_right > 0.0 and min(abs(d_left), abs(d_right)) > eighth * third) or width < _NARROWEST
         excluded = not changes and (monotone or min(abs(f_left), abs(f_right)) > eighth * second)
         if not excluded and not monotone and waiting < cells.shape[0] and cuts < _MOST_CUTS:
             cuts += 1

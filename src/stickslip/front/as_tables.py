@@ -59,7 +59,7 @@ def _values(given: Any, *, per_area: bool = False) -> dict[str, Any]:
     for entry in fields(given):
         known, value = quantity_of(entry), getattr(given, entry.name)
         default = entry.default if entry.default is not MISSING else None
-        if known is not None and value is not None and isinstance(value, int | float | str) and value != default:  # fmt: skip
+        if known is not None and value is not None and isinstance(value, int | float | str) and value != default:
             own = value if isinstance(value, str) else value / known.factor
             found[known.key_of(entry.name, per_area=per_area)] = own
     return found
@@ -69,9 +69,7 @@ def _part(part: Part) -> dict[str, Any]:
     if part.body is not None:
         return {"shape": "rigid body", "mass_kg": part.body.mass}
     mesh = "" if part.mesh is None else f", {len(part.mesh.points)} nodes"
-    found: dict[str, Any] = {
-        "shape": f"{part.structure.n} dof{'s' * (part.structure.n != 1)}{mesh}"
-    }
+    found: dict[str, Any] = {"shape": f"{part.structure.n} dof{'s' * (part.structure.n != 1)}{mesh}"}
     if part.sectors > 1:
         found["sectors"] = part.sectors
     if part.solid is not None and not isinstance(part.solid.material, list | tuple):
@@ -83,9 +81,13 @@ def _part(part: Part) -> dict[str, Any]:
 
 def _damping(damping: Damping) -> dict[str, Any]:
     given = {
-        "ratio": damping.ratio, "between_hz": damping.between_hz, "alpha_per_s": damping.alpha or None,
-        "beta_s": damping.beta or None, "modal_ratio": damping.modal, "loss_factor": damping.loss_factor or None,
-    }  # fmt: skip
+        "ratio": damping.ratio,
+        "between_hz": damping.between_hz,
+        "alpha_per_s": damping.alpha or None,
+        "beta_s": damping.beta or None,
+        "modal_ratio": damping.modal,
+        "loss_factor": damping.loss_factor or None,
+    }
     return {key: _plain(value) for key, value in given.items() if value is not None}
 
 

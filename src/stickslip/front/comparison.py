@@ -70,10 +70,15 @@ class Comparison:
         if not found:
             return Table({})
         columns = {
-            "case": "case", "design": "design", "frequency (Hz)": "hz", f"amplitude ({unit_of(self.designs, divided=divided)})": "height",
-            "verdict": "level", "against the first (%)": "off_percent", "shift (Hz)": "shift_hz",
-        }  # fmt: skip
-        return Table({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})  # fmt: skip
+            "case": "case",
+            "design": "design",
+            "frequency (Hz)": "hz",
+            f"amplitude ({unit_of(self.designs, divided=divided)})": "height",
+            "verdict": "level",
+            "against the first (%)": "off_percent",
+            "shift (Hz)": "shift_hz",
+        }
+        return Table({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})
 
     @property
     def inputs(self) -> Table:
@@ -120,9 +125,7 @@ def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
     labels = list(names) or _names(compared)
     if len(labels) != len(given) or len(set(labels)) != len(labels):
         raise input_error(
-            f"names = {labels}",
-            f"are no {len(given)} names that differ",
-            "Give one for each that is compared.",
+            f"names = {labels}", f"are no {len(given)} names that differ", "Give one for each that is compared."
         )
     designs: list[Design] = []
     curves: list[MeasuredCurve] = []
@@ -154,9 +157,12 @@ def _names(compared: Sequence[Compared]) -> list[str]:
         if isinstance(own, Result):
             found.append(str(own.data.attrs.get("title", "")) or "result")
         else:
-            parts = [p for p in Path(own).with_suffix("").parts if p not in (_FOLDER, "result", "study", "/")]  # fmt: skip
+            parts = [p for p in Path(own).with_suffix("").parts if p not in (_FOLDER, "result", "study", "/")]
             found.append(parts[-1] if parts else str(own))
     twice = len(set(found)) < len(found)
     if twice:
-        found = [str(own) if isinstance(own, str | Path) else f"{name} {k + 1}" for k, (own, name) in enumerate(zip(compared, found, strict=True))]  # fmt: skip
+        found = [
+            str(own) if isinstance(own, str | Path) else f"{name} {k + 1}"
+            for k, (own, name) in enumerate(zip(compared, found, strict=True))
+        ]
     return found

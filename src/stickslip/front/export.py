@@ -53,22 +53,11 @@ class Wanted:
 
 
 def export_result(
-    tree: xr.DataTree,
-    path: Path | None,
-    folder: Path | None,
-    wanted: Wanted,
-    of: Model | Path | None,
+    tree: xr.DataTree, path: Path | None, folder: Path | None, wanted: Wanted, of: Model | Path | None
 ) -> tuple[Path, ...]:
     """Write a motion of a result, which lies at `path`; return the files."""
     case, units = wanted.case, Units.named(wanted.units)
-    picked = chosen(
-        tree,
-        wanted.analysis,
-        case,
-        number=wanted.number,
-        hz=wanted.hz,
-        amplitude_mm=wanted.amplitude_mm,
-    )
+    picked = chosen(tree, wanted.analysis, case, number=wanted.number, hz=wanted.hz, amplitude_mm=wanted.amplitude_mm)
     LOG.info(f"[{picked.analysis}] {picked.told}")
     model = of if isinstance(of, Model) else _model(tree, path, of, case)
     if wanted.wheel and model.sectors == 1:
@@ -76,13 +65,15 @@ def export_result(
         raise input_error("export: wheel", "is asked of a single structure", remedy)
     motion = motion_of(picked, model, wheel=wanted.wheel)
     forced = tree[picked.analysis].to_dataset() if picked.point is not None else None
-    name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"  # fmt: skip
+    name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"
     place = _place(path, f"{name}_wheel" if wanted.wheel else name, folder)
     count = sum(len(body.nodes.points) for body in motion.bodies)
     sectors = f" of {motion.sectors} sectors" if motion.sectors > 1 else ""
     LOG.info(f"writing {count} nodes{sectors} to {place}")
     if wanted.to == "vtu":
-        contacts = contacts_of(forced, motion, case, picked.point) if forced is not None and picked.point is not None else ()  # fmt: skip
+        contacts = (
+            contacts_of(forced, motion, case, picked.point) if forced is not None and picked.point is not None else ()
+        )
         return write_vtu(motion, contacts, place, wanted.steps)
     if wanted.to == "frd":
         return (write_frd(motion, place / "motion.frd", units),)

@@ -8,7 +8,7 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.study.analyses.varied import varied_values
 
 # what the rows of a table are of, the first that an analysis has, that with most dimensions
-_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")  # fmt: skip
+_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")
 
 
 def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
@@ -30,9 +30,7 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     """
     names = [str(v) for v in data.data_vars]
     if of and of not in names:
-        raise input_error(
-            f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names)
-        )
+        raise input_error(f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names))
     chief = of or next((v for v in _CHIEF if v in names), names[0] if names else "")
     if not chief:
         raise input_error(f"to_dataframe({name!r})", "holds no variables", "Look at result.data.")
@@ -42,15 +40,11 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
     own = data[[chief, *(v for v in kept if v != chief)]]
     frame = own.to_dataframe()
-    places = [
-        n for n in frame.index.names if n not in frame.columns
-    ]  # a variable may be called as its dimension
+    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may be called as its dimension
     frame = frame.reset_index(places).reset_index(drop=True)
     if frame[chief].dtype.kind == "f":
         there = np.isfinite(frame[chief])
-        if (
-            "status" in own and "frequency_hz" in own
-        ):  # a point without a solution has its frequency
+        if "status" in own and "frequency_hz" in own:  # a point without a solution has its frequency
             there |= np.isfinite(frame["frequency_hz"])
         frame = frame[there].reset_index(drop=True)
     case = frame["case"].to_numpy() if "case" in dims else None
@@ -63,8 +57,8 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     for v in own.data_vars:  # numbers that stand for words
         told = own[v].attrs
         if "flag_meanings" in told:
-            words = dict(zip(np.ravel(told["flag_values"]).tolist(), str(told["flag_meanings"]).split(), strict=True))  # fmt: skip
+            words = dict(zip(np.ravel(told["flag_values"]).tolist(), str(told["flag_meanings"]).split(), strict=True))
             frame[str(v)] = [words.get(x, x) for x in frame[str(v)].tolist()]
     frame = frame.infer_objects()
-    frame.attrs["units"] = {str(v): str(own[v].attrs["units"]) for v in own if "units" in own[v].attrs}  # fmt: skip
+    frame.attrs["units"] = {str(v): str(own[v].attrs["units"]) for v in own if "units" in own[v].attrs}
     return frame

@@ -105,9 +105,7 @@ class Model(Assembly):
         """Say which modes engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
         return self._answer("safe", keys, folder)
 
-    def limit_cycle(
-        self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any
-    ) -> Result:
+    def limit_cycle(self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any) -> Result:
         """Find motions that nothing drives; keys such as ``wave_numbers=[3], points=40, in_time=True``.
 
         Parameters
@@ -132,11 +130,7 @@ class Model(Assembly):
         return self._answer("nonlinear_mode", keys, folder)
 
     def resonance(
-        self,
-        of: Callable[[float], Assembly] | None = None,
-        *,
-        folder: str | Path | None = None,
-        **keys: Any,
+        self, of: Callable[[float], Assembly] | None = None, *, folder: str | Path | None = None, **keys: Any
     ) -> Result:
         """Follow resonance peaks over a design parameter.
 
@@ -276,9 +270,7 @@ def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
     for key, value in keys.items():
         if key not in home or key in _OF_THE_MODEL:
             known = [k for k in home if k not in _OF_THE_MODEL]
-            raise input_error(
-                f"{name}: {key}", "is no key of this question", nearest_key(key, known, value)
-            )
+            raise input_error(f"{name}: {key}", "is no key of this question", nearest_key(key, known, value))
         values[home[key]][key] = _plain(value)
     return {table: _validated(own, values[table], name) for table, own in sections.items()}
 

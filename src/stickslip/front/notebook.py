@@ -69,7 +69,9 @@ class NotebookScreen(logging.Handler):
         for job, (fraction, text) in self._jobs.items():
             full = round(_WIDTH * fraction)
             state = "" if text == job else text
-            lines.append(f"{job:<{widest}} {'█' * full}{'░' * (_WIDTH - full)} {100 * fraction:3.0f} % {state}".rstrip())  # fmt: skip
+            lines.append(
+                f"{job:<{widest}} {'█' * full}{'░' * (_WIDTH - full)} {100 * fraction:3.0f} % {state}".rstrip()
+            )
         return "\n".join([*lines, *self._told])
 
     def _html(self) -> str:

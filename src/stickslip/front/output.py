@@ -35,9 +35,7 @@ def output_that_may_fail() -> Iterator[None]:
             sys.stdout.flush()
     except OSError as error:
         with suppress(OSError):
-            os.dup2(
-                os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
-            )  # what is left goes there
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left goes there
         with suppress(OSError, AttributeError):
             sys.stderr.write(f"standard output: cannot be written ({error.strerror}).\n")
         raise SystemExit(FAILED) from None

@@ -48,9 +48,7 @@ def aligned(cells: Sequence[str]) -> list[str]:
     return [f"{float(c):.{decimals}f}" if c else c for c in cells]
 
 
-def say_table(
-    title: str, head: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[str]
-) -> None:
+def say_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[str]) -> None:
     """Print a table without its empty columns, and lines below it."""
     if not rows:
         say_lines(title, lines)

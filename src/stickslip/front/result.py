@@ -74,9 +74,7 @@ class Result:
             If the result has none of that name.
         """
         if name not in self.data.children:
-            raise input_error(
-                f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, list(self))
-            )
+            raise input_error(f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, list(self)))
         return self.data[name].to_dataset()
 
     def __iter__(self) -> Iterator[str]:
@@ -213,9 +211,7 @@ class Result:
         """
         if name not in self._figures:
             known = list(self.plots)
-            raise input_error(
-                f"plot({name!r})", "is no figure of this result", did_you_mean(name, known)
-            )
+            raise input_error(f"plot({name!r})", "is no figure of this result", did_you_mean(name, known))
         return self._figures[name]
 
     @property
@@ -271,11 +267,7 @@ class Result:
 def _peaks(data: xr.Dataset) -> Table:
     keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else []
     found = {key: np.asarray(data["vary_value"].values[:, k]) for k, key in enumerate(keys)}
-    units = {
-        "excitation_n": "excitation (N)",
-        "peak_frequency_hz": "frequency (Hz)",
-        "peak_amplitude": "amplitude (m)",
-    }
+    units = {"excitation_n": "excitation (N)", "peak_frequency_hz": "frequency (Hz)", "peak_amplitude": "amplitude (m)"}
     found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
     if "case_verdict" in data:
         found["verdict"] = np.array([LEVELS[int(v)] for v in data["case_verdict"].values])
@@ -306,8 +298,5 @@ def _frequencies(data: xr.Dataset) -> Table:
     """Return a row a wave of the first case."""
     first = data.isel(case=0) if "case" in data.dims else data
     hz = np.asarray(first["frequency_hz"].values)
-    found = {
-        name.replace("_", " "): np.asarray(first[name].values)
-        for name in ("nodal_diameter", "wave_kind")
-    }
+    found = {name.replace("_", " "): np.asarray(first[name].values) for name in ("nodal_diameter", "wave_kind")}
     return Table(found | {f"mode {m + 1} (Hz)": hz[:, m] for m in range(hz.shape[1])})

@@ -33,9 +33,7 @@ class Screen(logging.Handler):
         Whether to write what jobs say on their way, too, as the log of a run has it.
     """
 
-    def __init__(
-        self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False
-    ) -> None:
+    def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False) -> None:
         super().__init__()
         self._console, self._bars = console, bars
         self._warnings, self._verbose = warnings, verbose

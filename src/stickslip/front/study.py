@@ -116,13 +116,7 @@ class Study:
         share = None if shard is None else Shard.read(shard)
         with by_default(workers), one_loaded_blas_thread():
             outcome = run_study(
-                content,
-                only=names,
-                workers=workers,
-                kind=executor,
-                shard=share,
-                fresh=fresh,
-                checks=checks,
+                content, only=names, workers=workers, kind=executor, shard=share, fresh=fresh, checks=checks
             )
         return Result.of(outcome)
 
@@ -154,9 +148,7 @@ class Study:
         mark = sha256("\n".join(said).encode()).hexdigest()[:8]
         named = {"output.folder": f"{self.content.tables.output.folder}-{mark}"}
         changed = self.content.replace({**named, **values})
-        text = "\n".join(
-            [self.content.text, "# replaced in Python", *(f"# {line}" for line in said), ""]
-        )
+        text = "\n".join([self.content.text, "# replaced in Python", *(f"# {line}" for line in said), ""])
         return Study(replace(changed, file=replace(changed.file, text=text)))
 
     def model(self, case: int = 0) -> Model:

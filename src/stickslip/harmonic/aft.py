@@ -74,12 +74,7 @@ def _tables(order: int, samples: int) -> _Tables:
 
 
 def contact_forces(
-    gap_coefficients: FloatArray,
-    contacts: CompiledContacts,
-    samples: int,
-    omega: float = 1.0,
-    *,
-    history: bool = True,
+    gap_coefficients: FloatArray, contacts: CompiledContacts, samples: int, omega: float = 1.0, *, history: bool = True
 ) -> ContactPeriod:
     """Evaluate contacts whose gaps have the given Fourier coefficients.
 
@@ -137,9 +132,7 @@ def _of(gap_coefficients: FloatArray, contacts: IntArray) -> FloatArray:
     return gap_coefficients.reshape(m, -1, 3)[:, contacts].reshape(m, -1)
 
 
-def _on_samples(
-    _: FloatArray, gap: FloatArray, contacts: CompiledContacts, tables: _Tables
-) -> ContactPeriod:
+def _on_samples(_: FloatArray, gap: FloatArray, contacts: CompiledContacts, tables: _Tables) -> ContactPeriod:
     """Evaluate sums of elementary contacts by intervals of the samples."""
     gap = gap if contacts.piecewise.size == len(gap) else gap[contacts.piecewise]
     n, _, samples = gap.shape
@@ -147,7 +140,7 @@ def _on_samples(
     force = np.empty_like(gap)
     state = np.empty((n, 2, samples), dtype=np.int64)
     blocks = np.empty((n, contacts.pairs, m, m))
-    arrays = (gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks)  # fmt: skip
+    arrays = (gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks)
     shares = thread_shares(n)
     if shares > 1:
         contact_period_threads(shares, *arrays)
@@ -157,9 +150,7 @@ def _on_samples(
     return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
 
 
-def _exact(
-    gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts, _: _Tables
-) -> ContactPeriod:
+def _exact(gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts, _: _Tables) -> ContactPeriod:
     """Evaluate sums of elementary contacts at exact events."""
     own = contacts.piecewise
     gap = gap if own.size == len(gap) else gap[own]
@@ -175,9 +166,7 @@ def _exact(
     return ContactPeriod(coefficients, blocks, None, gap, force, state, 0, kept)
 
 
-def _planar(
-    gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts
-) -> ContactPeriod:
+def _planar(gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts) -> ContactPeriod:
     """Evaluate contacts with isotropic planar friction at located events."""
     own = contacts.planar
     gap = gap if own.size == len(gap) else np.ascontiguousarray(gap[own])
@@ -199,9 +188,7 @@ def forces_between(events: Events, contacts: CompiledContacts, order: int) -> Co
     order
         Highest harmonic, at least that of the motion.
     """
-    coefficients, blocks = integrated(
-        events, contacts.elements, contacts.first, order, contacts.pairs
-    )
+    coefficients, blocks = integrated(events, contacts.elements, contacts.first, order, contacts.pairs)
     none = np.zeros((contacts.n_contacts, 3, 0))
     states = np.zeros((contacts.n_contacts, 2, 0), dtype=np.int64)
     whole = ContactPeriod(coefficients, blocks, None, none, none, states, 0)
@@ -209,12 +196,7 @@ def forces_between(events: Events, contacts: CompiledContacts, order: int) -> Co
 
 
 def _marched(
-    gap_coefficients: FloatArray,
-    gap: FloatArray,
-    laws: MarchedLaws,
-    pairs: int,
-    tables: _Tables,
-    omega: float,
+    gap_coefficients: FloatArray, gap: FloatArray, laws: MarchedLaws, pairs: int, tables: _Tables, omega: float
 ) -> ContactPeriod:
     """Evaluate contacts of one law class sample by sample."""
     gap = np.ascontiguousarray(gap[laws.contacts])
@@ -227,9 +209,20 @@ def _marched(
     blocks = np.empty((n, pairs, m, m))
     periods = np.empty(n, dtype=np.int64)
     period_march()(
-        law_address(laws.kernel), laws.parameters, laws.start, gap, velocity.reshape(gap.shape), tables.basis,
-        rate, omega, force, state, blocks, by_omega, periods,
-    )  # fmt: skip
+        law_address(laws.kernel),
+        laws.parameters,
+        laws.start,
+        gap,
+        velocity.reshape(gap.shape),
+        tables.basis,
+        rate,
+        omega,
+        force,
+        state,
+        blocks,
+        by_omega,
+        periods,
+    )
     return ContactPeriod(
         tables.analysis @ force.reshape(3 * n, samples).T,
         blocks,
@@ -241,9 +234,7 @@ def _marched(
     )
 
 
-def _put_together(
-    parts: list[tuple[IntArray, ContactPeriod]], gap: FloatArray, pairs: int, m: int
-) -> ContactPeriod:
+def _put_together(parts: list[tuple[IntArray, ContactPeriod]], gap: FloatArray, pairs: int, m: int) -> ContactPeriod:
     """Bring contacts that were evaluated in groups back into their order."""
     n, _, samples = gap.shape
     coefficients, by_omega = np.zeros((m, n, 3)), np.zeros((m, n, 3))

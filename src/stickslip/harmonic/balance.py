@@ -22,19 +22,8 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.matrix_products import matrices, products
 from stickslip.harmonic.sparse_stiffness import SparseStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_form
-from stickslip.harmonic.support import (
-    Harmonics,
-    complex_rows,
-    harmonics_of,
-    is_full,
-    real_rows,
-    rows_of,
-)
-from stickslip.harmonic.vector_forces import (
-    known_by_vectors,
-    linear_force,
-    mass_damping_slope,
-)
+from stickslip.harmonic.support import Harmonics, complex_rows, harmonics_of, is_full, real_rows, rows_of
+from stickslip.harmonic.vector_forces import known_by_vectors, linear_force, mass_damping_slope
 from stickslip.operators import Costs
 
 REDUCED = 300  # unknowns from which leaving out what rests can cost less than the whole array
@@ -165,13 +154,9 @@ class HarmonicBalance:
         own = rows_of(self.harmonics)
         by_omega = None if period.by_omega is None else period.by_omega[own]
         blocks = period.blocks[:, :, own[:, None], own]
-        return replace(
-            period, coefficients=period.coefficients[own], blocks=blocks, by_omega=by_omega
-        )
+        return replace(period, coefficients=period.coefficients[own], blocks=blocks, by_omega=by_omega)
 
-    def linearise(
-        self, x: FloatArray, omega: float, period: ContactPeriod | None = None
-    ) -> Linearisation:
+    def linearise(self, x: FloatArray, omega: float, period: ContactPeriod | None = None) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s).
 
         Contacts are not evaluated where their `period` at `x` is known, from `forces`.
@@ -225,9 +210,7 @@ class HarmonicBalance:
             return (part.product(q) - part.load).reshape(-1) / self.force_scale
         return self._linear_force(x, omega).reshape(-1) / self.force_scale
 
-    def by_mass_damping(
-        self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]
-    ) -> FloatArray:
+    def by_mass_damping(self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]) -> FloatArray:
         """Return the (size,) derivative of the scaled residual by a rate, 1/s, of damping in proportion to the `mass` of each harmonic.
 
         Where no products with vectors give it, the motion is spread over all dofs, and the force of their mass is condensed as a load is.
@@ -265,9 +248,7 @@ class HarmonicBalance:
     def _parts(self, omega: float, blocks: FloatArray) -> StructuredJacobian:
         """Return the Jacobian by its parts, whose matrices are formed."""
         part = matrices(self.linear, self.harmonics, omega)
-        return StructuredJacobian(
-            part, blocks, self.rows, self.displacement_scale / self.force_scale
-        )
+        return StructuredJacobian(part, blocks, self.rows, self.displacement_scale / self.force_scale)
 
     def _slope(self, x: FloatArray, omega: float, contacts: FloatArray | None) -> FloatArray:
         """Return the (size,) derivative of the scaled residual by ω, from that of the contact forces."""
@@ -371,11 +352,7 @@ def check_retained(place: str, linear: DynamicStiffness, interface: Interface) -
     """Raise `InputError` unless all dofs that the contacts touch are retained."""
     missing = np.setdiff1d(interface.coordinates(), linear.retained)
     if missing.size:
-        raise input_error(
-            place,
-            f"contact dofs {missing[:5].tolist()} are not retained",
-            "Retain all contact dofs.",
-        )
+        raise input_error(place, f"contact dofs {missing[:5].tolist()} are not retained", "Retain all contact dofs.")
 
 
 def _check_load(load: HarmonicLoad, harmonics: Harmonics) -> None:

@@ -153,9 +153,7 @@ class State:
         """How systems are solved with ``[J, ∂r/∂z; row]``, z the first extra unknown and `row` that of the problem; None if it is singular."""
         n = self.x.size
         row = np.eye(1, n + 1, n)[0] if self.problem.row is None else self.problem.row
-        return self.problem.invert(
-            Bordered(self.at.jac, self.columns[:, 0], row[:n], float(row[n]))
-        )
+        return self.problem.invert(Bordered(self.at.jac, self.columns[:, 0], row[:n], float(row[n])))
 
     @cached_property
     def along(self) -> FloatArray | None:

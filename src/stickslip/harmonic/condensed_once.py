@@ -16,9 +16,7 @@ LARGE = 300  # dofs from which the eigenproblem of the interior takes much longe
 _last: "WeakKeyDictionary[Structure, tuple[bytes, CondensedStiffness]]" = WeakKeyDictionary()
 
 
-def condensed_once(
-    structure: Structure, retained: IntArray, load: HarmonicLoad
-) -> CondensedStiffness:
+def condensed_once(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:
     """Prepare the exact condensation as `condense` does, from what the same structure's last one left.
 
     Matrices changed in place are told by their contents.

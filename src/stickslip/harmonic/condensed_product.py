@@ -20,9 +20,7 @@ from stickslip.harmonic.state_space import StateSpace
 from stickslip.harmonic.support import Harmonics, real_rows
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
-Lossy = tuple[
-    FloatArray, FloatArray, FloatArray, FloatArray | None
-]  # products with K, C, M and structural damping
+Lossy = tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]  # products with K, C, M and structural damping
 # interior dynamic stiffness of each harmonic: its diagonal, or its state-space eigenvectors and ihω, or its LU factors
 InnerOne = ComplexArray | tuple[StateSpace, complex] | tuple[ComplexArray, IntArray]
 Inner = ComplexArray | tuple[InnerOne, ...]  # an array: diagonals
@@ -74,9 +72,7 @@ class CondensedProduct:
         """Return the rows of ``Z q`` for the `rows` of q."""
         s = self.frequencies
         moved = _solve_inner(self.inner, dynamic_rows(onto_interior(self.linear, rows), s))
-        return dynamic_rows(_near(self.linear, rows), s) - dynamic_rows(
-            _back(self.linear, moved), s
-        )
+        return dynamic_rows(_near(self.linear, rows), s) - dynamic_rows(_back(self.linear, moved), s)
 
     @cached_property
     def transposed(self) -> "CondensedProduct":
@@ -101,9 +97,7 @@ class CondensedProduct:
         near, far = _near(self.linear, rows), onto_interior(self.linear, rows)
         moved = _solve_inner(self.inner, dynamic_rows(far, s))
         back = _back(self.linear, moved)
-        turned = _solve_inner(
-            self.inner, slope_rows(far, s) - slope_rows(_inner_parts(self.linear, moved), s)
-        )
+        turned = _solve_inner(self.inner, slope_rows(far, s) - slope_rows(_inner_parts(self.linear, moved), s))
         slope = slope_rows(near, s) - slope_rows(back, s)
         slope -= dynamic_rows(_back(self.linear, turned), s)
         return dynamic_rows(near, s) - dynamic_rows(back, s), by_omega(slope, self.harmonics)
@@ -137,7 +131,7 @@ class CondensedProduct:
             nl=(across(to_k), across(to_c), across(to_m)),
             ln=None if own.ln is None else (across(own.ln[0]), across(own.ln[1]), across(own.ln[2])),
             loss=None if own.loss is None else (near(own.loss[0]), across(own.loss[1]), own.loss[2]),
-        )  # fmt: skip
+        )
         return replace(self, linear=seen, load=none, load_slope=none)
 
     def moved_to(self, other: "Interiors") -> "CondensedProduct":
@@ -164,9 +158,7 @@ class CondensedProduct:
         onto = far if self.linear.ln is None else _across(self.linear.ln, loss, s)
         moved = _solve_one(self.inner[self.harmonics.index(harmonic)], onto.T)
         # in place: for thousands of coordinates this is the largest array there is
-        return np.asarray(
-            scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True)
-        )
+        return np.asarray(scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True))
 
 
 def at_frequency(
@@ -202,8 +194,14 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
     turned = _solve_inner(bare.inner, slope_rows(_inner_parts(bare.linear, moved), s))
     slope = dynamic_rows(_back(bare.linear, turned), s) - slope_rows(back, s)
     return CondensedProduct(
-        bare.linear, bare.omega, bare.harmonics, s, bare.inner, bare.load - dynamic_rows(back, s), by_omega(slope, bare.harmonics)
-    )  # fmt: skip
+        bare.linear,
+        bare.omega,
+        bare.harmonics,
+        s,
+        bare.inner,
+        bare.load - dynamic_rows(back, s),
+        by_omega(slope, bare.harmonics),
+    )
 
 
 def _inner(linear: Interior, omega: float, harmonics: Harmonics) -> Inner:
@@ -266,9 +264,7 @@ def _back(linear: Interior, rows: FloatArray) -> Lossy:
     return _products(rows, (k.T, c.T, m.T), linear.rayleigh_across, loss)
 
 
-def _products(
-    rows: FloatArray, blocks: Blocks, shares: tuple[float, float] | None, loss: FloatArray | None
-) -> Lossy:
+def _products(rows: FloatArray, blocks: Blocks, shares: tuple[float, float] | None, loss: FloatArray | None) -> Lossy:
     """Return the products with stiffness, damping and mass; that with the damping out of the others where it is made of them."""
     k, c, m = blocks
     stiff, inert = rows @ k, rows @ m

@@ -27,9 +27,7 @@ RESTING_CALL, RESTING_HARMONIC, RESTING_ENTRY, RESTING_FACTOR = 1.4e-4, 4e-5, 1.
 FORMED_ENTRY = 1.4e-8
 
 
-def linear_costs(
-    coordinates: int, harmonics: int, derivatives: int, sparse: int = 0, *, shared: bool = False
-) -> Costs:
+def linear_costs(coordinates: int, harmonics: int, derivatives: int, sparse: int = 0, *, shared: bool = False) -> Costs:
     """Estimate the costs of one system.
 
     Parameters
@@ -50,10 +48,7 @@ def linear_costs(
     if sparse:
         one, factors = CALL + SPARSE_PRODUCT * sparse, SPARSE_FACTORS * sparse / harmonics
     elif coordinates <= SMALL:
-        one, factors = (
-            LOOP_ENTRY * entries,
-            INVERSE_CALL + INVERSE_FACTOR * coordinates * entries,
-        )
+        one, factors = (LOOP_ENTRY * entries, INVERSE_CALL + INVERSE_FACTOR * coordinates * entries)
     else:
         one, factors = (
             CALL + CALL_ENTRY * entries,

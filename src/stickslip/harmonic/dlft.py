@@ -22,20 +22,11 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.rigid import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
-from stickslip.harmonic.balance import (
-    HarmonicBalance,
-    check_retained,
-    harmonic_balance,
-)
+from stickslip.harmonic.balance import HarmonicBalance, check_retained, harmonic_balance
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.penalty import Penalty, dynamic_penalty
 from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
-from stickslip.harmonic.rigid_jacobian import (
-    GapLaws,
-    RigidJacobian,
-    RigidLinearisation,
-    derivative,
-)
+from stickslip.harmonic.rigid_jacobian import GapLaws, RigidJacobian, RigidLinearisation, derivative
 from stickslip.harmonic.support import Harmonics, harmonics_of
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
@@ -139,9 +130,7 @@ class DynamicLagrangian:
         rigid = self.rigid
         found = self._corrected(x, omega, at.residual)
         laws = _gap_laws(rigid, found)
-        residual, jac_p = (
-            v.reshape(2 * self.order + 1, -1).copy() for v in (at.residual, at.jac_p)
-        )
+        residual, jac_p = (v.reshape(2 * self.order + 1, -1).copy() for v in (at.residual, at.jac_p))
         own = found.coefficients[:, rigid.contact, rigid.direction]
         residual[:, rigid.column] += rigid.factor * own
         # derivatives of the predictions by ω
@@ -210,9 +199,7 @@ class DynamicLagrangian:
         stuck = (rigid.direction != NORMAL) & period.stuck[rigid.contact, rigid.direction % 2]
         if np.any(stuck):
             held = predicted.copy()
-            held[:, rigid.contact[stuck], rigid.direction[stuck]] = (equilibrium + elastic)[
-                :, stuck
-            ]
+            held[:, rigid.contact[stuck], rigid.direction[stuck]] = (equilibrium + elastic)[:, stuck]
             _hold(period, held, stuck, rigid)
         coefficients = _in_harmonics(period.force.reshape(3 * n, -1), self.order)
         forbidden = np.where(stuck, elastic, sliding)
@@ -255,9 +242,7 @@ def _hold(period: RigidPeriod, held: FloatArray, stuck: BoolArray, rigid: RigidC
     m = held.shape[0]
     which = np.unique(rigid.contact[stuck])
     laws = tuple(_slider(rigid.mu[c], rigid.constant[c]) for c in which)
-    march = contact_forces(
-        held[:, which].reshape(m, -1), compile_contacts(laws), period.force.shape[2]
-    )
+    march = contact_forces(held[:, which].reshape(m, -1), compile_contacts(laws), period.force.shape[2])
     place = np.searchsorted(which, rigid.contact[stuck])
     for c, d, at in zip(rigid.contact[stuck], rigid.direction[stuck], place, strict=True):
         period.force[c, d] = march.force[at, d]
@@ -322,22 +307,16 @@ def dynamic_lagrangian(
     InputError
         If no contact is rigid, or a gap of one is no coordinate, or there are fewer samples than coefficients.
     """
-    rigid = np.array(
-        [i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)], dtype=np.int64
-    )
+    rigid = np.array([i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)], dtype=np.int64)
     if not rigid.size:
         raise input_error("dynamic_lagrangian", "no contact is rigid", "Use harmonic_balance.")
     if penalty is not None and not (np.isfinite(penalty) and penalty > 0.0):
         raise input_error(
-            "dynamic_lagrangian: penalty",
-            f"must be positive and finite, got {penalty}",
-            "Give it in N/m, or None.",
+            "dynamic_lagrangian: penalty", f"must be positive and finite, got {penalty}", "Give it in N/m, or None."
         )
     check_retained("dynamic_lagrangian", linear, interface)
     _checked_samples(samples, order)
-    balance = harmonic_balance(
-        linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator
-    )
+    balance = harmonic_balance(linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator)
     local = interface.restricted(linear.retained)
     own = rigid_contacts(local, rigid, balance)
     return DynamicLagrangian(balance, local, own, samples, penalty)

@@ -24,9 +24,7 @@ from stickslip.harmonic.support import Harmonics
 from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 
-DIAGONAL_TOLERANCE = (
-    1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
-)
+DIAGONAL_TOLERANCE = 1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
 LARGEST_INTERIOR = 5000  # dense eigenproblem of the interior; reduce larger structures first
 
 
@@ -72,9 +70,7 @@ class CondensedStiffness:
     diagonal: bool
     load: HarmonicLoad
     spectral: Interior  # the same blocks, and what is derived from them when first needed
-    ln: Blocks | None = (
-        None  # transposes of the blocks that lead back, where damping is not symmetric
-    )
+    ln: Blocks | None = None  # transposes of the blocks that lead back, where damping is not symmetric
     loss: Blocks | None = None  # structural damping on nn, nl, ll
 
     @cached_property
@@ -126,15 +122,11 @@ class CondensedStiffness:
         d_nn, g_nn = _dynamic(self.nn, s, self.loss and self.loss[0])
         d_nl, g_nl = _dynamic(self.nl, s, self.loss and self.loss[1])
         d_ln, g_ln = (d_nl, g_nl) if self.ln is None else self._back(s)
-        solved = self._solve_interior(
-            s, np.concatenate([d_ln.transpose(0, 2, 1), f_l[:, :, None]], axis=2)
-        )
+        solved = self._solve_interior(s, np.concatenate([d_ln.transpose(0, 2, 1), f_l[:, :, None]], axis=2))
         _, g_ll = self._interior_dynamic(s)
         g_x = g_ll * solved if self.diagonal else g_ll @ solved
         x_nt = (
-            solved[:, :, :-1]
-            if self.ln is None
-            else self._solve_interior(s, d_nl.transpose(0, 2, 1), True)
+            solved[:, :, :-1] if self.ln is None else self._solve_interior(s, d_nl.transpose(0, 2, 1), True)
         ).transpose(0, 2, 1)
         d_x = d_nl @ solved
         g_nl_x = g_nl @ solved
@@ -247,9 +239,7 @@ class CondensedStiffness:
             return _dynamic((k, c, m), s, None if loss is None else np.diagonal(loss)[:, None])
         return _dynamic(self.ll, s, loss)
 
-    def _solve_interior(
-        self, s: FloatArray, right: ComplexArray, transposed: bool = False
-    ) -> ComplexArray:
+    def _solve_interior(self, s: FloatArray, right: ComplexArray, transposed: bool = False) -> ComplexArray:
         d_ll, _ = self._interior_dynamic(s)
         if self.diagonal:
             return right / d_ll
@@ -258,9 +248,7 @@ class CondensedStiffness:
         return np.linalg.solve(d_ll.transpose(0, 2, 1) if transposed else d_ll, right)
 
 
-def _dynamic(
-    blocks: Blocks, s: FloatArray, loss: FloatArray | None = None
-) -> tuple[ComplexArray, ComplexArray]:
+def _dynamic(blocks: Blocks, s: FloatArray, loss: FloatArray | None = None) -> tuple[ComplexArray, ComplexArray]:
     """Return K + is C - s² M, with + i loss where s > 0, and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
     k, c, m = blocks
     stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
@@ -293,17 +281,11 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
         If a matrix is not real, one but the damping not symmetric, `retained` are not different dofs, the interior is too large, or it can move freely.
     """
     if load.static.size != structure.n:
-        raise input_error(
-            "HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof."
-        )
+        raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")
     retained = _checked_dofs(retained, structure.n)
     interior = np.setdiff1d(np.arange(structure.n), retained)
     if interior.size > LARGEST_INTERIOR:
-        raise input_error(
-            "condense",
-            f"{interior.size} interior dofs",
-            "Reduce the structure first (craig_bampton).",
-        )
+        raise input_error("condense", f"{interior.size} interior dofs", "Reduce the structure first (craig_bampton).")
     full = tuple(real_symmetric(structure, name) for name in ("stiffness", "damping", "mass"))
     nn = _three(a[np.ix_(retained, retained)] for a in full)
     nl = tuple(a[np.ix_(retained, interior)] for a in full)
@@ -318,14 +300,21 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     diagonal = _is_diagonal(damping) and (loss is None or _is_diagonal(loss[2]))
     own = _modal(modes, ll[2], np.diag(np.diagonal(damping)) if diagonal else damping)
     return CondensedStiffness(
-        retained, interior, nn, to_modes, own, modes, diagonal, load,
-        Interior(nn, to_modes, own, diagonal, back, loss), back, loss,
-    )  # fmt: skip
+        retained,
+        interior,
+        nn,
+        to_modes,
+        own,
+        modes,
+        diagonal,
+        load,
+        Interior(nn, to_modes, own, diagonal, back, loss),
+        back,
+        loss,
+    )
 
 
-def _loss(
-    structure: Structure, retained: IntArray, interior: IntArray, modes: FloatArray
-) -> Blocks | None:
+def _loss(structure: Structure, retained: IntArray, interior: IntArray, modes: FloatArray) -> Blocks | None:
     """Return structural damping on the retained coordinates, across, and on the interior's modes; None where there is none."""
     if structure.loss is None:
         return None
@@ -340,7 +329,7 @@ def _checked_dofs(retained: IntArray, n: int) -> IntArray:
     """Return dof indices after checking that each is there, once."""
     dofs = np.asarray(retained)
     whole = dofs.size == 0 or np.issubdtype(dofs.dtype, np.integer)
-    if not whole or dofs.ndim != 1 or np.any((dofs < 0) | (dofs >= n)) or np.unique(dofs).size != dofs.size:  # fmt: skip
+    if not whole or dofs.ndim != 1 or np.any((dofs < 0) | (dofs >= n)) or np.unique(dofs).size != dofs.size:
         raise input_error(
             "condense: retained",
             f"must be different integers from 0 to {n - 1}, got {dofs[:8].tolist() if dofs.ndim else dofs}",

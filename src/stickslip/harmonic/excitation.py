@@ -57,9 +57,7 @@ class HarmonicLoad:
                 )
         for f in (self.static, *self.harmonics.values()):
             if not np.all(np.isfinite(f)):
-                raise input_error(
-                    "HarmonicLoad", "contains NaN or infinite forces", "Give finite forces in N."
-                )
+                raise input_error("HarmonicLoad", "contains NaN or infinite forces", "Give finite forces in N.")
 
     def coefficients(self, order: int) -> ComplexArray:
         """Return the (order+1, n) complex coefficients, harmonic 0 being the static load."""
@@ -77,6 +75,4 @@ class HarmonicLoad:
     @property
     def scale(self) -> float:
         """Largest force amplitude, N."""
-        return float(
-            max(np.max(np.abs(f), initial=0.0) for f in (self.static, *self.harmonics.values()))
-        )
+        return float(max(np.max(np.abs(f), initial=0.0) for f in (self.static, *self.harmonics.values())))

@@ -108,8 +108,11 @@ def _sparse(matrix: Matrix) -> SparseFactors | None:
 
     try:
         lu = splu(
-            scipy.sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=PIVOTS, options={"SymmetricMode": True}
-        )  # fmt: skip
+            scipy.sparse.csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=PIVOTS,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError:  # a pivot vanishes
         return None
     return SparseFactors(lu, matrix.dtype)

@@ -73,9 +73,7 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
             "Take the wheel of all sectors (reduced_wheel), or the forced response.",
         )
     if structure.is_complex:
-        raise input_error(
-            analysis, "needs real matrices", "The forced response takes complex ones."
-        )
+        raise input_error(analysis, "needs real matrices", "The forced response takes complex ones.")
     return structure
 
 

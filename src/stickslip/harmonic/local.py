@@ -103,9 +103,7 @@ class LocalBalance:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
         at = self.balance.linearise(self.whole(x), omega)
         jac = np.asfortranarray(at.dense_jac()[np.ix_(self.own, self.own)])
-        return replace(
-            at, residual=at.residual[self.own], by_x=jac, by_omega=at.jac_p[self.own], events=None
-        )
+        return replace(at, residual=at.residual[self.own], by_x=jac, by_omega=at.jac_p[self.own], events=None)
 
     def linear_load(self, omega: float) -> FloatArray:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""

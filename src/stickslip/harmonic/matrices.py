@@ -7,9 +7,7 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 
-PROPORTIONAL = (
-    1e-13  # share of a row's largest damping by which the sum of stiffness and mass may differ
-)
+PROPORTIONAL = 1e-13  # share of a row's largest damping by which the sum of stiffness and mass may differ
 ROWS = 64  # that are compared at a time: matrices of thousands of rows need no copies
 SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
 
@@ -25,9 +23,7 @@ def asymmetry(matrix: Matrix) -> float:
 def is_real_symmetric(structure: Structure) -> bool:
     """Whether all matrices but the damping are real and symmetric: then undamped modes of the interior decouple it."""
     matrices = (structure.mass, structure.stiffness, structure.loss)
-    return not structure.is_complex and all(
-        asymmetry(m) <= SYMMETRY for m in matrices if m is not None
-    )
+    return not structure.is_complex and all(asymmetry(m) <= SYMMETRY for m in matrices if m is not None)
 
 
 def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
@@ -35,12 +31,8 @@ def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray
     matrix = getattr(structure, name)
     dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
     if not np.all(np.isfinite(dense)):
-        raise input_error(
-            f"Structure.{name}",
-            "contains NaN or infinite entries",
-            "Check the model that was read.",
-        )
-    if asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
+        raise input_error(f"Structure.{name}", "contains NaN or infinite entries", "Check the model that was read.")
+    if asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):
         raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
     return dense
 
@@ -74,10 +66,7 @@ def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, f
 
 
 def are_shares(
-    a: float,
-    b: float,
-    blocks: tuple[FloatArray, FloatArray, FloatArray],
-    rounding: float = PROPORTIONAL,
+    a: float, b: float, blocks: tuple[FloatArray, FloatArray, FloatArray], rounding: float = PROPORTIONAL
 ) -> bool:
     """Whether the damping is ``a`` times the stiffness and ``b`` times the mass, to `rounding` of the largest entry of each row."""
     k, c, m = blocks

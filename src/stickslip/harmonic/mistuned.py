@@ -106,9 +106,7 @@ class MistunedStiffness:
     def loads(self, omega: float, harmonics: Sequence[int]) -> tuple[ComplexArray, ComplexArray]:
         """Return the condensed loads (k, n) of some harmonics and their derivatives by hω."""
         f = self.load.coefficients(harmonics[-1])
-        found = [
-            self.at(h * omega).load(f[h, self.retained], f[h, self.interior]) for h in harmonics
-        ]
+        found = [self.at(h * omega).load(f[h, self.retained], f[h, self.interior]) for h in harmonics]
         return np.array([load for load, _ in found]), np.array([slope for _, slope in found])
 
     def products(self, omega: float, harmonics: Harmonics) -> "CondensedSectors":
@@ -203,9 +201,7 @@ class At:
         """(k, k) forces ``z = reaction @ y_0`` of the deviations that are active."""
         sector, share = self.linear.wheel.active
         delta = self.linear.wheel.factors[sector, share]
-        receptance = np.fft.ifft(
-            self.far @ self.inverse @ self.far.conj().transpose(0, 2, 1), axis=0
-        )
+        receptance = np.fft.ifft(self.far @ self.inverse @ self.far.conj().transpose(0, 2, 1), axis=0)
         behind = (sector[:, None] - sector) % self.linear.wheel.sectors
         A = receptance[behind, share[:, None], share]
         return np.asarray(np.linalg.solve(np.eye(delta.size) + delta[:, None] * A, np.diag(delta)))
@@ -376,9 +372,7 @@ class CondensedSectors:
         return np.array(self.linear.at(harmonic * self.omega).stiffness, order="F")
 
 
-def condense_mistuned(
-    wheel: MistunedWheel, retained: IntArray, load: HarmonicLoad
-) -> MistunedStiffness:
+def condense_mistuned(wheel: MistunedWheel, retained: IntArray, load: HarmonicLoad) -> MistunedStiffness:
     """Prepare the exact condensation of a mistuned wheel to coordinates that are the same in all sectors (`by_sectors`)."""
     if load.static.size != wheel.n:
         raise input_error(

@@ -60,10 +60,7 @@ class AtFrequency:
         """Evaluate at scaled unknowns `x` and the value `p` of the parameter."""
         at = self.family(p).linearise(x, self.omega)
         return ParameterLinearisation(
-            at.residual,
-            at.jac,
-            at.seconds_contact,
-            lambda: by_parameter(self.family, x, self.omega, p),
+            at.residual, at.jac, at.seconds_contact, lambda: by_parameter(self.family, x, self.omega, p)
         )
 
 
@@ -157,11 +154,7 @@ def rebuilt(build: BalanceAt, first: float) -> BalanceAt:
                 f"the retained dofs at {value:g} differ from those at {first:g}",
                 "Keep contacts and dofs the same for all values.",
             )
-        return replace(
-            made,
-            displacement_scale=reference.displacement_scale,
-            force_scale=reference.force_scale,
-        )
+        return replace(made, displacement_scale=reference.displacement_scale, force_scale=reference.force_scale)
 
     return member
 

@@ -22,24 +22,13 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.bordered import (
-    Condition,
-    Evaluated,
-    Invert,
-    PeriodicProblem,
-    State,
-    unknown_frequency,
-)
+from stickslip.harmonic.bordered import Condition, Evaluated, Invert, PeriodicProblem, State, unknown_frequency
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, by_parameter
 from stickslip.operators import transposed_times
 
 Peak = Literal["horizontal_tangent", "phase_quadrature", "variable_phase"]
-EVALUATIONS: dict[Peak, int] = {
-    "horizontal_tangent": 3,
-    "phase_quadrature": 1,
-    "variable_phase": 1,
-}
+EVALUATIONS: dict[Peak, int] = {"horizontal_tangent": 3, "phase_quadrature": 1, "variable_phase": 1}
 ALONG = 1e-6  # relative change of the state over which the Jacobian is differenced
 # the same where forces are sampled, in samples: J changes only when an event passes one
 ALONG_SAMPLES = 8.0
@@ -131,9 +120,7 @@ class HorizontalTangent:
         return own, change, float(own @ change) / size if size > 0.0 else 0.0
 
 
-def _gradient(
-    driven: Driven, state: State, along: FloatArray, by_own: FloatArray, by_change: FloatArray
-) -> FloatArray:
+def _gradient(driven: Driven, state: State, along: FloatArray, by_own: FloatArray, by_change: FloatArray) -> FloatArray:
     """Return (size + m,) the derivative of a function of the driven amplitudes and of their change along the response; zeros where it is unknown.
 
     Parameters
@@ -168,7 +155,7 @@ def _turned(state: State, along: FloatArray, adjoint: FloatArray) -> FloatArray:
     step = relative * size / max(float(np.linalg.norm(along[:-1])), size * abs(float(along[-1])))
     way = np.zeros(state.y.size)
     way[: along.size] = step * along
-    return (_weighted(state.moved(way), adjoint) - _weighted(state.moved(-way), adjoint)) / (2 * step)  # fmt: skip
+    return (_weighted(state.moved(way), adjoint) - _weighted(state.moved(-way), adjoint)) / (2 * step)
 
 
 def _weighted(state: State, adjoint: FloatArray) -> FloatArray:

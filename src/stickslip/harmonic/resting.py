@@ -210,14 +210,20 @@ class Resting:
         place = np.full(self.n * (2 * len(counts) - 1), -1)
         place[self.kept] = np.arange(self.size)
         add_coupling(
-            self.scale * self.contacts.left, self.contacts.coupled, self.rows.columns, self.rows.values,
-            np.ascontiguousarray(amplitudes.real), np.ascontiguousarray(amplitudes.imag), counts, first, place.reshape(-1, self.n), out,
-        )  # fmt: skip
+            self.scale * self.contacts.left,
+            self.contacts.coupled,
+            self.rows.columns,
+            self.rows.values,
+            np.ascontiguousarray(amplitudes.real),
+            np.ascontiguousarray(amplitudes.imag),
+            counts,
+            first,
+            place.reshape(-1, self.n),
+            out,
+        )
         return np.asfortranarray(out)
 
-    def reduced(
-        self, right: FloatArray, *, transposed: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+    def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return the right side (size, j) that is left of `right` (N, j), and ``J_RR⁻¹ b_R`` (N, j), zero at what is kept; see `Elimination`."""
         q = to_complex(right.reshape(-1, self.n, right.shape[1]))
         inner = np.zeros_like(q)
@@ -251,17 +257,22 @@ class Resting:
                 a[own.rest] = -own.solve(given, transposed=True)
         return to_real(q).reshape(out.shape)
 
-    def _add_coupling(
-        self, v: FloatArray, factor: float, out: FloatArray, *, transposed: bool
-    ) -> None:
+    def _add_coupling(self, v: FloatArray, factor: float, out: FloatArray, *, transposed: bool) -> None:
         """Add ``factor Bᵀ L B v`` to `out`, (N, j) both."""
         m = 2 * len(self.harmonics) - 1
         for column in range(v.shape[1]):
             rows = np.ascontiguousarray(v[:, column].reshape(m, self.n))
             added = np.zeros_like(rows)
             contact_product(
-                self.contacts.left, self.rows.columns, self.rows.values, rows, transposed, np.empty((3, m)), np.empty((3, m)), added
-            )  # fmt: skip
+                self.contacts.left,
+                self.rows.columns,
+                self.rows.values,
+                rows,
+                transposed,
+                np.empty((3, m)),
+                np.empty((3, m)),
+                added,
+            )
             out[:, column] += factor * added.reshape(-1)
 
 
@@ -279,9 +290,7 @@ class Known:
 
     def knows(self, contacts: Coupling, scale: float) -> bool:
         """Whether what rests is what rested last."""
-        return (
-            self._last is not None and self._last[1] == scale and contacts.same_rest(self._last[0])
-        )
+        return self._last is not None and self._last[1] == scale and contacts.same_rest(self._last[0])
 
     def without_resting(self, contacts: Coupling, rows: SparseRows, scale: float) -> Resting:
         """Eliminate what rests.
@@ -334,9 +343,7 @@ class TransposedElimination:
         """Return what is left, (size, size)."""
         return np.asfortranarray(self.inside.array().T)
 
-    def reduced(
-        self, right: FloatArray, *, transposed: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+    def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return what is left of right sides, and what they make of the eliminated unknowns; see `Elimination`."""
         return self.inside.reduced(right, transposed=not transposed)
 

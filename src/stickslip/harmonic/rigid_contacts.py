@@ -39,9 +39,7 @@ class RigidContacts:
     offset: FloatArray
 
 
-def rigid_contacts(
-    interface: Interface, rigid: IntArray, balance: HarmonicBalance
-) -> RigidContacts:
+def rigid_contacts(interface: Interface, rigid: IntArray, balance: HarmonicBalance) -> RigidContacts:
     """Find the coordinates of the gaps, and write all parameters in the scaled units of a problem.
 
     Parameters
@@ -62,9 +60,7 @@ def rigid_contacts(
     entries: list[tuple[int, int, int, float]] = []
     for c, i in enumerate(rigid):
         entries += [(c, *entry) for entry in _gap_coordinates(interface, i)]
-    contact, direction, column = (
-        np.array([e[k] for e in entries], dtype=np.int64) for k in range(3)
-    )
+    contact, direction, column = (np.array([e[k] for e in entries], dtype=np.int64) for k in range(3))
     factor = np.array([e[3] for e in entries])
     if np.unique(column).size < column.size:
         twice = column[np.argmax(np.bincount(column)[column] > 1)]
@@ -74,10 +70,15 @@ def rigid_contacts(
     gaps = np.array([law.initial_gap for law in laws]) / length
     constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
     return RigidContacts(
-        rigid, np.array([law.mu for law in laws]), constant * interface.factors[rigid] / force,
-        contact, direction, column, factor,
+        rigid,
+        np.array([law.mu for law in laws]),
+        constant * interface.factors[rigid] / force,
+        contact,
+        direction,
+        column,
+        factor,
         np.where(direction == NORMAL, gaps[contact], 0.0),
-    )  # fmt: skip
+    )
 
 
 def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int, float]]:
@@ -93,11 +94,7 @@ def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int,
         if columns.size > 1:
             raise _no_coordinate(name, "has a gap between several coordinates")
         found.append((d, int(columns[0]), float(row.data[0])))
-    if (
-        isinstance(law, RigidCoulomb)
-        and law.preload is None
-        and NORMAL not in [d for d, _, _ in found]
-    ):
+    if isinstance(law, RigidCoulomb) and law.preload is None and NORMAL not in [d for d, _, _ in found]:
         raise input_error(
             f"contact {name}",
             "is unilateral and has no normal gap",

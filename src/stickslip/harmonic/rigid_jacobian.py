@@ -239,9 +239,7 @@ class RigidJacobian:
             soft.subtract_below((before, first, last), gap, rows)
             below = predicted[:, :first]
             force = _each_product(laws.own[:, first:last, :first], below)
-            force[laws.tangent] += _each_product(
-                laws.by_normal[:, first:last, :first], below[laws.normal]
-            )
+            force[laws.tangent] += _each_product(laws.by_normal[:, first:last, :first], below[laws.normal])
             rows[first:last, laws.column] -= laws.factor * force.T
             right_side = rows[0] if h == 0 else rows[first] - 1j * rows[first + 1]
             x = kept.solve(h, right_side)

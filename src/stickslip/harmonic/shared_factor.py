@@ -85,9 +85,7 @@ class SharedInverses:
     def solve_transposed(self, place: int, rows: FloatArray) -> FloatArray:
         """Solve with the transpose of the real form of harmonic number `place`."""
         # the transpose of a real form is that of the conjugate transpose
-        return _solve(
-            self.kept.factor.solve_transposed, self.kept, self.inner[place].conj().T, rows
-        )
+        return _solve(self.kept.factor.solve_transposed, self.kept, self.inner[place].conj().T, rows)
 
 
 def _solve(solve: Solve, kept: SharedFactor, inner: ComplexArray, rows: FloatArray) -> FloatArray:
@@ -107,9 +105,7 @@ def _in_its_precision(factor: AnyFactors, solve: Solve, right: FloatArray) -> Fl
     return np.asarray(solve(right.astype(np.float32) if single else right), dtype=float)
 
 
-def shared_factor(
-    linear: Shareable, means: ComplexArray, rows: SparseRows, scale: float
-) -> SharedFactor | None:
+def shared_factor(linear: Shareable, means: ComplexArray, rows: SparseRows, scale: float) -> SharedFactor | None:
     """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are wanted.
 
     Parameters
@@ -139,9 +135,7 @@ def shared_factor(
             count = modes.shape[1]
             gaps = rows.gaps(modes.T.copy()).reshape(count, -1, 3).transpose(1, 2, 0)
             projected = linear.projected(modes)
-            return SharedFactor(
-                linear, factor, modes, weighted, np.ascontiguousarray(gaps), projected
-            )
+            return SharedFactor(linear, factor, modes, weighted, np.ascontiguousarray(gaps), projected)
     return None
 
 
@@ -153,9 +147,7 @@ def _copied(matrix: Matrix, single: bool) -> Matrix:
     return np.array(matrix, dtype=kind, order="F")
 
 
-def _enough_modes(
-    linear: Shareable, factor: AnyFactors, scale: float
-) -> tuple[FloatArray, FloatArray] | None:
+def _enough_modes(linear: Shareable, factor: AnyFactors, scale: float) -> tuple[FloatArray, FloatArray] | None:
     """Return low modes beyond the highest harmonic, and M times them; None if that takes too many, or more than the mass has."""
     wanted = scale * (REACH * linear.harmonics[-1] * linear.omega) ** 2
     most = linear.n // MOST_MODES
@@ -172,9 +164,7 @@ def _enough_modes(
         count = min(2 * count, most)
 
 
-def _low_modes(
-    linear: Shareable, factor: AnyFactors, count: int
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+def _low_modes(linear: Shareable, factor: AnyFactors, count: int) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973).
 
     None if no `count` modes have mass.

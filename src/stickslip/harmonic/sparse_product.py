@@ -53,9 +53,7 @@ class SparseMatrices:
             return self
         return SparseMatrices(self.stiffness, self.damping.T.tocsr(), self.mass, self.loss)
 
-    def times(
-        self, rows: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
+    def times(self, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
         """Return the products of stiffness, damping, mass and loss with the `rows` (m, n) of q."""
         columns = np.ascontiguousarray(rows.T)
 
@@ -145,9 +143,13 @@ class SparseProduct:
         near: Blocks = (seen(own.stiffness), seen(own.damping), seen(own.mass))
         none: Blocks = (across, across, across)
         interior = Interior(
-            near, none, (inside, inside, inside), True, none if own.coriolis else None,
+            near,
+            none,
+            (inside, inside, inside),
+            True,
+            none if own.coriolis else None,
             None if own.loss is None else (seen(own.loss), across, inside),
-        )  # fmt: skip
+        )
         unloaded = np.zeros((1, k), dtype=complex), np.zeros((1, 0), dtype=complex)
         return at_frequency(interior, unloaded, self.omega, self.harmonics)
 

@@ -141,8 +141,7 @@ class SparseStiffness:
     def output_rows(self, _omega: float, _harmonic: int, dofs: IntArray) -> ComplexArray:
         """Return the (k, n) matrix that takes the motion of `dofs` (k,) out of that of all."""
         rows = scipy.sparse.csr_array(
-            (np.ones(dofs.size, dtype=complex), (np.arange(dofs.size), dofs)),
-            shape=(dofs.size, self.n),
+            (np.ones(dofs.size, dtype=complex), (np.arange(dofs.size), dofs)), shape=(dofs.size, self.n)
         )
         return np.asarray(as_array(rows))
 
@@ -168,9 +167,7 @@ def keep_all(structure: Structure, load: HarmonicLoad) -> SparseStiffness:
         If a matrix is not real, not finite, or one but the damping not symmetric.
     """
     if load.static.size != structure.n:
-        raise input_error(
-            "HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof."
-        )
+        raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")
     whole = (_sparse(structure, name) for name in ("stiffness", "damping", "mass"))
     loss = None if structure.loss is None else _sparse(structure, "loss")
     stiffness, damping, mass = whole
@@ -187,7 +184,5 @@ def _sparse(structure: Structure, name: str) -> Any:
     elif name != "damping" and asymmetry(matrix) > SYMMETRY:
         wrong = "is not symmetric"
     if wrong:
-        raise input_error(
-            f"Structure.{name}", wrong, "An unreduced structure takes real, symmetric matrices."
-        )
+        raise input_error(f"Structure.{name}", wrong, "An unreduced structure takes real, symmetric matrices.")
     return matrix

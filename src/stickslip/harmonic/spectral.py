@@ -23,10 +23,10 @@ Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
 PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
 LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
-IN_MODES = 1e-11  # share of the largest damping in a row by which a sum of products with the modes of the interior may round
-FAST = (
-    10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
+IN_MODES = (
+    1e-11  # share of the largest damping in a row by which a sum of products with the modes of the interior may round
 )
+FAST = 10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,11 +207,7 @@ class Interior:
     def states(self) -> StateSpace | None:
         """State-space eigenvectors, or None where damping is diagonal or structural, the interior too large or its eigenvectors ill-conditioned."""
         _, damping, mass = self.ll
-        if (
-            self.diagonal
-            or self.loss is not None
-            or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE
-        ):
+        if self.diagonal or self.loss is not None or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE:
             return None
         return state_space(damping, np.diagonal(mass))
 
@@ -246,9 +242,7 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
     if np.any(np.sum(np.abs(c - ratio * m), axis=0) > PARALLEL * largest):
         return None
     polynomial = np.concatenate([whole, np.zeros((1, *whole.shape[1:]))])
-    return ModeTerms(
-        m, np.ascontiguousarray(m.T), polynomial, ratio, np.diagonal(ll[1]), np.diagonal(ll[2])
-    )
+    return ModeTerms(m, np.ascontiguousarray(m.T), polynomial, ratio, np.diagonal(ll[1]), np.diagonal(ll[2]))
 
 
 def _poles(interior: Interior, states: StateSpace) -> Poles:
@@ -268,20 +262,21 @@ def _poles(interior: Interior, states: StateSpace) -> Poles:
     # what the division leaves, (1 - p ν) times: c, or -m / ν
     left_rest = np.where(slow, -m_left / safe, c_left)
     right_rest = np.where(slow, -m_right.T / safe, c_right.T).T
-    crossed = left @ np.where(slow[:, None], right_rest, 0.0) + left_rest @ np.where(
-        slow[:, None], right, 0.0
-    )
-    turned = left @ np.where(slow[:, None], 0.0, right_rest) + left_rest @ np.where(
-        slow[:, None], 0.0, right
-    )
+    crossed = left @ np.where(slow[:, None], right_rest, 0.0) + left_rest @ np.where(slow[:, None], right, 0.0)
+    turned = left @ np.where(slow[:, None], 0.0, right_rest) + left_rest @ np.where(slow[:, None], 0.0, right)
     square = left_rest @ right_rest
     cube = turned - (left_rest * nu) @ right_rest
     whole[2] -= (crossed + square).real
     polynomial = np.concatenate([whole, -cube.real[None]])
     return Poles(
-        left, np.ascontiguousarray(right), polynomial, (left_rest @ backward).real,
-        np.where(slow, 1.0, 2.0), states, interior.ln is None,
-    )  # fmt: skip
+        left,
+        np.ascontiguousarray(right),
+        polynomial,
+        (left_rest @ backward).real,
+        np.where(slow, 1.0, 2.0),
+        states,
+        interior.ln is None,
+    )
 
 
 def summed(
@@ -329,7 +324,7 @@ def summed(
     return matrices, loads
 
 
-def _multiplied(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: ComplexArray) -> None:  # fmt: skip
+def _multiplied(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: ComplexArray) -> None:
     """Write ``Σ_k P_k p^k - Σ w R`` and its derivative to `out` (2, H, n, n)."""
     size = terms.left.shape[1]
     scaled = (terms.left * weights[:, :, None]).reshape(-1, size)

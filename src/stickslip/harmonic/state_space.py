@@ -60,6 +60,4 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
     condition = np.linalg.norm(inverse, axis=1) * np.linalg.norm(vectors, axis=0)
     if not np.max(condition) <= ILL_CONDITIONED:
         return None
-    return StateSpace(
-        nu.astype(complex), vectors[:n].astype(complex), inverse[:, :n].astype(complex)
-    )
+    return StateSpace(nu.astype(complex), vectors[:n].astype(complex), inverse[:, :n].astype(complex))

@@ -16,37 +16,14 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
 from stickslip.contact.law import PAIRS
-from stickslip.contact.product import (
-    contact_product,
-    harmonic_means,
-    less_means,
-    subtract_lower,
-    sweep,
-)
+from stickslip.contact.product import contact_product, harmonic_means, less_means, subtract_lower, sweep
 from stickslip.harmonic.costs import linear_costs, reduced_cost
-from stickslip.harmonic.factors import (
-    AnyFactors,
-    as_array,
-    factorise,
-    real_part,
-    with_contacts,
-)
+from stickslip.harmonic.factors import AnyFactors, as_array, factorise, real_part, with_contacts
 from stickslip.harmonic.linear import Shareable, StiffnessProducts
 from stickslip.harmonic.matrix_products import MatrixProducts
-from stickslip.harmonic.resting import (
-    Coupling,
-    Resting,
-    TransposedElimination,
-    coupling,
-    known,
-)
+from stickslip.harmonic.resting import Coupling, Resting, TransposedElimination, coupling, known
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
-from stickslip.harmonic.small_blocks import (
-    SMALL,
-    SmallBlocks,
-    dynamic_stiffness,
-    small_blocks,
-)
+from stickslip.harmonic.small_blocks import SMALL, SmallBlocks, dynamic_stiffness, small_blocks
 from stickslip.harmonic.sparse_product import SparseProduct
 from stickslip.operators import Costs, JacobianOperator
 
@@ -234,9 +211,7 @@ class StructuredJacobian:
 
         def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
             q = self._by_row(v)
-            return preconditioned + self.scale * self._add_contacts(
-                left, q, False, np.zeros_like(q)
-            )
+            return preconditioned + self.scale * self._add_contacts(left, q, False, np.zeros_like(q))
 
         return solve, product
 
@@ -260,9 +235,7 @@ class StructuredJacobian:
         gap = self.rows.gaps(rows[first:last]).reshape(2, -1, 3)
         force = np.zeros((first, *gap.shape[1:]))
         for block, (row, col) in enumerate(PAIRS[: self.blocks.shape[1]]):
-            force[:, :, col] += np.einsum(
-                "cpq,pc->qc", self.blocks[:, block, first:last, :first], gap[:, :, row]
-            )
+            force[:, :, col] += np.einsum("cpq,pc->qc", self.blocks[:, block, first:last, :first], gap[:, :, row])
         self.rows.add_forces(-self.scale * force.reshape(first, -1), rows[:first])
 
     def _inverses(self, kept: Kept) -> HarmonicFactors | SharedInverses:
@@ -278,8 +251,16 @@ class StructuredJacobian:
         if isinstance(own, HarmonicFactors) and own.inverses is not None:
             out = np.empty_like(rows)
             sweep(
-                own.inverses.real, own.inverses.imaginary, self.blocks, self.rows.columns, self.rows.values, self.scale, rows, gap, out
-            )  # fmt: skip
+                own.inverses.real,
+                own.inverses.imaginary,
+                self.blocks,
+                self.rows.columns,
+                self.rows.values,
+                self.scale,
+                rows,
+                gap,
+                out,
+            )
             return out.reshape(-1)
         before = first = 0
         for h in range(len(self.linear.harmonics)):
@@ -291,20 +272,16 @@ class StructuredJacobian:
 
     def subtract_below(self, span: tuple[int, int, int], gap: FloatArray, rows: FloatArray) -> None:
         """Subtract from a harmonic of the right side `rows` what the solved harmonics below it do at the contacts; see `subtract_lower`."""
-        subtract_lower(
-            self.blocks, self.rows.columns, self.rows.values, rows, *span, self.scale, gap, rows
-        )
+        subtract_lower(self.blocks, self.rows.columns, self.rows.values, rows, *span, self.scale, gap, rows)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
         return np.ascontiguousarray(v.reshape(-1, self.linear.n))
 
-    def _add_contacts(
-        self, blocks: FloatArray, q: FloatArray, transposed: bool, out: FloatArray
-    ) -> FloatArray:
+    def _add_contacts(self, blocks: FloatArray, q: FloatArray, transposed: bool, out: FloatArray) -> FloatArray:
         m = q.shape[0]
         contact_product(
             blocks, self.rows.columns, self.rows.values, q, transposed, np.empty((3, m)), np.empty((3, m)), out
-        )  # fmt: skip
+        )
         return out.reshape(-1)
 
 

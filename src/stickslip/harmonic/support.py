@@ -76,7 +76,7 @@ def rows_among(harmonics: Harmonics, some: Iterable[int]) -> IntArray:
 
 def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
     """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros where it has none."""
-    whole = coefficients if len(coefficients) == harmonics[-1] + 1 else padded(coefficients, harmonics[-1])  # fmt: skip
+    whole = coefficients if len(coefficients) == harmonics[-1] + 1 else padded(coefficients, harmonics[-1])
     return to_real(whole if is_full(harmonics) else whole[list(harmonics)])
 
 
@@ -107,6 +107,4 @@ def kept_by_dof(by_dof: ByDof, harmonics: Harmonics) -> BoolArray:
 
 def supports_of(kept: BoolArray, harmonics: Harmonics) -> ByDof:
     """Return the support of each coordinate from the (len(harmonics), n) pairs that are kept."""
-    return tuple(
-        tuple(h for h, own in zip(harmonics, column, strict=True) if own) for column in kept.T
-    )
+    return tuple(tuple(h for h, own in zip(harmonics, column, strict=True) if own) for column in kept.T)

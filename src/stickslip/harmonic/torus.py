@@ -20,13 +20,7 @@ from stickslip.harmonic.balance import JacobianForm, check_retained
 from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.torus_path import (
-    Indices,
-    TorusPath,
-    half_plane,
-    torus_basis,
-    torus_rates,
-)
+from stickslip.harmonic.torus_path import Indices, TorusPath, half_plane, torus_basis, torus_rates
 from stickslip.harmonic.torus_products import CombinedProducts
 from stickslip.harmonic.torus_side import TorusSide
 
@@ -132,11 +126,7 @@ class TorusBalance:
         return self.unknowns(np.array([known.get(index, none) for index in self.indices]))
 
     def forces(
-        self,
-        x: FloatArray,
-        omegas: tuple[float, float],
-        path: TorusPath,
-        more: Indices = ((0, 0),),
+        self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices = ((0, 0),)
     ) -> TorusForces:
         """Return what the contacts do on the torus, `more` names combined frequencies at which their forces are asked for, too."""
         gaps = self.rows.gaps(x.reshape(self.n_rows, self.side.n) * self.displacement_scale)
@@ -149,9 +139,7 @@ class TorusBalance:
             basis = torus_basis(path, self.indices, way)
             slope = torus_rates(basis, frequencies)
             for laws in self.compiled.marched:
-                force, own, late, rated = _marched(
-                    laws, gaps.reshape(m, n, 3), (basis, slope), omegas[0], pairs
-                )
+                force, own, late, rated = _marched(laws, gaps.reshape(m, n, 3), (basis, slope), omegas[0], pairs)
                 coefficients[:, laws.contacts] += _analysed(force, basis) / path.ways
                 wider = torus_basis(path, more, way)
                 beyond[:, laws.contacts] += _analysed(force, wider) / path.ways
@@ -161,9 +149,7 @@ class TorusBalance:
             coefficients *= self.compiled.weights[:, None]
             beyond *= self.compiled.weights[:, None]
             blocks *= self.compiled.weights[:, None, None, None]
-        return TorusForces(
-            coefficients.reshape(m, -1), blocks, beyond.reshape(len(beyond), -1), rates, unsettled
-        )
+        return TorusForces(coefficients.reshape(m, -1), blocks, beyond.reshape(len(beyond), -1), rates, unsettled)
 
     def frequencies(self, omegas: tuple[float, float]) -> FloatArray:
         """Return the combined frequencies, rad/s; some may be below zero."""
@@ -199,13 +185,7 @@ class TorusBalance:
             forces.unsettled,
         )
 
-    def left_out(
-        self,
-        x: FloatArray,
-        omegas: tuple[float, float],
-        path: TorusPath,
-        more: Indices,
-    ) -> ComplexArray:
+    def left_out(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices) -> ComplexArray:
         """Return the (len(more), n) motion that the contact forces at combined frequencies left out would make, m; 0 at (0, 0).
 
         Contacts answer it with the stiffness that they have against the first frequency.
@@ -218,24 +198,20 @@ class TorusBalance:
         cos = forces.blocks[:, :, 1:3, 1:3].diagonal(axis1=2, axis2=3).mean(axis=2)
         add_contact_jacobian(
             np.ascontiguousarray(cos[:, :, None, None]), self.rows.columns, self.rows.values, self.side.n, 1.0, against
-        )  # fmt: skip
+        )
         moved = np.zeros((len(more), self.side.n), dtype=complex)
         right = to_complex(out)
         moved[1:] = np.linalg.solve(stiffness[1:] + against, -right[1:, :, None])[..., 0]
         return moved
 
-    def by_damping(
-        self, x: FloatArray, omegas: tuple[float, float], rate: float, step: float
-    ) -> FloatArray:
+    def by_damping(self, x: FloatArray, omegas: tuple[float, float], rate: float, step: float) -> FloatArray:
         """Return the derivative of the residual by `rate`, a central difference of the linear side."""
         q = self.coefficients(x)[:, :, None]
         ends = [self.side.stiffness(self.indices, omegas, rate + s)[0] for s in (-step, step)]
         change = ((ends[1] - ends[0]) @ q)[..., 0] / (2.0 * step)
         return np.asarray(to_real(change).reshape(-1) / self.force_scale)
 
-    def _by_rate(
-        self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, place: int
-    ) -> FloatArray:
+    def _by_rate(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, place: int) -> FloatArray:
         """Return the derivative of the coefficients of the contact forces by a frequency, where they depend on velocity."""
         step = 1e-5 * omegas[place]
         ends = []
@@ -282,7 +258,7 @@ def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBal
     stiffness = local.stuck_stiffness()
     known = stiffness[stiffness > 0.0]
     typical = float(np.exp(np.mean(np.log(known)))) if known.size else 1.0
-    scale = max(*(one.scale for one in loads), float(np.max(np.abs(local.resting_force()), initial=0.0)))  # fmt: skip
+    scale = max(*(one.scale for one in loads), float(np.max(np.abs(local.resting_force()), initial=0.0)))
     if scale <= 0.0:
         raise input_error("quasi_periodic", "nothing acts on the model", "Give a load.")
     indices = half_plane(order)
@@ -299,11 +275,7 @@ def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBal
 
 
 def _marched(
-    laws: MarchedLaws,
-    gaps: FloatArray,
-    tables: tuple[FloatArray, FloatArray],
-    omega: float,
-    pairs: int,
+    laws: MarchedLaws, gaps: FloatArray, tables: tuple[FloatArray, FloatArray], omega: float, pairs: int
 ) -> tuple[FloatArray, FloatArray, int, bool]:
     """March contacts of one law class along a characteristic; return forces, blocks, how many did not settle, and whether velocity counts."""
     basis, rates = tables
@@ -316,9 +288,20 @@ def _marched(
     blocks = np.empty((n, pairs, len(own), len(own)))
     periods = np.empty(n, dtype=np.int64)
     period_march()(
-        law_address(laws.kernel), laws.parameters, laws.start, gap, velocity, basis, rates, omega,
-        force, state, blocks, by_omega, periods,
-    )  # fmt: skip
+        law_address(laws.kernel),
+        laws.parameters,
+        laws.start,
+        gap,
+        velocity,
+        basis,
+        rates,
+        omega,
+        force,
+        state,
+        blocks,
+        by_omega,
+        periods,
+    )
     return force, blocks, int(np.count_nonzero(periods < 0)), bool(np.any(by_omega))
 
 

@@ -70,9 +70,7 @@ def half_plane(order: int) -> Indices:
         raise input_error("harmonics", f"is {order}", "Keep at least the two frequencies: 1.")
     first = [(j, 0) for j in range(1, order + 1)]
     rest = [
-        (j, k)
-        for k in range(1, order + 1)
-        for j in sorted(range(k - order, order - k + 1), key=lambda v: (abs(v), -v))
+        (j, k) for k in range(1, order + 1) for j in sorted(range(k - order, order - k + 1), key=lambda v: (abs(v), -v))
     ]
     return ((0, 0), *first, *rest)
 
@@ -90,9 +88,7 @@ def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
         Times the usual number of turns and of samples a turn.
     """
     least = ceil(refine * max(TURNS_A_HARMONIC * order, LEAST_TURNS))
-    choices = [
-        (p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1
-    ]
+    choices = [(p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1]
     off = [2.0 * np.pi * abs(ratio - q / p) for p, q in choices]
     near = [i for i, slip in enumerate(off) if slip <= SLIP]
     p, q = choices[near[0] if near else int(np.argmin(off))]
@@ -109,12 +105,7 @@ def _through_beat(ratio: float, least: int) -> tuple[int, int]:
     with in another part.
     """
     turns = range(least, LONG * least)
-    choices = [
-        (p, q)
-        for p in turns
-        for q in {max(1, int(ratio * p)), int(ratio * p) + 1}
-        if gcd(p, q) == 1
-    ]
+    choices = [(p, q) for p in turns for q in {max(1, int(ratio * p)), int(ratio * p) + 1} if gcd(p, q) == 1]
     return min(choices, key=lambda c: abs(ratio - c[1] / c[0]))
 
 

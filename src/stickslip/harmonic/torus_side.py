@@ -58,9 +58,7 @@ class TorusSide:
         """
         return _stiffness(self, indices, omegas, rate)
 
-    def load(
-        self, indices: Indices, omegas: tuple[float, float]
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    def load(self, indices: Indices, omegas: tuple[float, float]) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Return (len, n) the condensed load of each combined frequency and its derivatives by ω1 and ω2."""
         out = np.zeros((3, len(indices), self.n), dtype=complex)
         top = max(max(abs(j), abs(k)) for j, k in indices)
@@ -72,9 +70,7 @@ class TorusSide:
                 out[0, place], out[2, place] = two.load[k], two.load_derivative[k]
         return out[0], out[1], out[2]
 
-    def recover(
-        self, indices: Indices, omegas: tuple[float, float], q: ComplexArray
-    ) -> ComplexArray:
+    def recover(self, indices: Indices, omegas: tuple[float, float], q: ComplexArray) -> ComplexArray:
         """Return the (len, n_all) motion of all dofs from that of the retained ones (len, n)."""
         top = max(max(abs(j), abs(k)) for j, k in indices)
         own: list[ComplexArray | None] = [None] * len(indices)

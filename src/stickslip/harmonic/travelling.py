@@ -13,9 +13,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.condensed_once import condensed_once
-from stickslip.harmonic.dynamic_stiffness import (
-    Condensed,
-)
+from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
@@ -24,13 +22,7 @@ from stickslip.harmonic.mistuned import by_sectors, condense_mistuned
 from stickslip.harmonic.sparse_stiffness import LEAST_SPARSE, Unreduced, keep_all
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
-from stickslip.harmonic.wave_condensation import (
-    Array,
-    ModalWave,
-    SolvedWave,
-    WaveAt,
-    condense_wave,
-)
+from stickslip.harmonic.wave_condensation import Array, ModalWave, SolvedWave, WaveAt, condense_wave
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.mistuned import MistunedWheel
@@ -70,9 +62,7 @@ class Waves:
         structure = self.structures[h]
         key = id(structure), h == 0
         if key not in self.known:
-            self.known[key] = condense_wave(
-                structure, self.near, self.far, mean=h == 0, feedback=self.force_on(h)
-            )
+            self.known[key] = condense_wave(structure, self.near, self.far, mean=h == 0, feedback=self.force_on(h))
         return self.known[key]
 
     def force_on(self, h: int) -> Feedback | None:
@@ -173,15 +163,10 @@ class TravellingStiffness:
         """Return the waves of some harmonics at `omega` (rad/s)."""
         return self.waves.at(omega, harmonics)
 
-    def loads(
-        self, waves: Sequence[WaveAt], harmonics: Sequence[int]
-    ) -> tuple[ComplexArray, ComplexArray]:
+    def loads(self, waves: Sequence[WaveAt], harmonics: Sequence[int]) -> tuple[ComplexArray, ComplexArray]:
         """Return the condensed loads (k, n) of some harmonics and their derivatives by hω."""
         f = self.load.coefficients(harmonics[-1])
-        found = [
-            wave.load(f[h, self.retained], f[h, self.interior])
-            for wave, h in zip(waves, harmonics, strict=True)
-        ]
+        found = [wave.load(f[h, self.retained], f[h, self.interior]) for wave, h in zip(waves, harmonics, strict=True)]
         return np.array([load for load, _ in found]), np.array([slope for _, slope in found])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
@@ -282,9 +267,7 @@ class CondensedWaves:
         return to_real(np.array([times(wave, q) for wave, q in pairs]))
 
 
-def condense_side(
-    side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int
-) -> DynamicStiffness:
+def condense_side(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
     """Prepare the exact condensation of what vibrates, for harmonics up to `order`.
 
     Not at all where it is unreduced (`keep_all`). By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by

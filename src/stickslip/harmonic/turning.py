@@ -202,9 +202,7 @@ class TurningProducts:
         return self.linear.beside(self.omega).products(self.omega, self.harmonics)
 
 
-def condense_line(
-    line: SpeedLine, retained: IntArray, load: HarmonicLoad, order: int
-) -> TurningStiffness:
+def condense_line(line: SpeedLine, retained: IntArray, load: HarmonicLoad, order: int) -> TurningStiffness:
     """Prepare the exact condensation along an engine-order line; `load` holds multiples of the line's own at the highest speed."""
     one = TurningStiffness(line, np.asarray(retained, dtype=np.int64), order, {})
     return one.with_load(load)

@@ -22,9 +22,7 @@ from stickslip.reduction.aerodynamics import Feedback
 
 Array = FloatArray | ComplexArray
 Four = tuple[Array, Array, Array, Array]  # of stiffness, damping, mass and structural damping
-LARGEST_MODAL = (
-    1500  # interior coordinates; beyond, the modes cost more than solving at dozens of frequencies
-)
+LARGEST_MODAL = 1500  # interior coordinates; beyond, the modes cost more than solving at dozens of frequencies
 HELD = 1e-12  # smallest eigenvalue of the scaled interior stiffness, below which its modes lose their digits
 DIAGONAL = 1e-10  # off-diagonal damping below this share of the largest counts as none
 
@@ -165,10 +163,7 @@ class ModalWave:
         """Return the same wave with `rate` (1/s) times its mass added to its damping: its modes stay what they are."""
         k, c, m, loss = self.nn
         return replace(
-            self,
-            nn=(k, c + rate * m, m, loss),
-            ratio=self.ratio + rate,
-            damping=self.damping + rate * self.mass,
+            self, nn=(k, c + rate * m, m, loss), ratio=self.ratio + rate, damping=self.damping + rate * self.mass
         )
 
     def at(self, s: float) -> WaveAt:
@@ -226,12 +221,7 @@ class _ModalAt:
 
 
 def condense_wave(
-    structure: Structure,
-    near: IntArray,
-    far: IntArray,
-    *,
-    mean: bool,
-    feedback: Feedback | None = None,
+    structure: Structure, near: IntArray, far: IntArray, *, mean: bool, feedback: Feedback | None = None
 ) -> SolvedWave | ModalWave:
     """Prepare the condensation of a wave.
 
@@ -268,9 +258,7 @@ def _in_modes(matrices: Four, near: IntArray, far: IntArray) -> ModalWave | None
         return None
     damping, mass, loss = (np.diagonal(matrix).real for matrix in own)
     static = to_modes[0]
-    left = [
-        cross - static * d for cross, d in zip(to_modes[1:], (damping, mass, loss), strict=True)
-    ]
+    left = [cross - static * d for cross, d in zip(to_modes[1:], (damping, mass, loss), strict=True)]
     c, m, lossy = left
     squares = np.sum(np.abs(m) ** 2, axis=0)
     ratio = np.sum(m.conj() * c, axis=0).real / np.where(squares > 0.0, squares, 1.0)
@@ -282,9 +270,7 @@ def _in_modes(matrices: Four, near: IntArray, far: IntArray) -> ModalWave | None
     for (nn, _, _, _), cross, rest in zip(blocks[1:], to_modes[1:], left, strict=True):
         whole.append(nn - cross @ static.conj().T - static @ rest.conj().T)
     k_nn, c_nn, m_nn, l_nn = whole
-    return ModalWave(
-        (k_nn, c_nn, m_nn, l_nn), static, m, ratio, damping, np.maximum(mass, 0.0), loss, modes
-    )
+    return ModalWave((k_nn, c_nn, m_nn, l_nn), static, m, ratio, damping, np.maximum(mass, 0.0), loss, modes)
 
 
 def _interior_modes(stiffness: Array, mass: Array) -> Array | None:

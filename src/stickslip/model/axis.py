@@ -33,9 +33,7 @@ class Axis:
         for name in ("direction", "origin"):
             value = getattr(self, name)
             if len(value) != 3 or not all(math.isfinite(v) for v in value):
-                raise input_error(
-                    f"Axis.{name}", f"needs three numbers, got {value}", "Give x, y, z."
-                )
+                raise input_error(f"Axis.{name}", f"needs three numbers, got {value}", "Give x, y, z.")
         if not any(self.direction):
             raise input_error("Axis.direction", "has no length", "The z axis is (0, 0, 1).")
 
@@ -54,9 +52,7 @@ class Axis:
     def rotation(self, angle: float) -> FloatArray:
         """Return the (3, 3) matrix that turns vectors by `angle` (rad) about the axis (Rodrigues)."""
         cross = self.cross
-        return np.asarray(
-            np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-        )
+        return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
 
     def turned(self, points: FloatArray, angle: float) -> FloatArray:
         """Return `points` (n, 3) turned by `angle` (rad) about the axis."""

@@ -55,9 +55,7 @@ class Damping:
             )
         if (self.ratio is not None) + factors + (self.modal is not None) > 1:
             raise input_error(
-                "damping",
-                "is given in several forms",
-                "Give ratio and between_hz, or alpha and beta, or modal.",
+                "damping", "is given in several forms", "Give ratio and between_hz, or alpha and beta, or modal."
             )
         given: dict[str, tuple[float, ...]] = {
             "alpha": (self.alpha,),
@@ -67,9 +65,7 @@ class Damping:
         given["modal"] = self.modal if isinstance(self.modal, tuple) else (self.modal or 0.0,)
         for name, values in given.items():
             if not all(0 <= value < math.inf for value in values):
-                raise input_error(
-                    f"damping.{name}", f"must not be negative, got {values}", "0 is none."
-                )
+                raise input_error(f"damping.{name}", f"must not be negative, got {values}", "0 is none.")
         if self.ratio is not None and self.between_hz is not None:
             _check_rayleigh(self.ratio, self.between_hz)
 
@@ -104,14 +100,10 @@ def _check_rayleigh(ratio: float, between_hz: tuple[float, float]) -> None:
     if not (math.isfinite(ratio) and ratio >= 0):
         raise input_error("damping ratio", f"must not be negative, got {ratio}", "0.001 is 0.1 %.")
     if not 0 < low < high < math.inf:
-        raise input_error(
-            "damping between_hz", f"needs 0 < low < high, got {between_hz}", "Give hertz."
-        )
+        raise input_error("damping between_hz", f"needs 0 < low < high, got {between_hz}", "Give hertz.")
 
 
-def rayleigh_damping(
-    structure: Structure, ratio: float, between_hz: tuple[float, float]
-) -> Structure:
+def rayleigh_damping(structure: Structure, ratio: float, between_hz: tuple[float, float]) -> Structure:
     """Return the structure with ``C = α M + β K``.
 
     Parameters
@@ -154,9 +146,7 @@ def modal_damping(structure: Structure, ratios: float | Sequence[float] | FloatA
     """
     n = structure.n
     if n > LARGEST:
-        raise input_error(
-            "modal_damping", f"{n} dofs would need a full matrix", "Reduce the structure first."
-        )
+        raise input_error("modal_damping", f"{n} dofs would need a full matrix", "Reduce the structure first.")
     movable = int(np.count_nonzero(structure.mass.diagonal()))
     given = np.asarray(ratios, dtype=float)
     zeta = np.full(movable, given) if given.ndim == 0 else given
@@ -179,9 +169,7 @@ def modal_damping(structure: Structure, ratios: float | Sequence[float] | FloatA
     return _with_dissipation(structure, (damping + damping.conj().T) / 2)
 
 
-def structural_damping(
-    structure: Structure, loss_factor: float, *, elastic: Matrix | None = None
-) -> Structure:
+def structural_damping(structure: Structure, loss_factor: float, *, elastic: Matrix | None = None) -> Structure:
     """Return the structure with structural (hysteretic) damping: stiffness ``K + i η K`` in vibration, K alone in statics.
 
     Parameters
@@ -201,9 +189,7 @@ def structural_damping(
     """
     if not 0 <= loss_factor < math.inf:
         raise input_error(
-            "structural_damping: loss_factor",
-            f"must not be negative, got {loss_factor}",
-            "Metals: 1e-4 to 1e-2.",
+            "structural_damping: loss_factor", f"must not be negative, got {loss_factor}", "Metals: 1e-4 to 1e-2."
         )
     source = structure.stiffness if elastic is None else elastic
     if source.shape != structure.stiffness.shape:
@@ -219,9 +205,7 @@ def dissipates(structure: Structure) -> bool:
     """Tell whether a structure has damping of its own, Coriolis terms aside."""
     own = structure.damping
     symmetric = (own + own.conj().T) / 2
-    return structure.loss is not None or bool(
-        structure.n and abs(symmetric).max() > ROUNDING * abs(own).max()
-    )
+    return structure.loss is not None or bool(structure.n and abs(symmetric).max() > ROUNDING * abs(own).max())
 
 
 def _with_dissipation(structure: Structure, damping: Matrix) -> Structure:

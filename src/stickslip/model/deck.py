@@ -48,9 +48,7 @@ class CalculixRun:
 
     def __post_init__(self) -> None:
         if self.n_modes < 0 or (self.n_modes == 0 and self.speed == 0.0 and not self.matrices):
-            raise input_error(
-                "CalculixRun.n_modes", f"is {self.n_modes} without a speed", "Ask for modes."
-            )
+            raise input_error("CalculixRun.n_modes", f"is {self.n_modes} without a speed", "Ask for modes.")
 
 
 def write_deck(
@@ -92,13 +90,9 @@ def write_deck(
     wanted = [*clamped, *(("cyclic_low", "cyclic_high") if sectors else ())]
     missing = [name for name in wanted if name not in mesh.node_sets]
     if missing:
-        raise input_error(
-            "write_deck", f"the mesh lacks the node sets {missing}", f"It has {[*mesh.node_sets]}."
-        )
+        raise input_error("write_deck", f"the mesh lacks the node sets {missing}", f"It has {[*mesh.node_sets]}.")
     if run.nodal_diameters and not sectors:
-        raise input_error(
-            "CalculixRun.nodal_diameters", "asks for a cyclic model", "Give the number of sectors."
-        )
+        raise input_error("CalculixRun.nodal_diameters", "asks for a cyclic model", "Give the number of sectors.")
     held = np.concatenate([np.empty(0, np.int64), *(mesh.node_sets[name] for name in clamped)])
     lines = [*_mesh_cards(mesh), *_material_cards(material)]
     if sectors:

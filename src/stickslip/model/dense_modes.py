@@ -53,9 +53,7 @@ def dense_modes(
     follow = _following(stiffness, with_mass, without, dofs)
     basis = with_mass + without @ follow
     condensed = with_mass.conj().T @ stiffness @ basis
-    values, vectors = _of_full_rank(
-        (condensed + condensed.conj().T) / 2, np.diag(squares), n, shift
-    )
+    values, vectors = _of_full_rank((condensed + condensed.conj().T) / 2, np.diag(squares), n, shift)
     return values, np.asarray(basis @ vectors)
 
 
@@ -81,9 +79,7 @@ def _by_mass(mass: Matrix, dofs: Dofs | None) -> tuple[FloatArray, Matrix, Matri
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = scale[:, None] * mass * scale
     sizes = np.abs(scaled).max(axis=0)
-    if not np.all(
-        np.isfinite(sizes)
-    ):  # beside a positive diagonal no number of a positive matrix is so large
+    if not np.all(np.isfinite(sizes)):  # beside a positive diagonal no number of a positive matrix is so large
         raise _not_positive(np.where(np.isfinite(sizes), 0.0, 1.0), dofs)
     squares, shapes = np.linalg.eigh(scaled)
     if squares[0] < -NEGATIVE * squares[-1]:

@@ -36,9 +36,7 @@ class Dofs:
     def __post_init__(self) -> None:
         n = len(self.component)
         if self.node.shape != (n,) or self.position.shape != (n, 3):
-            raise ValueError(
-                f"Dofs: {n} components, nodes {self.node.shape}, positions {self.position.shape}"
-            )
+            raise ValueError(f"Dofs: {n} components, nodes {self.node.shape}, positions {self.position.shape}")
         if not self.part:
             object.__setattr__(self, "part", ("",) * n)
 
@@ -83,11 +81,7 @@ def modal_dofs(n: int) -> Dofs:
 
 def nodal_dofs(points: FloatArray, nodes: IntArray) -> Dofs:
     """Return the x, y, z dofs of `nodes` (node-major) at `points` (n_nodes, 3)."""
-    return Dofs(
-        np.repeat(nodes, 3),
-        ("x", "y", "z") * len(nodes),
-        np.repeat(points, 3, axis=0).astype(float),
-    )
+    return Dofs(np.repeat(nodes, 3), ("x", "y", "z") * len(nodes), np.repeat(points, 3, axis=0).astype(float))
 
 
 def join_dofs(parts: dict[str, Dofs]) -> Dofs:

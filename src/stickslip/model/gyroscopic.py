@@ -11,13 +11,7 @@ import scipy
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import DENSE, factorise
-from stickslip.model.modes import (
-    Factors,
-    connected_parts,
-    lowest_modes,
-    normal_modes,
-    usual_shift,
-)
+from stickslip.model.modes import Factors, connected_parts, lowest_modes, normal_modes, usual_shift
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
@@ -122,11 +116,7 @@ def _without_rounding(rates: ComplexArray) -> FloatArray:
 
 
 def _enriched(
-    structure: Structure,
-    coriolis: Matrix,
-    n_basis: int,
-    shift: float | None,
-    factors: Factors | None,
+    structure: Structure, coriolis: Matrix, n_basis: int, shift: float | None, factors: Factors | None
 ) -> tuple[FloatArray, Matrix]:
     """Return squares and shapes of the structure on its lowest modes and the static answers to their Coriolis forces."""
     K, M = structure.stiffness, structure.mass
@@ -145,6 +135,4 @@ def _enriched(
     basis = np.linalg.qr(np.hstack(columns))[0]
     squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
     # a rigid motion has no strain, but for rounding
-    return np.where(
-        squares < -RIGID * squares[-1], squares, np.maximum(squares, 0.0)
-    ), basis @ vectors
+    return np.where(squares < -RIGID * squares[-1], squares, np.maximum(squares, 0.0)), basis @ vectors

@@ -13,10 +13,7 @@ SYMMETRY = 1e-10  # relative
 
 
 def lumped(
-    mass: FloatArray,
-    stiffness: FloatArray,
-    damping: FloatArray | None = None,
-    names: Sequence[str] | None = None,
+    mass: FloatArray, stiffness: FloatArray, damping: FloatArray | None = None, names: Sequence[str] | None = None
 ) -> Structure:
     """Return a structure of n coordinates from its matrices.
 
@@ -53,19 +50,13 @@ def lumped(
             "Give every coordinate a mass.",
         )
     if names is not None and (len(names) != n or len(set(names)) != n):
-        raise input_error(
-            "lumped: names", f"need {n} different names, got {list(names)}", "Name each coordinate."
-        )
+        raise input_error("lumped: names", f"need {n} different names, got {list(names)}", "Name each coordinate.")
     sets: dict[str, IntArray] = {name: np.array([i]) for i, name in enumerate(names or ())}
     return Structure(M, C, K, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3))), sets)
 
 
 def lumped_sector(
-    mass: Sequence[float],
-    stiffness: FloatArray,
-    damping: FloatArray,
-    names: Sequence[str],
-    behind: Sequence[str],
+    mass: Sequence[float], stiffness: FloatArray, damping: FloatArray, names: Sequence[str], behind: Sequence[str]
 ) -> Structure:
     """Return one sector of a wheel of masses, with massless copies of masses of the next sector behind its own.
 
@@ -104,9 +95,7 @@ def chain(n: int, mass: float, stiffness: float, damping_factor: float = 0.0) ->
         β of ``C = β K`` in s.
     """
     if n < 1 or not stiffness > 0:
-        raise input_error(
-            "chain", f"needs masses and a positive stiffness, got {n} and {stiffness}", "Check."
-        )
+        raise input_error("chain", f"needs masses and a positive stiffness, got {n} and {stiffness}", "Check.")
     K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     K[-1, -1] = 1.0
     K *= stiffness

@@ -11,28 +11,16 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
 from stickslip.model.dense_modes import dense_modes
 from stickslip.model.dofs import Dofs
-from stickslip.model.fe.factorisation import (
-    DENSE,
-    Factorisation,
-    Say,
-    Solve,
-    factorise,
-    negative_eigenvalues,
-    silent,
-)
+from stickslip.model.fe.factorisation import DENSE, Factorisation, Say, Solve, factorise, negative_eigenvalues, silent
 from stickslip.model.fe.lanczos import lanczos
 from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
-RIGID = (
-    1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
-)
+RIGID = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
 FAR = 1e4  # so many times the mean K_ii / M_ii below zero there are no squares
 ABSURD = 1e100  # entries of matrices above, or below its inverse, are no numbers of a model
-INDEFINITE = (
-    1e-9  # of the largest eigenvalue of a mass matrix: negative ones beyond are no rounding
-)
+INDEFINITE = 1e-9  # of the largest eigenvalue of a mass matrix: negative ones beyond are no rounding
 SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
 
@@ -66,12 +54,7 @@ class Modes:
 
 
 def normal_modes(
-    structure: Structure,
-    n: int,
-    *,
-    shift: float | None = None,
-    say: Say = silent,
-    factors: Factors | None = None,
+    structure: Structure, n: int, *, shift: float | None = None, say: Say = silent, factors: Factors | None = None
 ) -> Modes:
     """Return the `n` lowest undamped modes.
 
@@ -230,12 +213,7 @@ def submatrix(matrix: Matrix, rows: IntArray, columns: IntArray) -> Matrix:
 
 
 def lowest_modes(
-    stiffness: Matrix,
-    mass: Matrix,
-    n: int,
-    solve: Solve | None,
-    shift: float = 0.0,
-    dofs: Dofs | None = None,
+    stiffness: Matrix, mass: Matrix, n: int, solve: Solve | None, shift: float = 0.0, dofs: Dofs | None = None
 ) -> tuple[FloatArray, Matrix]:
     """Return the `n` lowest squares of circular frequencies and mass-normalised modes.
 
@@ -317,9 +295,7 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
 def _check_count(place: str, structure: Structure, n: int) -> None:
     if not 0 < n <= structure.n:
         raise input_error(
-            place,
-            f"{n} asked of a structure with {structure.n} dofs",
-            "Ask for at least one and at most as many.",
+            place, f"{n} asked of a structure with {structure.n} dofs", "Ask for at least one and at most as many."
         )
     heavy = int(np.count_nonzero(structure.mass.diagonal()))
     if n > heavy:

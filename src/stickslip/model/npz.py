@@ -71,16 +71,11 @@ def read_npz(path: Path) -> Arrays:
     try:
         check_file(path)
         with zipfile.ZipFile(path) as archive:
-            return {
-                _array_name(entry, path): _read_array(archive, entry, path)
-                for entry in archive.infolist()
-            }
+            return {_array_name(entry, path): _read_array(archive, entry, path) for entry in archive.infolist()}
     except FileNotFoundError as error:
         raise input_error(str(path), "there is no such file", "Check the path.") from error
     except (IsADirectoryError, PermissionError) as error:
-        raise input_error(
-            str(path), f"cannot be read ({error.strerror})", "Check the path."
-        ) from error
+        raise input_error(str(path), f"cannot be read ({error.strerror})", "Check the path.") from error
     except zipfile.BadZipFile as error:
         raise input_error(str(path), f"is no .npz file ({error})", BROKEN) from error
     except InputError:
@@ -126,9 +121,7 @@ def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) ->
     if entry.file_size > DEFLATE_RATIO * max(entry.compress_size, 1):
         raise input_error(place, f"claims {entry.file_size} bytes, more than it can hold", BROKEN)
     if entry.header_offset + entry.compress_size > path.stat().st_size:
-        raise input_error(
-            place, f"claims {entry.compress_size} bytes beyond the file's end", BROKEN
-        )
+        raise input_error(place, f"claims {entry.compress_size} bytes beyond the file's end", BROKEN)
     with archive.open(entry) as stream:
         shape, dtype = _read_header(stream)
         if dtype.kind not in READABLE_KINDS or not dtype.itemsize:
@@ -142,9 +135,7 @@ def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) ->
             count *= length  # Python integers do not overflow
         if stream.tell() + count * dtype.itemsize != entry.file_size:
             raise input_error(
-                place,
-                f"its header asks for {count * dtype.itemsize} bytes of a member of {entry.file_size}",
-                BROKEN,
+                place, f"its header asks for {count * dtype.itemsize} bytes of a member of {entry.file_size}", BROKEN
             )
     with archive.open(entry) as stream:
         array: npt.NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)

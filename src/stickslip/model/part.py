@@ -126,9 +126,7 @@ class Place:
     def keeps(self, axis: Axis) -> bool:
         """Whether it is a turn about an axis, with a move along it: then the axis is to the copy what it was to the original."""
         origin = np.asarray(axis.origin, dtype=float)
-        near = np.linalg.norm(axis.arm(self.put(origin[None]))) <= 1e-12 * (
-            1 + np.linalg.norm(origin)
-        )
+        near = np.linalg.norm(axis.arm(self.put(origin[None]))) <= 1e-12 * (1 + np.linalg.norm(origin))
         return bool(near and not self.mirrors and np.allclose(self.turn @ axis.unit, axis.unit))
 
 
@@ -242,9 +240,7 @@ def structure_part(structure: Structure, **others: Any) -> Part:
     return Part(structure=structure, **others)
 
 
-def rigid_part(
-    body: RigidBody, surfaces: Mapping[str, BodyPoints] | None = None, **others: Any
-) -> Part:
+def rigid_part(body: RigidBody, surfaces: Mapping[str, BodyPoints] | None = None, **others: Any) -> Part:
     """Return a rigid part, with its contact surfaces by name."""
     return Part(structure=body.structure(), body=body, surfaces=dict(surfaces or {}), **others)
 

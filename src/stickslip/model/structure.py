@@ -97,9 +97,7 @@ class Structure:
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
         if name not in self.sets:
-            raise input_error(
-                "Structure", f"there is no set {name!r}", nearest_and_known(name, list(self.sets))
-            )
+            raise input_error("Structure", f"there is no set {name!r}", nearest_and_known(name, list(self.sets)))
         return self.sets[name]
 
     def expand(self, vector: Matrix) -> Matrix:
@@ -135,10 +133,7 @@ def join(**parts: Structure) -> Structure:
     def stack(which: str) -> Matrix:
         blocks = [getattr(s, which) for s in parts.values()]
         # parts without loss beside parts with it
-        blocks = [
-            np.zeros((s.n, s.n)) if b is None else b
-            for s, b in zip(parts.values(), blocks, strict=True)
-        ]
+        blocks = [np.zeros((s.n, s.n)) if b is None else b for s, b in zip(parts.values(), blocks, strict=True)]
         if any(scipy.sparse.issparse(b) for b in blocks):
             return scipy.sparse.block_diag(blocks, format="csr")
         return scipy.linalg.block_diag(*blocks)

@@ -54,9 +54,7 @@ def save_structure(structure: Structure, path: Path | str) -> None:
     for i, (name, members) in enumerate(structure.sets.items()):
         index = np.asarray(members)
         if index.size and index.dtype.kind not in "iu":
-            raise input_error(
-                f"save_structure: set {name!r}", f"holds {index.dtype} values", "Give dof indices."
-            )
+            raise input_error(f"save_structure: set {name!r}", f"holds {index.dtype} values", "Give dof indices.")
         arrays[f"set.{i}"] = index.astype(np.int64)
     write_npz(Path(path), arrays)
 

@@ -69,11 +69,7 @@ class InfluenceCoefficients:
         }
         for name, array in own.items():
             object.__setattr__(self, name, array)
-        wanted = (
-            max(self.speeds.size, 1),
-            max(self.frequencies.size, 1),
-            self.distances.size,
-        )
+        wanted = (max(self.speeds.size, 1), max(self.frequencies.size, 1), self.distances.size)
         if values.ndim != 5 or values.shape[:3] != wanted or values.shape[3] != values.shape[4]:
             raise input_error(
                 "InfluenceCoefficients.values",
@@ -81,9 +77,7 @@ class InfluenceCoefficients:
                 "Give (speeds, frequencies, distances, m, m).",
             )
         if not np.all(np.isfinite(values)):
-            raise input_error(
-                "InfluenceCoefficients.values", "has NaN or infinite entries", "Check the table."
-            )
+            raise input_error("InfluenceCoefficients.values", "has NaN or infinite entries", "Check the table.")
         if np.unique(self.distances).size != self.distances.size:
             raise input_error(
                 "InfluenceCoefficients.distances",
@@ -93,9 +87,7 @@ class InfluenceCoefficients:
         for name in ("frequencies", "speeds"):
             axis = getattr(self, name)
             if axis.size and (axis[0] < 0 or np.any(np.diff(axis) <= 0)):
-                raise input_error(
-                    f"InfluenceCoefficients.{name}", "do not ascend from zero on", "Sort them."
-                )
+                raise input_error(f"InfluenceCoefficients.{name}", "do not ascend from zero on", "Sort them.")
 
     def __repr__(self) -> str:
         """Return what it is in a line, without its numbers."""
@@ -218,9 +210,7 @@ class InfluenceCoefficients:
     @property
     def _one_speed(self) -> ComplexArray:
         if self.speeds.size > 1:
-            raise input_error(
-                "InfluenceCoefficients", "are those of several speeds", "Take at_speed first."
-            )
+            raise input_error("InfluenceCoefficients", "are those of several speeds", "Take at_speed first.")
         return np.asarray(self.values[0])
 
     def _inside(self, omega: float) -> float:
@@ -305,9 +295,7 @@ def one_twice(numbers: Sequence[int] | IntArray, sectors: int) -> tuple[int, int
     return None
 
 
-def to_phase_angles(
-    distances: IntArray, values: ComplexArray, angles: Sequence[float] | FloatArray
-) -> ComplexArray:
+def to_phase_angles(distances: IntArray, values: ComplexArray, angles: Sequence[float] | FloatArray) -> ComplexArray:
     """Return G (a, ...) at inter-blade phase angles in rad (a,) from coefficients (d, ...) by neighbour."""
     phases = np.exp(1j * np.outer(np.asarray(angles), distances))
     return np.asarray(np.tensordot(phases, values, axes=1))
@@ -336,9 +324,7 @@ class Feedback:
 
     def __post_init__(self) -> None:
         if not 0 < self.reference < np.inf:
-            raise input_error(
-                "Feedback.reference", f"must be above zero, got {self.reference}", "Give rad/s."
-            )
+            raise input_error("Feedback.reference", f"must be above zero, got {self.reference}", "Give rad/s.")
         if self.patterns.shape[1] != self.influence.patterns:
             raise input_error(
                 "Feedback.patterns",

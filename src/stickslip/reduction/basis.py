@@ -40,9 +40,7 @@ def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
     return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
 
 
-def in_coordinates(
-    structure: Structure, basis: Matrix, dofs: Dofs, sets: Mapping[str, IntArray]
-) -> Structure:
+def in_coordinates(structure: Structure, basis: Matrix, dofs: Dofs, sets: Mapping[str, IntArray]) -> Structure:
     """Return a structure in other coordinates: all its matrices projected, the way back chained.
 
     Parameters

@@ -22,11 +22,7 @@ LAYOUT = 1  # raised when the same input no longer gives the same hash
 
 
 def cached(
-    reduction: Callable[..., Structure],
-    structure: Structure,
-    *arguments: object,
-    folder: Path | str,
-    say: Say = silent,
+    reduction: Callable[..., Structure], structure: Structure, *arguments: object, folder: Path | str, say: Say = silent
 ) -> Structure:
     """Return ``reduction(structure, *arguments)``, from disk where it was computed before.
 
@@ -88,9 +84,7 @@ def content_hash(*values: object) -> str:
     return digest.hexdigest()
 
 
-def _key(
-    reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]
-) -> str:
+def _key(reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]) -> str:
     # a method, a partial or a callable object has arguments of its own, which no hash would see
     plain = isinstance(reduction, types.FunctionType)
     name = reduction.__qualname__ if plain else repr(reduction)

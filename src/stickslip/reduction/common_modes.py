@@ -53,9 +53,7 @@ def on_modes_of_others(
     if len(others) > 1:
         common = _spanned(others, structure.mass)
         dofs = with_modal_dofs(structure.dofs.take(keep), common.shape[1])
-        return in_coordinates(
-            structure, np.hstack([static, common]), dofs, surviving_sets(structure, keep)
-        )
+        return in_coordinates(structure, np.hstack([static, common]), dofs, surviving_sets(structure, keep))
     (other,) = others
     sizes = [np.linalg.norm(_in_mass(m, structure.mass, m), 2) ** 0.5 for m in (modes, other)]
     left, common, right = np.linalg.svd(_in_mass(modes, structure.mass, other))

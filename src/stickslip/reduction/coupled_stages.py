@@ -79,10 +79,7 @@ class Multistage:
         """
         self._require(nodal_diameter)
         found = {
-            self._wave(name, nodal_diameter)
-            for f in self.flanges
-            if nodal_diameter in f.harmonics
-            for name in f.stages
+            self._wave(name, nodal_diameter) for f in self.flanges if nodal_diameter in f.harmonics for name in f.stages
         }
         grown = True
         while grown:
@@ -198,9 +195,7 @@ def multistage(stages: Mapping[str, CyclicSector], flanges: Sequence[Flange]) ->
         both = []
         for name, dofs in zip(flange.stages, flange.dofs, strict=True):
             if name not in stages:
-                raise input_error(
-                    "multistage", f"there is no stage {name!r}", f"There are {', '.join(stages)}."
-                )
+                raise input_error("multistage", f"there is no stage {name!r}", f"There are {', '.join(stages)}.")
             both.append(circles(stages[name], dofs, name))
         first, second = same_circles(both[0], both[1], flange.stages)
         for side, name in zip((first, second), flange.stages, strict=True):
@@ -209,9 +204,7 @@ def multistage(stages: Mapping[str, CyclicSector], flanges: Sequence[Flange]) ->
     return Multistage(dict(stages), tuple(flanges), tuple(places))
 
 
-def multistage_modes(
-    assembly: Multistage, nodal_diameter: int, n: int, *, say: Say = silent
-) -> MultistageModes:
+def multistage_modes(assembly: Multistage, nodal_diameter: int, n: int, *, say: Say = silent) -> MultistageModes:
     """Return the `n` lowest undamped modes of an assembly in one of its nodal diameters, at rest.
 
     Parameters
@@ -233,10 +226,7 @@ def multistage_modes(
     waves = assembly.waves(nodal_diameter)
     moving = [travelling_wave(assembly.stages[name], k) for name, k in waves]
     counts = np.array([assembly.stages[name].sectors for name, _ in waves])
-    mass, stiffness = (
-        _side_by_side(counts, [getattr(s, which) for s in moving])
-        for which in ("mass", "stiffness")
-    )
+    mass, stiffness = (_side_by_side(counts, [getattr(s, which) for s in moving]) for which in ("mass", "stiffness"))
     problem = _Problem(stiffness, mass, min(usual_shift(s) for s in moving))
     squares, vectors = problem.modes(constraints(assembly, waves), n, say)
     order = np.argsort(squares)
@@ -248,25 +238,14 @@ def multistage_modes(
     ends = np.cumsum([s.n for s in moving])[:-1]
     pieces = np.split(vectors, ends)
     energy = np.array(
-        [
-            c * np.sum((x.conj() * (s.mass @ x)).real, axis=0)
-            for c, s, x in zip(counts, moving, pieces, strict=True)
-        ]
+        [c * np.sum((x.conj() * (s.mass @ x)).real, axis=0) for c, s, x in zip(counts, moving, pieces, strict=True)]
     )
-    shares = np.array(
-        [energy[[name == own for own, _ in waves]].sum(axis=0) for name in assembly.stages]
-    )
+    shares = np.array([energy[[name == own for own, _ in waves]].sum(axis=0) for name in assembly.stages])
     expanded = {
-        own: np.asarray(assembly.stages[own[0]].wave_tie(own[1]) @ x)
-        for own, x in zip(waves, pieces, strict=True)
+        own: np.asarray(assembly.stages[own[0]].wave_tie(own[1]) @ x) for own, x in zip(waves, pieces, strict=True)
     }
     return MultistageModes(
-        assembly,
-        nodal_diameter,
-        squares,
-        np.maximum(stiffest, squares),
-        expanded,
-        shares / shares.sum(axis=0),
+        assembly, nodal_diameter, squares, np.maximum(stiffest, squares), expanded, shares / shares.sum(axis=0)
     )
 
 

@@ -163,9 +163,7 @@ class CyclicSector:
         if self.axis is None or not sectors % self.sectors:
             return scipy.sparse.eye_array(index.size, format="csr")
         angle = sectors % self.sectors * self.pitch
-        return dof_rotation(
-            self.structure.dofs.take(index), self.axis.rotation(angle), "CyclicSector"
-        )
+        return dof_rotation(self.structure.dofs.take(index), self.axis.rotation(angle), "CyclicSector")
 
     def _whirl(self, phase: complex) -> Matrix:
         """Return the motions of shared nodes that the turn to the next sector changes by the phase alone."""
@@ -274,7 +272,7 @@ def _projected(matrix: Matrix, tie: Matrix, free: IntArray, *, evened: bool = Tr
     other = np.setdiff1d(np.arange(tie.shape[0]), free)
     way, size = tie[other], (tie.shape[1],) * 2
     of_free, of_other = sparse[free], sparse[other]
-    own, right, corner = of_free[:, free], of_free[:, other] @ way, way.conj().T @ of_other[:, other] @ way  # fmt: skip
+    own, right, corner = of_free[:, free], of_free[:, other] @ way, way.conj().T @ of_other[:, other] @ way
     left = right.conj().T if even is not None else way.conj().T @ of_other[:, free]
     if even is not None:
         corner = (corner + corner.conj().T) / 2

@@ -88,9 +88,7 @@ def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -
         )
 
 
-def pair_faces(
-    low: Face, high: Face, sectors: int, axis: Axis, tolerance: float | None
-) -> tuple[IntArray, IntArray]:
+def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float | None) -> tuple[IntArray, IntArray]:
     """Return the dofs of `low` and, in the same order, their partners on `high`.
 
     Parameters
@@ -131,10 +129,7 @@ def pair_faces(
         raise _other_components(low, high, differ[0], partner[differ[0]])
     present = low.table >= 0
     shared = hub[hub >= 0]
-    return (
-        np.concatenate([low.table[present], shared]),
-        np.concatenate([there[present], shared]),
-    )
+    return (np.concatenate([low.table[present], shared]), np.concatenate([there[present], shared]))
 
 
 def _split(low: Face, high: Face, axis: Axis, reach: float) -> tuple[IntArray, Face, Face]:
@@ -149,9 +144,7 @@ def _split(low: Face, high: Face, axis: Axis, reach: float) -> tuple[IntArray, F
     return hub, sides[0], sides[1]
 
 
-def _match(
-    low: Face, high: Face, angle: float, axis: Axis, reach: float
-) -> tuple[IntArray, BoolArray]:
+def _match(low: Face, high: Face, angle: float, axis: Axis, reach: float) -> tuple[IntArray, BoolArray]:
     """Return the node of `high` nearest to each turned node of `low`, and whether it is near enough."""
     distance, partner = _nearest(axis.turned(low.position, angle), high.position)
     return partner, np.asarray(distance <= reach)
@@ -233,10 +226,7 @@ def _angle_between(low: Face, high: Face, axis: Axis) -> float:
     """Return the angle about the axis, in rad, from the mean place of one face to that of the other."""
     if not (len(low.node) and len(high.node)):
         return 0.0
-    a, b = (
-        axis.arm(low.position.mean(axis=0)[None])[0],
-        axis.arm(high.position.mean(axis=0)[None])[0],
-    )
+    a, b = (axis.arm(low.position.mean(axis=0)[None])[0], axis.arm(high.position.mean(axis=0)[None])[0])
     return math.atan2(float(axis.unit @ np.cross(a, b)), float(a @ b))
 
 

@@ -14,14 +14,7 @@ from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_basis, kept_dofs, surviving_sets, with_modal_dofs
-from stickslip.reduction.bodies import (
-    Body,
-    BodyModes,
-    bodies_fixed_at,
-    fill_constraint_modes,
-    lowest_of,
-    modes_up_to,
-)
+from stickslip.reduction.bodies import Body, BodyModes, bodies_fixed_at, fill_constraint_modes, lowest_of, modes_up_to
 from stickslip.reduction.truncation import (
     FrequencyError,
     FrequencyErrors,
@@ -32,14 +25,10 @@ from stickslip.reduction.truncation import (
     frequencies_below,
 )
 
-AHEAD = (
-    1.5  # modes computed over modes needed, while their number grows: two or three steps use them
-)
+AHEAD = 1.5  # modes computed over modes needed, while their number grows: two or three steps use them
 
 
-def craig_bampton(
-    structure: Structure, keep: IntArray, n_modes: ModeChoice, *, say: Say = silent
-) -> Structure:
+def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, say: Say = silent) -> Structure:
     """Reduce to the kept dofs and the lowest modes with those dofs fixed.
 
     Parameters

@@ -57,9 +57,7 @@ class Circles:
     def reordered(self, order: IntArray) -> "Circles":
         """Return the same with circle ``order[i]`` as the i-th."""
         new = np.argsort(order)
-        return Circles(
-            self.sector, self.place[order], new[self.owner], self.dofs, self.angle, self.weight, self.frame
-        )  # fmt: skip
+        return Circles(self.sector, self.place[order], new[self.owner], self.dofs, self.angle, self.weight, self.frame)
 
 
 def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
@@ -86,22 +84,15 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
         raise input_error(where, "has a node of the flange on the axis", "Take it out of the set.")
     height = points @ sector.axis.unit
     step = TOLERANCE * max(size, float(radius.max()))
-    place, owner = np.unique(
-        np.round(np.column_stack([radius, height]) / step), axis=0, return_inverse=True
-    )
+    place, owner = np.unique(np.round(np.column_stack([radius, height]) / step), axis=0, return_inverse=True)
     owner = owner.reshape(-1)
     radial = arm / radius[:, None]
-    frame = np.stack(
-        [radial, np.cross(sector.axis.unit, radial), np.tile(sector.axis.unit, (len(points), 1))],
-        axis=1,
-    )
+    frame = np.stack([radial, np.cross(sector.axis.unit, radial), np.tile(sector.axis.unit, (len(points), 1))], axis=1)
     first, second = _across(sector.axis)
     angle = np.arctan2(arm @ second, arm @ first)
     own = np.where(table >= 0, members[table], -1)
     weight = np.concatenate([np.zeros(0), _weights(angle, owner, sector.pitch)])
-    mean = np.array(
-        [[radius[owner == c].mean(), height[owner == c].mean()] for c in range(len(place))]
-    )
+    mean = np.array([[radius[owner == c].mean(), height[owner == c].mean()] for c in range(len(place))])
     return Circles(sector, mean, owner, own, angle, weight, frame)
 
 
@@ -119,9 +110,7 @@ def same_circles(one: Circles, other: Circles, names: tuple[str, str]) -> tuple[
     reach = TOLERANCE * float(max(one.place[:, 0].max(), other.place[:, 0].max())) * 3
     if not np.allclose(a.unit, b.unit) or np.linalg.norm(a.arm(np.array([b.origin]))) > reach:
         raise input_error(
-            "multistage",
-            f"{names[0]!r} and {names[1]!r} turn about different axes",
-            "Give them one axis.",
+            "multistage", f"{names[0]!r} and {names[1]!r} turn about different axes", "Give them one axis."
         )
     off = np.linalg.norm(one.place[:, None] - other.place[None], axis=2)
     lost = np.flatnonzero(off.min(axis=1) > reach)

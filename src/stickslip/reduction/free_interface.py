@@ -16,13 +16,7 @@ from stickslip.errors import SingularError, input_error
 from stickslip.model.fe.factorisation import Say, Solve, factorise, silent
 from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import (
-    BLOCK,
-    in_coordinates,
-    kept_dofs,
-    surviving_sets,
-    with_modal_dofs,
-)
+from stickslip.reduction.basis import BLOCK, in_coordinates, kept_dofs, surviving_sets, with_modal_dofs
 from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 
@@ -30,9 +24,7 @@ DEPENDENT = 1e-8  # smallest eigenvalue of the scaled residual flexibility of th
 NAMED = 4  # dofs that a message names
 
 
-def rubin(
-    structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, say: Say = silent
-) -> Structure:
+def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, say: Say = silent) -> Structure:
     """Reduce to the kept dofs and the lowest modes with those dofs free.
 
     Parameters
@@ -68,9 +60,7 @@ def rubin(
     """
     keep = kept_dofs("rubin", structure, keep)
     most = structure.n - keep.size
-    if isinstance(n_modes, FrequencyError) or (
-        not isinstance(n_modes, ModesBelow) and not 0 <= n_modes <= most
-    ):
+    if isinstance(n_modes, FrequencyError) or (not isinstance(n_modes, ModesBelow) and not 0 <= n_modes <= most):
         raise input_error(
             "rubin: n_modes",
             f"got {n_modes}, and {most} dofs are not kept",
@@ -149,11 +139,7 @@ def _answer(body: Body, solve: Solve, shapes: Matrix, load: Matrix) -> Matrix:
 
 
 def _basis(
-    structure: Structure,
-    keep: IntArray,
-    bodies: Sequence[Body],
-    modes: BodyModes,
-    flexibility: Matrix,
+    structure: Structure, keep: IntArray, bodies: Sequence[Body], modes: BodyModes, flexibility: Matrix
 ) -> Matrix:
     """Return ``[I 0; Δ Φ_del − Δ Φ_ret]`` (eq. 58)."""
     k, m = keep.size, modes.squares.size

@@ -21,9 +21,7 @@ from stickslip.reduction.truncation import ModeChoice
 PLACE = "reduce_interface"
 
 
-def reduce_interface(
-    structure: Structure, interface: IntArray, n_modes: ModeChoice, *, say: Say = silent
-) -> Structure:
+def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeChoice, *, say: Say = silent) -> Structure:
     """Replace interface dofs of a reduced structure by its characteristic constraint modes.
 
     Parameters
@@ -69,9 +67,7 @@ def reduce_interface(
         )
     if isinstance(n_modes, int | np.integer) and not 0 <= n_modes <= interface.size:
         raise input_error(
-            f"{PLACE}: n_modes",
-            f"got {n_modes} for {interface.size} interface dofs",
-            "Ask for at most that many.",
+            f"{PLACE}: n_modes", f"got {n_modes} for {interface.size} interface dofs", "Ask for at most that many."
         )
     others = np.setdiff1d(np.arange(structure.n), interface)
     bodies = _bodies(structure, interface, others, say)

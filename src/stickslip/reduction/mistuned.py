@@ -82,9 +82,7 @@ class MistunedWheel:
         return sector, share
 
 
-def mistuned_wheel(
-    waves: list[Structure], shares: list[Matrix], factors: FloatArray, dofs: Dofs
-) -> MistunedWheel:
+def mistuned_wheel(waves: list[Structure], shares: list[Matrix], factors: FloatArray, dofs: Dofs) -> MistunedWheel:
     """Put all sectors together.
 
     Parameters

@@ -61,9 +61,7 @@ class NodalCoordinates:
         """
         old, count = structure.n, self.copied.size
         turn = np.array([phase**-s for s in self.ahead])
-        tie = scipy.sparse.csr_array(
-            (turn, (np.arange(old), np.arange(old))), shape=(old, old + 2 * count)
-        )
+        tie = scipy.sparse.csr_array((turn, (np.arange(old), np.arange(old))), shape=(old, old + 2 * count))
         dense = not scipy.sparse.issparse(structure.stiffness)
         dofs = self._dofs(structure.dofs)
         turned = in_coordinates(structure, tie.toarray() if dense else tie, dofs, structure.sets)
@@ -71,9 +69,7 @@ class NodalCoordinates:
             return turned
         held = self._constraints(structure.stiffness.diagonal(), phase)
         stiffness = turned.stiffness + (held.toarray() if dense else held)
-        return Structure(
-            turned.mass, turned.damping, stiffness, dofs, turned.sets, turned.basis, turned.loss
-        )
+        return Structure(turned.mass, turned.damping, stiffness, dofs, turned.sets, turned.basis, turned.loss)
 
     def _constraints(self, diagonal: Matrix, phase: complex | float) -> Matrix:
         """Return the stiffness of ``copy = phase^s coordinate`` and of its force, in the scale of the coordinate's own stiffness."""
@@ -98,9 +94,8 @@ class NodalCoordinates:
         held = tuple(f"tie_{c}" for c in copies.component)
         joined = join_dofs({"": dofs, "copies": copies, "held": copies})
         return Dofs(
-            joined.node, dofs.component + copies.component + held, joined.position,
-            (*dofs.part, *parts, *parts),
-        )  # fmt: skip
+            joined.node, dofs.component + copies.component + held, joined.position, (*dofs.part, *parts, *parts)
+        )
 
 
 def nodal_coordinates(
@@ -170,9 +165,7 @@ def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
     """
     n, ties = structure.n, multipliers.size
     if not np.array_equal(multipliers, np.arange(n - ties, n)):
-        raise input_error(
-            "TunedWheel", "has forces of constraints among its motions", "Put them behind these."
-        )
+        raise input_error("TunedWheel", "has forces of constraints among its motions", "Put them behind these.")
     own = n - 2 * ties
     held = structure.stiffness[n - ties :]
     dense = held.toarray() if scipy.sparse.issparse(held) else np.asarray(held)

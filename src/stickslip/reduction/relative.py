@@ -59,9 +59,7 @@ def in_relative_coordinates(
     touched = np.any(B != 0.0, axis=0)
     free = np.flatnonzero(~touched)
     inverse, null = _local_inverses(B, used, np.flatnonzero(touched), contacts)
-    eye = scipy.sparse.csr_array(
-        (np.ones(free.size), (free, np.arange(free.size))), shape=(structure.n, free.size)
-    )
+    eye = scipy.sparse.csr_array((np.ones(free.size), (free, np.arange(free.size))), shape=(structure.n, free.size))
     L = scipy.sparse.hstack([inverse, null, eye], format="csr")
     gaps, rest = np.arange(used.size), np.arange(used.size, used.size + null.shape[1])
     operator = np.zeros_like(B)
@@ -82,9 +80,7 @@ def _dense(matrix: Matrix) -> Matrix:
     return full if np.iscomplexobj(full) else full.astype(float)
 
 
-def _local_inverses(
-    B: Matrix, used: IntArray, touched: IntArray, contacts: tuple[str, ...]
-) -> tuple[Matrix, Matrix]:
+def _local_inverses(B: Matrix, used: IntArray, touched: IntArray, contacts: tuple[str, ...]) -> tuple[Matrix, Matrix]:
     """Return B⁺ and the null space of B on all dofs, from the blocks of contacts that share dofs."""
     pattern = scipy.sparse.csr_array(B[np.ix_(used, touched)] != 0.0)
     graph = scipy.sparse.block_array([[None, pattern], [pattern.T, None]], format="csr")
@@ -130,9 +126,7 @@ def _refuse(u: Matrix, s: FloatArray, rows: IntArray, contacts: tuple[str, ...])
     )
 
 
-def _dofs(
-    dofs: Dofs, used: IntArray, contacts: tuple[str, ...], n_rest: int, free: IntArray
-) -> Dofs:
+def _dofs(dofs: Dofs, used: IntArray, contacts: tuple[str, ...], n_rest: int, free: IntArray) -> Dofs:
     kept = dofs.take(free)
     new = used.size + n_rest
     return Dofs(

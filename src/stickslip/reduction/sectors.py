@@ -11,9 +11,7 @@ import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 
-ROUNDING = (
-    1e-12  # imaginary part over the largest entry: below, what waves make of real sectors is real
-)
+ROUNDING = 1e-12  # imaginary part over the largest entry: below, what waves make of real sectors is real
 
 
 def couplings(waves: Sequence[Matrix]) -> Matrix:
@@ -94,8 +92,6 @@ def of_alike(blocks: Matrix, gram: Matrix, factors: FloatArray) -> FloatArray:
     whole = (first.T @ product).reshape(count, m, count, m)  # of sector 0
     out = np.zeros_like(whole)
     for n in np.flatnonzero(factors):
-        place = (
-            np.arange(count) - n
-        ) % count  # what sector 0 sees of sector p - n, sector n sees of p
+        place = (np.arange(count) - n) % count  # what sector 0 sees of sector p - n, sector n sees of p
         out += factors[n] * whole[place][:, :, place]
     return np.asarray(out.reshape(count * m, count * m))

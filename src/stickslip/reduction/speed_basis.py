@@ -46,9 +46,7 @@ class SpeedBasis:
         """Return the structure at a speed in rad/s, its mass the unit matrix."""
         x, at = speed**2, self.speeds**2
         # Lagrange's interpolation in the square of the speed, which has degree two
-        weights = [
-            np.prod([(x - at[j]) / (at[i] - at[j]) for j in range(3) if j != i]) for i in range(3)
-        ]
+        weights = [np.prod([(x - at[j]) / (at[i] - at[j]) for j in range(3) if j != i]) for i in range(3)]
         stiffness = np.einsum("i,ijk->jk", np.array(weights), self.stiffness)
         r = len(stiffness)
         damping = speed / self.speeds[-1] * self.damping
@@ -56,11 +54,7 @@ class SpeedBasis:
 
 
 def speed_basis(
-    structure_at: Callable[[float], Structure],
-    speed_range: tuple[float, float],
-    n_modes: int,
-    *,
-    coriolis: bool,
+    structure_at: Callable[[float], Structure], speed_range: tuple[float, float], n_modes: int, *, coriolis: bool
 ) -> SpeedBasis:
     """Return the small model of a family of structures.
 

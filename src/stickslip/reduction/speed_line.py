@@ -151,16 +151,12 @@ class SpeedLine:
             return self.sides[int(np.flatnonzero(weights == 1.0)[0])]
         top = self.top
         if isinstance(top, Structure):
-            return self._mixed(
-                0, [s for s in self.sides if isinstance(s, Structure)], weights, ratio
-            )
+            return self._mixed(0, [s for s in self.sides if isinstance(s, Structure)], weights, ratio)
         wheels = [side for side in self.sides if isinstance(side, TunedWheel)]
         waves = {k: self._mixed(k, [w.waves[k] for w in wheels], weights, ratio) for k in top.waves}
         return replace(top, waves=waves)
 
-    def _mixed(
-        self, k: int, structures: list[Structure], weights: FloatArray, ratio: FloatArray
-    ) -> Structure:
+    def _mixed(self, k: int, structures: list[Structure], weights: FloatArray, ratio: FloatArray) -> Structure:
         """Return the weighted sum of matrices; the skew part of the damping is proportional to the speed, whose `ratio` to each is given."""
         if k not in self.stacks:
             self.stacks[k] = _stacked(structures)

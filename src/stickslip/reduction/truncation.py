@@ -141,9 +141,7 @@ def frequency_errors(
     _positive("frequency_errors", up_to_hz=up_to_hz)
     basis = _basis_between(structure, reduced)
     bodies = loose_bodies(structure, np.arange(structure.n), say)
-    return errors_of(
-        structure, reduced, basis, bodies, up_to_hz, frequencies_below(structure, up_to_hz, say)
-    )
+    return errors_of(structure, reduced, basis, bodies, up_to_hz, frequencies_below(structure, up_to_hz, say))
 
 
 def frequencies_below(structure: Structure, limit_hz: float, say: Say) -> int | None:
@@ -153,12 +151,7 @@ def frequencies_below(structure: Structure, limit_hz: float, say: Say) -> int | 
 
 
 def errors_of(
-    structure: Structure,
-    reduced: Structure,
-    basis: Matrix,
-    bodies: list[Body],
-    up_to_hz: float,
-    count: int | None,
+    structure: Structure, reduced: Structure, basis: Matrix, bodies: list[Body], up_to_hz: float, count: int | None
 ) -> FrequencyErrors:
     """Return the estimated errors, given the basis and what solves with the stiffness.
 
@@ -203,11 +196,7 @@ def errors_of(
 
 
 def enough_modes(
-    choice: FrequencyError,
-    start: int,
-    available: int,
-    errors: Callable[[int], FrequencyErrors],
-    say: Say,
+    choice: FrequencyError, start: int, available: int, errors: Callable[[int], FrequencyErrors], say: Say
 ) -> int:
     """Return the number of modes at which the estimated errors suffice.
 

@@ -202,9 +202,7 @@ def tuned_wheel(  # noqa: PLR0913
     moving = _moving(sector, wanted, place, n_modes, reduce)
 
     def gap_coordinates(k: int) -> tuple[Structure, Matrix]:
-        return in_relative_coordinates(
-            moving[k], _gaps_of(sector, k, gaps) @ moving[k].basis, names
-        )
+        return in_relative_coordinates(moving[k], _gaps_of(sector, k, gaps) @ moving[k].basis, names)
 
     first = moving[wanted[0]]
     if relative is not False:
@@ -226,11 +224,7 @@ def tuned_wheel(  # noqa: PLR0913
 
 
 def _moving(
-    sector: CyclicSector,
-    wanted: Sequence[int],
-    place: IntArray | None,
-    n_modes: int,
-    reduce: Reduce,
+    sector: CyclicSector, wanted: Sequence[int], place: IntArray | None, n_modes: int, reduce: Reduce
 ) -> dict[int, Structure]:
     """Return the travelling waves, reduced where dofs are kept; those that are conjugates of others are left out."""
     if place is None:
@@ -290,9 +284,7 @@ def _written(
     return waves, common
 
 
-def _refuse_lost_contacts(
-    sector: CyclicSector, place: IntArray, own: Matrix, following: Matrix | None
-) -> None:
+def _refuse_lost_contacts(sector: CyclicSector, place: IntArray, own: Matrix, following: Matrix | None) -> None:
     """Refuse contacts on dofs that the reduction does not keep: few modes know little of forces there."""
     operators = [own] if following is None else [own, following]
     used = np.unique(np.concatenate([operator.nonzero()[1] for operator in operators]))

@@ -50,9 +50,7 @@ def node_table(dofs: Dofs) -> IntArray:
     if np.count_nonzero(table >= 0) != vector.size:
         twice = np.setdiff1d(vector, table)[0]
         raise input_error(
-            "Dofs",
-            f"{dofs.labels[twice]} appears twice",
-            "Number the nodes differently, or give the parts names.",
+            "Dofs", f"{dofs.labels[twice]} appears twice", "Number the nodes differently, or give the parts names."
         )
     return table
 

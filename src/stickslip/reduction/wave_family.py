@@ -86,18 +86,13 @@ class SharedInterior:
             wide[:n] = right
             eliminated = self.factors.forward(wide)
             mine, theirs = eliminated[n - m : n], eliminated[n:]
-            own = scipy.linalg.cho_solve(
-                (lower, True), mine + np.conj(phase) * theirs, check_finite=False
-            )
+            own = scipy.linalg.cho_solve((lower, True), mine + np.conj(phase) * theirs, check_finite=False)
             eliminated[n - m : n], eliminated[n:] = own, phase * own
             return self.factors.backward(eliminated)[:n]
 
         def solve(right: Matrix) -> Matrix:
             columns = np.asarray(right).reshape(n, -1)
-            blocks = [
-                some(columns[:, first : first + COLUMNS])
-                for first in range(0, columns.shape[1], COLUMNS)
-            ]
+            blocks = [some(columns[:, first : first + COLUMNS]) for first in range(0, columns.shape[1], COLUMNS)]
             return np.hstack(blocks).reshape(np.shape(right))
 
         return solve
@@ -197,9 +192,7 @@ class WaveFamily:
     numbers: tuple[int, ...]
     say: Say = silent
 
-    def shifted(
-        self, wave_number: int, structure: Structure
-    ) -> tuple[float | None, Factors | None]:
+    def shifted(self, wave_number: int, structure: Structure) -> tuple[float | None, Factors | None]:
         """Return the shift of all waves and what factorises ``K − shift M`` of one; None where a wave is better factorised by itself."""
         if structure.n <= LARGE or len(self.numbers) < 2 or self._shared is None:
             return None, None
@@ -217,11 +210,7 @@ class WaveFamily:
         if 2 * number >= self.sectors:
             return None
         pair = self.at(0), self.at(number)
-        real = all(
-            scipy.sparse.issparse(m) and is_hermitian(m)
-            for s in pair
-            for m in (s.stiffness, s.mass)
-        )
+        real = all(scipy.sparse.issparse(m) and is_hermitian(m) for s in pair for m in (s.stiffness, s.mass))
         if not real or len(connected_parts(pair[0].stiffness, pair[0].mass)) > 1:
             return None
         shift = usual_shift(pair[0])

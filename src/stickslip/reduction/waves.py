@@ -124,8 +124,4 @@ def to_sectors(waves: Matrix) -> ComplexArray:
 def check_sectors(place: str, sectors: int) -> None:
     """Refuse a number of sectors that is none."""
     if sectors != int(sectors) or sectors < 1:
-        raise input_error(
-            f"{place}: sectors",
-            f"must be a whole number from 1, got {sectors}",
-            "Count the blades.",
-        )
+        raise input_error(f"{place}: sectors", f"must be a whole number from 1, got {sectors}", "Count the blades.")

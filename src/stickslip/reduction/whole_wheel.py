@@ -162,15 +162,11 @@ def reduced_wheel(
     keep = dof_indices("reduced_wheel", sector.structure, keep)
     place = kept_places("reduced_wheel", sector, keep)
     half = sector.sectors // 2 + 1
-    waves = tuple(
-        reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in range(half)
-    )
+    waves = tuple(reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in range(half))
     both_ways = all(goes_both_ways(sector, w) for w in waves)
     if not both_ways:
         rest = range(half, sector.sectors)
-        waves += tuple(
-            reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in rest
-        )
+        waves += tuple(reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in rest)
     refuse_unequal("reduced_wheel", dict(enumerate(waves)))
     if feedback is not None:
         waves = tuple(feedback(k, own).frozen(own) for k, own in enumerate(waves))
@@ -208,9 +204,7 @@ def refuse_reduced(who: str, sector: CyclicSector) -> None:
     """Refuse a sector that is a reduced model: it would be reduced twice, and its fields would be lost."""
     if sector.structure.basis is not None:
         raise input_error(
-            f"{who}: sector",
-            "is a reduced model already",
-            "Give the sector of the full model: it is reduced here.",
+            f"{who}: sector", "is a reduced model already", "Give the sector of the full model: it is reduced here."
         )
 
 
@@ -244,13 +238,13 @@ def reduced_wave(
         raise input_error(f"{who}: reduce", f"returned {type(reduced).__name__}", wanted)
     shape = None if reduced.basis is None else reduced.basis.shape
     if shape != (sector.structure.n, reduced.n):
-        problem = f"returned a structure of {reduced.n} dofs with a basis of shape {shape} for {sector.structure.n} dofs"
+        problem = (
+            f"returned a structure of {reduced.n} dofs with a basis of shape {shape} for {sector.structure.n} dofs"
+        )
         raise input_error(f"{who}: reduce", problem, wanted)
     rows = reduced.expand(np.eye(reduced.n))[sector.independent[place]]
     if not np.allclose(rows, np.eye(place.size, reduced.n), rtol=0, atol=1e-9):
-        problem = (
-            "returned a structure whose first coordinates are not the kept dofs in their order"
-        )
+        problem = "returned a structure whose first coordinates are not the kept dofs in their order"
         raise input_error(f"{who}: reduce", problem, wanted)
     return reduced
 
@@ -283,9 +277,7 @@ def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
 
 def _circulant(blocks: list[Matrix], sectors: int, turn: FloatArray) -> ComplexArray:
     """Return the matrix of the wheel from its waves 0 to n_s/2 or from all, in global axes."""
-    waves = np.array(
-        [blocks[k] if k < len(blocks) else np.conj(blocks[sectors - k]) for k in range(sectors)]
-    )
+    waves = np.array([blocks[k] if k < len(blocks) else np.conj(blocks[sectors - k]) for k in range(sectors)])
     first = np.fft.ifft(waves, axis=0)  # coupling of sector n with sector 0, in sector axes
     size = len(turn)
     turns = [np.linalg.matrix_power(turn, n) for n in range(sectors)]
@@ -301,14 +293,9 @@ def _dofs(sector: CyclicSector, own: Dofs, kept: int) -> Dofs:
     if sector.axis is not None:
         for n in range(sector.sectors):
             position[n, :kept] = sector.axis.turned(own.position[:kept], n * sector.pitch)
-    parts = [
-        f"sector{n}.{p}" if p else f"sector{n}" for n in range(sector.sectors) for p in own.part
-    ]
+    parts = [f"sector{n}.{p}" if p else f"sector{n}" for n in range(sector.sectors) for p in own.part]
     return Dofs(
-        np.tile(own.node, sector.sectors),
-        own.component * sector.sectors,
-        position.reshape(-1, 3),
-        tuple(parts),
+        np.tile(own.node, sector.sectors), own.component * sector.sectors, position.reshape(-1, 3), tuple(parts)
     )
 
 

@@ -68,10 +68,8 @@ def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
     n = data.sizes.get("case", 1)
     values, numbers = varied_values(data)[1], first_number(data)[1]
     labels = [str(v) for v in data["case_label"].values] if "case_label" in data else [""] * n
-    force = (
-        np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)
-    )
+    force = np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)
     return tuple(
         ShownCase(i, labels[i], _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
         for i, colour in enumerate(ramp(n))
-    )  # fmt: skip
+    )

@@ -39,9 +39,7 @@ def told_by(
     return found
 
 
-def stacked(
-    views: Sequence[tuple[Design, str, View]], table: Callable[[View], Table | Words]
-) -> list[Content]:
+def stacked(views: Sequence[tuple[Design, str, View]], table: Callable[[View], Table | Words]) -> list[Content]:
     """Return the rows of each case's table below each other, with the design and the case before them, and what is told in words where it has none."""
     head: Sequence[str] = ()
     rows, words = [], []
@@ -74,10 +72,17 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
             amplitude, hz, ratio = view.along(i, "amplitude", "frequency_hz", "damping_ratio")
             for panel, y in enumerate((hz, 100.0 * ratio), 1):
                 figure.add_scatter(
-                    x=scale.factor * amplitude, y=y, mode="lines", name=name, legendgroup=name, showlegend=panel == 1,
+                    x=scale.factor * amplitude,
+                    y=y,
+                    mode="lines",
+                    name=name,
+                    legendgroup=name,
+                    showlegend=panel == 1,
                     line={"color": design.colour, "width": 1.8, "dash": dash},
-                    hovertemplate=f"%{{y:.6g}} at %{{x:.4g}} {scale.unit}<extra>{name}</extra>", row=1, col=panel,
-                )  # fmt: skip
+                    hovertemplate=f"%{{y:.6g}} at %{{x:.4g}} {scale.unit}<extra>{name}</extra>",
+                    row=1,
+                    col=panel,
+                )
     styled(figure, 420)
     outputs = " or ".join(dict.fromkeys(v.text("output") for _, _, v in views))
     figure.update_xaxes(type="log", title_text=f"amplitude of {outputs} ({scale.unit})")
@@ -101,10 +106,13 @@ def flutter(designs: Sequence[Design]) -> list[Content]:
         for m, own in enumerate(100.0 * view.floats("damping").T):
             name = ", ".join(word for word in (design.name, label, f"mode {m + 1}") if word)
             figure.add_scatter(
-                x=angle[order], y=own[order], mode="lines+markers", name=name,
+                x=angle[order],
+                y=own[order],
+                mode="lines+markers",
+                name=name,
                 line={"color": design.colour, "width": 1.4, "dash": _DASHES[(before + m) % len(_DASHES)]},
                 hovertemplate=f"%{{y:.4g}} % at %{{x:.0f}}°<extra>{name}</extra>",
-            )  # fmt: skip
+            )
     figure.add_hline(y=0.0, line={"color": INK, "width": 1})
     styled(figure, 440)
     figure.update_xaxes(title_text="inter-blade phase angle (degrees)", dtick=45)

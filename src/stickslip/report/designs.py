@@ -96,7 +96,7 @@ class Design:
         first, own = self.response.cases[self.response.chosen], self.response
         if divided or not own.per_force:
             return first
-        alike = [c for c in own.peaked if own.level(c) == own.level(first) and own.resonates(c) == own.resonates(first)]  # fmt: skip
+        alike = [c for c in own.peaked if own.level(c) == own.level(first) and own.resonates(c) == own.resonates(first)]
         return min(alike, key=lambda c: own.peak_response(c) * c.excitation)
 
 
@@ -184,10 +184,14 @@ def per_force(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> boo
     """
     known = [d.response for d in designs if d.response]
     if curves and not known:
-        raise input_error(curves[0].name, "has no forced response to be held against", "Give a result with [forced_response].")  # fmt: skip
+        raise input_error(
+            curves[0].name, "has no forced response to be held against", "Give a result with [forced_response]."
+        )
     if len({r.length for r in known}) > 1:
         told = ", ".join(f"{d.name}: {d.response.output_name}" for d in designs if d.response)
-        raise input_error(told, "are displacements and rotations", "Compare results with the same kind of [output] peak.")  # fmt: skip
+        raise input_error(
+            told, "are displacements and rotations", "Compare results with the same kind of [output] peak."
+        )
     able = all(r.per_force for r in known)
     kinds = {c.per_force for c in curves}
     if len(kinds) > 1:

@@ -16,8 +16,7 @@ def mode_lines(view: Waves) -> list[go.Scatter]:
     groups = [("", np.arange(len(names)))]
     if len(set(diameter)) < len(diameter):
         groups = [
-            (f", {way}", np.flatnonzero((kinds == way) | (kinds == "standing")))
-            for way in ("forward", "backward")
+            (f", {way}", np.flatnonzero((kinds == way) | (kinds == "standing"))) for way in ("forward", "backward")
         ]
     traces = []
     for mode in range(hz.shape[1]):
@@ -25,21 +24,22 @@ def mode_lines(view: Waves) -> list[go.Scatter]:
             order = members[np.argsort(diameter[members], kind="stable")]
             traces.append(
                 go.Scatter(
-                    x=diameter[order], y=hz[order, mode], mode="lines+markers", name=f"mode {mode + 1}{suffix}",
+                    x=diameter[order],
+                    y=hz[order, mode],
+                    mode="lines+markers",
+                    name=f"mode {mode + 1}{suffix}",
                     text=[f"{names[w]}, {kinds[w]} wave" for w in order],
                     line={"color": colour(mode), "width": 1.4, "dash": "dot" if g else "solid"},
                     marker={"size": 7, "color": colour(mode), "symbol": "diamond" if g else "circle"},
                     hovertemplate=f"mode {mode + 1}, %{{text}}: %{{y:.6g}} Hz<extra></extra>",
                 )
-            )  # fmt: skip
+            )
     return traces
 
 
 def diameter_axes(figure: go.Figure, view: Waves) -> None:
     """Label the axes of a figure over nodal diameters."""
     highest = int(view.integers("nodal_diameter").max())
-    figure.update_xaxes(
-        title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4]
-    )
+    figure.update_xaxes(title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4])
     figure.update_xaxes(dtick=1 if highest <= 30 else None)
     figure.update_yaxes(title_text="frequency (Hz)", rangemode="tozero")

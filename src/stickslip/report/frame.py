@@ -98,9 +98,13 @@ class Placing:
             return Placed(own, _kind(own))
         self.figures += 1
         drawing = to_html(
-            _slim(own.figure.to_dict()), config=_CONFIG, full_html=False, include_plotlyjs=False,
-            div_id=f"plot-{anchor(own.key)}", validate=False,
-        )  # fmt: skip
+            _slim(own.figure.to_dict()),
+            config=_CONFIG,
+            full_html=False,
+            include_plotlyjs=False,
+            div_id=f"plot-{anchor(own.key)}",
+            validate=False,
+        )
         ends = [axis.domain[1] for axis in own.figure.select_xaxes() if axis.domain]
         wide = min(ends, default=1.0) < 0.9 or len(list(own.figure.select_scenes())) > 1
         return Placed(own, "figure", self.figures, Markup(drawing), wide)
@@ -163,8 +167,11 @@ def inline(text: str) -> Markup:
 def _templates() -> Environment:
     found = Environment(
         loader=PackageLoader("stickslip.report", "assets"),
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     found.filters |= {"inline": inline, "anchor": anchor}
     return found
 
@@ -190,10 +197,20 @@ def page_html(
     conclusion
         What is trusted and what is not, above all else.
     """
-    return _templates().get_template("page.html").render(
-        title=title, made=made, chapters=chapters, cards=cards, conclusion=conclusion,
-        style=_asset("page.css"), plotly=Markup(get_plotlyjs()), scripts=_asset("page.js") + _asset("shapes.js"),
-    )  # fmt: skip
+    return (
+        _templates()
+        .get_template("page.html")
+        .render(
+            title=title,
+            made=made,
+            chapters=chapters,
+            cards=cards,
+            conclusion=conclusion,
+            style=_asset("page.css"),
+            plotly=Markup(get_plotlyjs()),
+            scripts=_asset("page.js") + _asset("shapes.js"),
+        )
+    )
 
 
 def _asset(name: str) -> Markup:

@@ -19,12 +19,22 @@ from stickslip.report.response import Response
 
 # endings of keys, the longer ones first; True: with a prefix such as µ or M
 _UNITS = (
-    ("n_per_m3", "N/m³", True), ("kg_per_m3", "kg/m³", False), ("n_per_m", "N/m", True), ("n_s_per_m", "N s/m", True),
-    ("kg_m2", "kg m²", False), ("pa", "Pa", True), ("rpm", "rpm", False), ("hz", "Hz", False), ("deg", "°", False),
-    ("kg", "kg", False), ("n", "N", True), ("m", "m", True), ("s", "s", True),
-)  # fmt: skip
+    ("n_per_m3", "N/m³", True),
+    ("kg_per_m3", "kg/m³", False),
+    ("n_per_m", "N/m", True),
+    ("n_s_per_m", "N s/m", True),
+    ("kg_m2", "kg m²", False),
+    ("pa", "Pa", True),
+    ("rpm", "rpm", False),
+    ("hz", "Hz", False),
+    ("deg", "°", False),
+    ("kg", "kg", False),
+    ("n", "N", True),
+    ("m", "m", True),
+    ("s", "s", True),
+)
 _SETTINGS = ("material", "damping", "rotation", "retention", "aero", "mistuning", "measured")
-_QUESTIONS = {"frequency_hz", "speed_rpm", "points", "modes", "nodal_diameters", "levels", "span", "orders"}  # fmt: skip
+_QUESTIONS = {"frequency_hz", "speed_rpm", "points", "modes", "nodal_diameters", "levels", "span", "orders"}
 _BLADE = re.compile(r"\[(\d+)\]$")
 _FEW_NAMES, _MOST_NAMES = 4, 24
 _ENDS = 2  # numbers of a range
@@ -139,8 +149,8 @@ def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any
 
 
 def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
-    rows = [[f"part {name}", _part(own)] for name, own in _table(study, "part").items() if isinstance(own, dict)]  # fmt: skip
-    rows += [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]  # fmt: skip
+    rows = [[f"part {name}", _part(own)] for name, own in _table(study, "part").items() if isinstance(own, dict)]
+    rows += [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]
     for name in _SETTINGS:
         own = _table(study, name)
         if own:
@@ -151,7 +161,7 @@ def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
             rows.append([name.replace("_", " "), "; ".join(told(k, v) for k, v in own.items())])
     varied = study.get("vary", {})
     for own in varied if isinstance(varied, list) else [varied]:
-        rows += [[f"cases: {key}", _plain(v)] for key, v in _flat(own if isinstance(own, dict) else {})]  # fmt: skip
+        rows += [[f"cases: {key}", _plain(v)] for key, v in _flat(own if isinstance(own, dict) else {})]
     return Table((), rows, "Loads, damping, cases", numeric=False) if rows else None
 
 
@@ -171,9 +181,9 @@ def _load(own: Mapping[str, Any]) -> str:
     if "ratio_of" in own:
         size = f"{own['ratio_of']} over {_plain(own.get('ratio', NONE))}"
     static = own.get("harmonic", 1) == 0
-    rest = [told(k, v) for k, v in own.items() if k in ("engine_order", "phase_deg", "frequency_hz", "frequency_ratio")]  # fmt: skip
+    rest = [told(k, v) for k, v in own.items() if k in ("engine_order", "phase_deg", "frequency_hz", "frequency_ratio")]
     kind = "static" if static else f"harmonic {_plain(own.get('harmonic', 1))}"
-    return "; ".join([f"{size.removeprefix('force ')} on {own.get('on', NONE)}{along}", kind, *rest])  # fmt: skip
+    return "; ".join([f"{size.removeprefix('force ')} on {own.get('on', NONE)}{along}", kind, *rest])
 
 
 def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | None:
@@ -192,7 +202,7 @@ def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | No
     for name, force in zip(names, aligned(forces + 0.0), strict=True):
         own = dict(written.get(name, {}))
         between = _plain(own.pop("between", NONE))
-        law = ", ".join(dict.fromkeys(laws[k] for k in known.get(name, ()))) or _plain(own.get("law", NONE))  # fmt: skip
+        law = ", ".join(dict.fromkeys(laws[k] for k in known.get(name, ()))) or _plain(own.get("law", NONE))
         values = "; ".join(told(k, v) for k, v in own.items() if k != "law") or NONE
         rows.append([name, between, law, values, str(len(known.get(name, ()))), force])
     head = ["contact", "between", "law", "values", "points", "normal force at rest (N)"]
@@ -207,19 +217,19 @@ def _names(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
     if node is None:
         return None
     output = _table(study, "output")
-    loads = {n: o["on"] for n, o in _table(study, "load").items() if isinstance(o, dict) and "on" in o}  # fmt: skip
+    loads = {n: o["on"] for n, o in _table(study, "load").items() if isinstance(o, dict) and "on" in o}
     points, labels = loads | dict(_table(output, "points")), node.labels("output")
     wanted = node.text("report_output")
-    rows = [[label, _meaning(label, points) + "; **its peak counts**" * (label == wanted)] for label in labels]  # fmt: skip
-    text = "Amplitudes are those of the harmonic that the load drives: half of peak to peak, where nothing else vibrates. "
+    rows = [[label, _meaning(label, points) + "; **its peak counts**" * (label == wanted)] for label in labels]
+    text = (
+        "Amplitudes are those of the harmonic that the load drives: half of peak to peak, where nothing else vibrates. "
+    )
     text += "On a set of several nodes an output is the first of them, and 'stickslip check' says where that lies."
     shown = sorted(rows, key=lambda row: row[0] != wanted)[:_MOST_NAMES]
     more = [f"{len(rows) - len(shown)} more of the same kind."] if len(rows) > len(shown) else []
     folded = "" if len(shown) < _FEW_NAMES else f"Names of {len(rows)} outputs, and what they are"
     heading = "" if folded else "Names"
-    return Table(
-        ("name", "what it is"), shown, heading, (text,), numeric=False, items=more, folded=folded
-    )
+    return Table(("name", "what it is"), shown, heading, (text,), numeric=False, items=more, folded=folded)
 
 
 def _meaning(label: str, points: Mapping[str, Any]) -> str:

@@ -29,14 +29,20 @@ def loop_figure(fit: LoopFit) -> go.Figure:
         dots = {"mode": "markers", "marker": {"size": 4, "color": MUTED}, **own}
         figure.add_scatter(
             x=x[every] * length.factor, y=force[every] * newton.factor, name="measured", row=1, col=1, **dots
-        )  # fmt: skip
+        )
         figure.add_scatter(
-            x=x[every] * length.factor, y=fitted[every] * newton.factor, name="fitted", mode="lines",
-            line={"width": 2, "color": COLOURS[j % len(COLOURS)]}, row=1, col=1, **own,
-        )  # fmt: skip
+            x=x[every] * length.factor,
+            y=fitted[every] * newton.factor,
+            name="fitted",
+            mode="lines",
+            line={"width": 2, "color": COLOURS[j % len(COLOURS)]},
+            row=1,
+            col=1,
+            **own,
+        )
         at = (begin + np.arange(x.size))[every]
         left = (force - fitted)[every] * newton.factor
-        figure.add_scatter(x=at, y=left, name="residual", row=1, col=2, **(dots | {"showlegend": False}))  # fmt: skip
+        figure.add_scatter(x=at, y=left, name="residual", row=1, col=2, **(dots | {"showlegend": False}))
         begin += x.size
     styled(figure, 480)
     legend_above(figure)
@@ -47,9 +53,7 @@ def loop_figure(fit: LoopFit) -> go.Figure:
     return figure
 
 
-def write_loop_page(
-    fit: LoopFit, source: Path, target: Path, estimates: Sequence[str], lines: Sequence[str]
-) -> None:
+def write_loop_page(fit: LoopFit, source: Path, target: Path, estimates: Sequence[str], lines: Sequence[str]) -> None:
     """Write the page of a fit.
 
     Parameters

@@ -16,23 +16,40 @@ def modes_of_wheel(view: Waves) -> Plot | None:
     hertz, blades = view.floats("mistuned_hz"), view.floats("sector_share")
     factor, waves = view.floats("mode_localisation"), view.floats("wave_share")
     figure = make_subplots(
-        1, 3, horizontal_spacing=0.08, column_widths=[0.3, 0.35, 0.35],
+        1,
+        3,
+        horizontal_spacing=0.08,
+        column_widths=[0.3, 0.35, 0.35],
         subplot_titles=("localisation factor", "share of each blade", "share of each wave"),
-    )  # fmt: skip
+    )
     modes = np.arange(1, hertz.size + 1)
     figure.add_bar(
-        x=factor, y=modes, orientation="h", marker_color=INK, customdata=hertz, showlegend=False,
-        hovertemplate="mode %{y}, %{customdata:.6g} Hz: %{x:.3f}<extra></extra>", row=1, col=1,
-    )  # fmt: skip
+        x=factor,
+        y=modes,
+        orientation="h",
+        marker_color=INK,
+        customdata=hertz,
+        showlegend=False,
+        hovertemplate="mode %{y}, %{customdata:.6g} Hz: %{x:.3f}<extra></extra>",
+        row=1,
+        col=1,
+    )
     for column, share, name in ((2, blades, "blade"), (3, waves, "wave number")):
         figure.add_trace(
             go.Heatmap(
-                z=100 * share, y=modes, x=np.arange(share.shape[1]), colorscale="Blues", showscale=column == 3,
-                colorbar={"title": {"text": "%"}}, zmin=0, customdata=np.tile(hertz[:, None], share.shape[1]),
+                z=100 * share,
+                y=modes,
+                x=np.arange(share.shape[1]),
+                colorscale="Blues",
+                showscale=column == 3,
+                colorbar={"title": {"text": "%"}},
+                zmin=0,
+                customdata=np.tile(hertz[:, None], share.shape[1]),
                 hovertemplate=f"mode %{{y}}, %{{customdata:.6g}} Hz<br>{name} %{{x}}: %{{z:.2g}} %<extra></extra>",
             ),
-            row=1, col=column,
-        )  # fmt: skip
+            row=1,
+            col=column,
+        )
     styled(figure, max(380, min(12 * hertz.size + 160, 900)))
     legend_above(figure)
     figure.update_yaxes(title_text="mode", col=1)

@@ -81,16 +81,17 @@ def facts(nodes: Mapping[str, Node]) -> Table | None:
 def _together(nodes: Mapping[str, Node]) -> Node:
     """Return what any analysis stores of the model: the first one that does."""
     each = [node.data for node in reversed(list(nodes.values()))]
-    told = {
-        n: v.variable for data in each for n, v in data.data_vars.items() if set(v.dims) <= {"xyz"}
-    }
+    told = {n: v.variable for data in each for n, v in data.data_vars.items() if set(v.dims) <= {"xyz"}}
     return Node(xr.Dataset(told, attrs={k: v for data in each for k, v in data.attrs.items()}))
 
 
 _COUNTS = (
-    ("nodes", "nodes"), ("elements", "elements"), ("dofs", "free degrees of freedom"), ("reduced", "coordinates of the reduced model"),
+    ("nodes", "nodes"),
+    ("elements", "elements"),
+    ("dofs", "free degrees of freedom"),
+    ("reduced", "coordinates of the reduced model"),
     ("retained", "coordinates of contacts and rigid bodies"),
-)  # fmt: skip
+)
 
 
 def _static(node: Node) -> list[list[str]]:

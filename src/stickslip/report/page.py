@@ -98,13 +98,8 @@ def _chapter(
         return Chapter(block.key, block.title, [*placing(same), *bodies[0]], folded=block.folded)
     cases = cases_of(data)
     buttons = chooser(varied(data), cases, 0)
-    each = [
-        CaseBody(k, case.label, body)
-        for k, (case, body) in enumerate(zip(cases, bodies, strict=True))
-    ]
-    return Chapter(
-        block.key, block.title, placing([buttons] if buttons else []), each, block.folded
-    )
+    each = [CaseBody(k, case.label, body) for k, (case, body) in enumerate(zip(cases, bodies, strict=True))]
+    return Chapter(block.key, block.title, placing([buttons] if buttons else []), each, block.folded)
 
 
 def _nodes(tree: xr.DataTree) -> dict[str, Node]:
@@ -192,9 +187,7 @@ def report_file(path: Path, html_path: Path | None = None) -> Path:
     if not any(True for _ in _shown(tree)):
         known = ", ".join(section.name for section in SECTIONS)
         raise input_error(
-            str(path),
-            f"holds none of {known}",
-            "This is no result of 'stickslip run'; run the study again.",
+            str(path), f"holds none of {known}", "This is no result of 'stickslip run'; run the study again."
         )
     target = html_path or (path if path.is_dir() else path.parent) / "report.html"
     write_report(tree, target)

@@ -23,22 +23,37 @@ _STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 15
 
 # what all figures share
 _LAYOUT = {
-    "autosize": True, "paper_bgcolor": "white", "plot_bgcolor": "white",
-    "font": {"family": FONT, "size": 13, "color": INK}, "hoverlabel": {"font": {"family": FONT, "size": 12}},
+    "autosize": True,
+    "paper_bgcolor": "white",
+    "plot_bgcolor": "white",
+    "font": {"family": FONT, "size": 13, "color": INK},
+    "hoverlabel": {"font": {"family": FONT, "size": 12}},
     "legend": {
-        "title": {"font": {"size": 12}}, "font": {"size": 12}, "x": 1.02, "y": 1, "tracegroupgap": 12, "groupclick": "toggleitem",
+        "title": {"font": {"size": 12}},
+        "font": {"size": 12},
+        "x": 1.02,
+        "y": 1,
+        "tracegroupgap": 12,
+        "groupclick": "toggleitem",
     },
-}  # fmt: skip
+}
 _AXIS = {
-    "showline": True, "mirror": True, "linecolor": MUTED, "gridcolor": GRID, "zeroline": False, "automargin": True,
-    "ticks": "outside", "ticklen": 4, "tickcolor": MUTED, "tickfont": {"size": 12}, "exponentformat": "power",
+    "showline": True,
+    "mirror": True,
+    "linecolor": MUTED,
+    "gridcolor": GRID,
+    "zeroline": False,
+    "automargin": True,
+    "ticks": "outside",
+    "ticklen": 4,
+    "tickcolor": MUTED,
+    "tickfont": {"size": 12},
+    "exponentformat": "power",
     "title": {"standoff": 8, "font": {"size": 14}},
-}  # fmt: skip
+}
 # one template, checked once: ten times as fast as the same for every axis of every figure
 _TEMPLATE = go.layout.Template(layout={**_LAYOUT, "xaxis": _AXIS, "yaxis": _AXIS})
-_ROW_ABOVE = {
-    "orientation": "h", "x": 0, "xanchor": "left", "yref": "container", "y": 0.995, "yanchor": "top",
-}  # fmt: skip
+_ROW_ABOVE = {"orientation": "h", "x": 0, "xanchor": "left", "yref": "container", "y": 0.995, "yanchor": "top"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,9 +142,7 @@ def _even_ticks(low: float, high: float) -> list[float]:
 def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figure:
     """Give `figure` the look of the page; returns it."""
     margin = {"l": 70, "r": 20, "t": 56 if figure.layout.annotations else 40, "b": 55}
-    figure.update_layout(
-        template=_TEMPLATE, height=height, margin=margin, legend_title_text=legend_title
-    )
+    figure.update_layout(template=_TEMPLATE, height=height, margin=margin, legend_title_text=legend_title)
     figure.update_annotations(font_size=13)
     return figure
 

@@ -75,9 +75,7 @@ def amplitude(value: float, unit: str, digits: int = 4) -> str:
     return BEYOND if _beyond(value, unit) else f"{number(value / MM, digits)} mm"
 
 
-def column(
-    values: FloatArray, unit: str, digits: int = 4, *, millimetres: bool = False
-) -> tuple[str, list[str]]:
+def column(values: FloatArray, unit: str, digits: int = 4, *, millimetres: bool = False) -> tuple[str, list[str]]:
     """Write numbers of one column with one unit and the same decimals, as `aligned` does.
 
     Parameters

@@ -17,12 +17,7 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
-from stickslip.study.analyses.forced.curve import (
-    Curve,
-    branch_length,
-    of_largest_blade,
-    peak_output,
-)
+from stickslip.study.analyses.forced.curve import Curve, branch_length, of_largest_blade, peak_output
 from stickslip.study.analyses.forced.quantities import MOTION
 from stickslip.study.analyses.forced.stable_words import said_of
 from stickslip.study.analyses.forced.summary import MEASURED
@@ -181,7 +176,7 @@ class Response(Node):
         first = "predicted_error_percent" if self.is_error else "indicator"
         error = self.floats("own_error_percent" if self.auto else first)
         at = np.flatnonzero(~np.isnan(error))
-        return Alert(self.point_case[at], self.hz[at], error[at])  # fmt: skip
+        return Alert(self.point_case[at], self.hz[at], error[at])
 
     @property
     def selection(self) -> str:
@@ -295,9 +290,7 @@ class Response(Node):
         """Return a table whose first column names the case; without it where there is one case."""
         first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
         cells = [list(row)[first:] for row in rows]
-        return Table(
-            [self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded
-        )
+        return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
 
     def points(self, case: ShownCase) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.

@@ -64,10 +64,14 @@ def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
         margin={"l": 0, "r": 0, "t": 44, "b": 0},
         title={"text": "", "x": 0.02, "y": 0.97, "font": {"size": 15, "family": FONT}},
         scene={
-            "xaxis": axis, "yaxis": axis, "zaxis": axis, "aspectmode": "manual", "dragmode": "orbit",
+            "xaxis": axis,
+            "yaxis": axis,
+            "zaxis": axis,
+            "aspectmode": "manual",
+            "dragmode": "orbit",
             "camera": {"projection": {"type": "orthographic"}},
         },
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -118,9 +122,7 @@ def _text(values: npt.NDArray[np.generic]) -> str:
 def _controls(view: Waves, modes: int, data: dict[str, object]) -> Markup:
     """Return the form above the picture and the data behind it, as HTML."""
     pairs = enumerate(zip(view.waves, view.kinds, strict=True))
-    waves = "".join(
-        f'<option value="{k}">{escape(f"{name} ({kind})")}</option>' for k, (name, kind) in pairs
-    )
+    waves = "".join(f'<option value="{k}">{escape(f"{name} ({kind})")}</option>' for k, (name, kind) in pairs)
     numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
     views = (
         '<label>show <select name="view"><option value="wheel">whole wheel</option>'

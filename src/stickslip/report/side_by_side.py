@@ -56,15 +56,10 @@ def over_first(value: float, first: float) -> float:
 def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
     """Return what the reader chooses between: the best case of each design, then each case that any of them has; nothing where each has one case."""
     labels = dict.fromkeys(
-        c.label
-        for d in designs
-        if d.response and len(d.response.cases) > 1
-        for c in d.response.cases
+        c.label for d in designs if d.response and len(d.response.cases) > 1 for c in d.response.cases
     )
     names = [_BEST, *labels] if labels else []
-    return tuple(
-        ShownCase(i, name, name, float("nan"), float("nan"), MUTED) for i, name in enumerate(names)
-    )
+    return tuple(ShownCase(i, name, name, float("nan"), float("nan"), MUTED) for i, name in enumerate(names))
 
 
 def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | None:
@@ -74,9 +69,7 @@ def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | No
     return cases[0] if len(cases) == 1 else design.case(choice.label)
 
 
-def opening(
-    designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool
-) -> ShownCase | None:
+def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool) -> ShownCase | None:
     """Return the choice that the page opens on: a case that all designs have, that of the first one's smallest peak if it is one; else the best of each.
 
     The best cases of two designs may be those of different loads, which say nothing of the designs.
@@ -107,25 +100,27 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
             pairs = [(None, response.cases[0])]
         for k, case in pairs:
             if case is not None:
-                figure.add_trace(_line(design, response, case, own * scale.factor, scale).update(meta=k))  # fmt: skip
+                figure.add_trace(_line(design, response, case, own * scale.factor, scale).update(meta=k))
     for k, curve in enumerate(curves):
         figure.add_scatter(
-            x=curve.hz, y=scale.factor * curve.amplitude, mode="lines+markers", name=curve.name,
-            line={"color": INK, "width": 1.2, "dash": _DASHES[k % len(_DASHES)]}, marker={"size": 4, "color": INK},
+            x=curve.hz,
+            y=scale.factor * curve.amplitude,
+            mode="lines+markers",
+            name=curve.name,
+            line={"color": INK, "width": 1.2, "dash": _DASHES[k % len(_DASHES)]},
+            marker={"size": 4, "color": INK},
             hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra>{curve.name}</extra>",
-        )  # fmt: skip
+        )
     styled(figure, 540)
     drawn = np.concatenate([np.asarray(t.y, dtype=float) for t in figure.data])
     over = " / force" if divided else ""
-    figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))
     figure.update_xaxes(title_text="frequency (Hz)")
-    caption = (
-        f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones."
-    )
+    caption = f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones."
     captions = {c.index: _shown(told, c, divided=divided) for c in offered}
     first = opening(designs, offered, divided=divided)
     chosen = first.index if first else -1
-    return Plot("compared_responses", "Responses over each other", caption, figure, captions, chosen)  # fmt: skip
+    return Plot("compared_responses", "Responses over each other", caption, figure, captions, chosen)
 
 
 def _outputs(designs: Sequence[Design]) -> str:
@@ -145,16 +140,18 @@ def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> st
     return f"Drawn: {'; '.join(there)}.{lacks}"
 
 
-def _line(
-    design: Design, response: Response, case: ShownCase, y: FloatArray, scale: Scale
-) -> go.Scatter:
+def _line(design: Design, response: Response, case: ShownCase, y: FloatArray, scale: Scale) -> go.Scatter:
     at = response.points(case)
     symbols = np.array(["circle", "circle-open", "x"])[response.levels[at]]
     return go.Scatter(
-        x=response.hz[at], y=y[at], mode="lines+markers", name=design.name, line={"color": design.colour, "width": 1.8},
+        x=response.hz[at],
+        y=y[at],
+        mode="lines+markers",
+        name=design.name,
+        line={"color": design.colour, "width": 1.8},
         marker={"symbol": symbols.tolist(), "size": 5, "color": design.colour, "line": {"width": 1}},
         hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz{f'<br>{case.label}' * bool(case.label)}<extra>{design.name}</extra>",
-    )  # fmt: skip
+    )
 
 
 def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
@@ -171,25 +168,32 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
         cases = sorted(response.peaked, key=lambda c: c.value)
         peak = np.array([_peak(response, c, divided=divided) for c in cases])
         heights.append(peak)
-        curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))  # fmt: skip
+        curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))
     unit_drawn = unit_of(designs, divided=divided)
     scale = scale_for(np.concatenate(heights), unit_drawn)
     for design, values, peak, hz in curves:
         for panel, (y, unit) in enumerate(((scale.factor * peak, scale.unit), (hz, "Hz")), 1):
             figure.add_scatter(
-                x=values, y=y, mode="lines+markers", name=design.name, showlegend=panel == 1, legendgroup=design.name,
-                line={"color": design.colour, "width": 1.8}, hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{design.name}</extra>",
-                row=1, col=panel,
-            )  # fmt: skip
+                x=values,
+                y=y,
+                mode="lines+markers",
+                name=design.name,
+                showlegend=panel == 1,
+                legendgroup=design.name,
+                line={"color": design.colour, "width": 1.8},
+                hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{design.name}</extra>",
+                row=1,
+                col=panel,
+            )
     styled(figure, 400)
     every = [value for _, own, _, _ in curves for value in own]
     wide = min(every) > 0 and max(every) > 5 * min(every)
     figure.update_xaxes(title_text=key, type="log" if wide else "linear")
     drawn = scale.factor * np.concatenate(heights)
     over = " / force" if divided else ""
-    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)  # fmt: skip
+    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])  # fmt: skip
+    lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])
     caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
@@ -237,11 +241,22 @@ def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
     if not found:
         return None
     unit, cells = column(np.array([p.height for p in found]), unit_of(designs, divided=divided))
-    head = ["case", "design", f"peak ({unit})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]  # fmt: skip
-    return Table(head, [
-        [p.case or NONE, p.design, cell, fixed(p.hz, 3), p.level or NONE, fixed(p.off_percent, 2), fixed(p.shift_hz, 3)]
-        for p, cell in zip(found, cells, strict=True)
-    ])  # fmt: skip
+    head = ["case", "design", f"peak ({unit})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]
+    return Table(
+        head,
+        [
+            [
+                p.case or NONE,
+                p.design,
+                cell,
+                fixed(p.hz, 3),
+                p.level or NONE,
+                fixed(p.off_percent, 2),
+                fixed(p.shift_hz, 3),
+            ]
+            for p, cell in zip(found, cells, strict=True)
+        ],
+    )
 
 
 def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Table | None:
@@ -255,8 +270,17 @@ def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -
         for design, response, case in every:
             height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
             off = percent(over_first(height, float(curve.amplitude[top])), 3)
-            rows.append([curve.name, design.name, case.label or NONE, off, fixed(hz - float(curve.hz[top]), 3), _along(response, case, curve, divided=divided)])  # fmt: skip
-    head = ["curve", "design", "case", "peak off by", "frequency off by (Hz)", "largest difference along it"]  # fmt: skip
+            rows.append(
+                [
+                    curve.name,
+                    design.name,
+                    case.label or NONE,
+                    off,
+                    fixed(hz - float(curve.hz[top]), 3),
+                    _along(response, case, curve, divided=divided),
+                ]
+            )
+    head = ["curve", "design", "case", "peak off by", "frequency off by (Hz)", "largest difference along it"]
     told = "Along a curve: the difference of the amplitudes over the curve's peak, where frequencies of both overlap, with straight lines between the points of the design."
     return Table(head, rows, "Against other curves", (told,))
 
@@ -283,12 +307,21 @@ def frequencies(designs: Sequence[Design]) -> Table | None:
     told = [(d, d.modes) for d in designs if d.modes is not None]
     if len(told) < 2:
         return None
-    known = [{(w, m): float(f) for w, row in zip(v.waves, v.floats("frequency_hz"), strict=True) for m, f in enumerate(row)} for _, v in told]  # fmt: skip
+    known = [
+        {(w, m): float(f) for w, row in zip(v.waves, v.floats("frequency_hz"), strict=True) for m, f in enumerate(row)}
+        for _, v in told
+    ]
     rows = []
     for wave, mode in known[0]:
         if all((wave, mode) in each for each in known):
             own = [each[wave, mode] for each in known]
-            rows.append([f"{wave}, mode {mode + 1}", *(number(f, 7) for f in own), *(percent(over_first(f, own[0]), 3) for f in own[1:])])  # fmt: skip
+            rows.append(
+                [
+                    f"{wave}, mode {mode + 1}",
+                    *(number(f, 7) for f in own),
+                    *(percent(over_first(f, own[0]), 3) for f in own[1:]),
+                ]
+            )
     head = ["", *(f"{d.name} (Hz)" for d, _ in told), *(f"{d.name} off by" for d, _ in told[1:])]
     several = any(d.tree["modes"].sizes.get("case", 1) > 1 for d, _ in told)
     said = ("Of the first case of each design.",) if several else ()
@@ -299,13 +332,11 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
     """Return what differs between the study files."""
     rows, title = differences(designs), "What differs between the study files"
     without = [d.name for d in designs if not d.inputs]
-    told = [f"Made without a study file, inputs not known: {', '.join(without)}."] if without else []  # fmt: skip
+    told = [f"Made without a study file, inputs not known: {', '.join(without)}."] if without else []
     if not rows:
         return Words([*told, "Nothing differs that the results know of."])
-    cells = [[c if len(c) <= _MOST_INPUTS else f"{c[:_MOST_INPUTS]} …" for c in row] for row in rows]  # fmt: skip
-    return Table(
-        ["key", *(d.name for d in designs)], cells, "", [title + ".", *told], numeric=False
-    )
+    cells = [[c if len(c) <= _MOST_INPUTS else f"{c[:_MOST_INPUTS]} …" for c in row] for row in rows]
+    return Table(["key", *(d.name for d in designs)], cells, "", [title + ".", *told], numeric=False)
 
 
 def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
@@ -323,9 +354,7 @@ def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
     return [*found, *_held(alike, f"peak of {{}} at {shown.label}", unit, divided=divided)]
 
 
-def _held(
-    pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool
-) -> list[Card]:
+def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool) -> list[Card]:
     """Return a card for each design at a case of it, held against the first one."""
     found: list[Card] = []
     first, against = float("nan"), ""
@@ -344,9 +373,7 @@ def _held(
     return found
 
 
-def contents(
-    designs: Sequence[Design], curves: Sequence[MeasuredCurve]
-) -> list[tuple[str, str, list[Content]]]:
+def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list[tuple[str, str, list[Content]]]:
     """Return the chapters of a comparison: key, title, and what they show.
 
     Raises
@@ -359,7 +386,15 @@ def contents(
     verdicts = Words(items=[f"**{d.name}**: {conclusion(d.tree)}" for d in designs])
     each: list[tuple[str, str, list[Content | None]]] = [
         ("verdicts", "Verdicts", [verdicts]),
-        ("responses", "Forced response", [chooser("case", offered, first.index if first else -1), responses(designs, curves), against_curves(designs, curves)]),
+        (
+            "responses",
+            "Forced response",
+            [
+                chooser("case", offered, first.index if first else -1),
+                responses(designs, curves),
+                against_curves(designs, curves),
+            ],
+        ),
         ("optimisation", "Optimisation curves", [optimisation(designs, divided=divided)]),
         ("peaks", "Peaks", [peaks(designs, divided=divided)]),
         ("modes", "Modes", [frequencies(designs)]),
@@ -367,7 +402,7 @@ def contents(
         ("flutter", "Flutter", [*flutter(designs)]),
         ("limit_cycles", "Limit cycles", [*limit_cycles(designs)]),
         ("inputs", "Inputs", [inputs(designs)]),
-    ]  # fmt: skip
+    ]
     kept = [(key, title, [c for c in own if c is not None]) for key, title, own in each]
     return [chapter for chapter in kept if chapter[2]]
 
@@ -377,6 +412,6 @@ def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] =
     placing = Placing()
     chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
     names = [d.name for d in designs]
-    made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")  # fmt: skip
+    made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")
     head = cards(designs, divided=per_force(designs, curves))
     return page_html(f"{joined(names)} compared", made, chapters, cards=head)

@@ -36,8 +36,7 @@ def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray
         (n,) True where the two faces make an angle of more than 30 degrees, or there is only one.
     """
     normal = np.cross(
-        points[triangles[:, 1]] - points[triangles[:, 0]],
-        points[triangles[:, 2]] - points[triangles[:, 0]],
+        points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
     )
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1.0)
@@ -82,22 +81,28 @@ def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArr
     return np.asarray(parts[meets.all(axis=1)])
 
 
-def _contacts(
-    response: Response, position: FloatArray, *, named: bool, keyed: bool = False
-) -> list[go.Scatter3d]:
+def _contacts(response: Response, position: FloatArray, *, named: bool, keyed: bool = False) -> list[go.Scatter3d]:
     """Draw the contact points, coloured by the contact of the model that they belong to."""
     names, colours = np.array(response.labels("contact"), dtype=object), group_colours(response)
     place = _places(response)
     mode = "markers+text" if named and len(names) <= _MOST_NAMES else "markers"
     return [
         go.Scatter3d(
-            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=group, legendgroup=group, showlegend=keyed,
-            text=names[at], textposition=place[at], textfont={"size": 12, "color": INK},
+            x=position[at, 0],
+            y=position[at, 1],
+            z=position[at, 2],
+            mode=mode,
+            name=group,
+            legendgroup=group,
+            showlegend=keyed,
+            text=names[at],
+            textposition=place[at],
+            textfont={"size": 12, "color": INK},
             marker={"size": 5 if named else 3, "color": colours[group]},
             hovertemplate="%{text}: x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
         )
         for group, at in response.groups.items()
-    ]  # fmt: skip
+    ]
 
 
 def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.Mesh3d]:
@@ -115,10 +120,12 @@ def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.
         drawn = [tiles[int(i)] for i in at if i in tiles]
         if drawn:
             points, triangles = triangulated(drawn)
-            found.append(surface(points, triangles, color=_COLOURS[k], lighting=_FLAT).update(key | {"showlegend": True}))  # fmt: skip
+            found.append(
+                surface(points, triangles, color=_COLOURS[k], lighting=_FLAT).update(key | {"showlegend": True})
+            )
         alone = np.array([i for i in at if i not in tiles], dtype=np.int64)
         if at.size:
-            found.append(_named(response, position, at, alone, k).update(key | {"showlegend": not drawn}))  # fmt: skip
+            found.append(_named(response, position, at, alone, k).update(key | {"showlegend": not drawn}))
     if tiles:
         x, y, z = outlines(tiles.values()).astype(np.float32).T
         rim = {"mode": "lines", "line": {"color": INK, "width": 2}, "hoverinfo": "skip"}
@@ -126,19 +133,26 @@ def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.
     return found
 
 
-def _named(
-    response: Response, position: FloatArray, at: IntArray, alone: IntArray, state: int
-) -> go.Scatter3d:
+def _named(response: Response, position: FloatArray, at: IntArray, alone: IntArray, state: int) -> go.Scatter3d:
     """Draw contact points in a state: those that stand alone as dots, those on a patch to point at; names where they are few."""
     names = np.array(response.labels("contact"), dtype=object)
     few = len(names) <= _MOST_NAMES
     size = np.where(np.isin(at, alone), 8.0, 2.0)
     return go.Scatter3d(
-        x=position[at, 0], y=position[at, 1], z=position[at, 2], mode="markers+text" if few else "markers",
-        text=names[at], textposition=_places(response)[at], textfont={"size": 12, "color": INK},
-        marker={"size": size.tolist(), "color": _COLOURS[state] if alone.size else INK, "line": {"width": 1, "color": INK}},
+        x=position[at, 0],
+        y=position[at, 1],
+        z=position[at, 2],
+        mode="markers+text" if few else "markers",
+        text=names[at],
+        textposition=_places(response)[at],
+        textfont={"size": 12, "color": INK},
+        marker={
+            "size": size.tolist(),
+            "color": _COLOURS[state] if alone.size else INK,
+            "line": {"width": 1, "color": INK},
+        },
         hovertemplate="%{text} " + _SAID[state] + ": x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def contact_patches(response: Response, position: FloatArray) -> dict[int, FloatArray]:
@@ -201,11 +215,16 @@ def _scene(
     span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
-            "range": [float(a), float(b)], "title": {"text": f"{name} (mm)", "font": {"size": 12}}, "showbackground": False,
-            "gridcolor": "#dfe4ea", "zeroline": False, "nticks": 6 if close else 3, "tickfont": {"size": 11},
+            "range": [float(a), float(b)],
+            "title": {"text": f"{name} (mm)", "font": {"size": 12}},
+            "showbackground": False,
+            "gridcolor": "#dfe4ea",
+            "zeroline": False,
+            "nticks": 6 if close else 3,
+            "tickfont": {"size": 11},
         }
         for name, a, b in zip("xyz", low, high, strict=True)
-    }  # fmt: skip
+    }
     camera = {"eye": eye, "projection": {"type": "orthographic"}}
     ratio = dict(zip("xyz", span.tolist(), strict=True))
     shown = {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit"}
@@ -223,11 +242,7 @@ def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
     each = [f"{counted(len(at), 'point')} of {group}" for group, at in node.groups.items()]
     text += f" Contact points, coloured by contact: {joined(each)}." if each else ""
     if node.has("peak_state", "contact_position") and node.chosen >= 0:
-        drawn = (
-            "their patches"
-            if contact_patches(node, 1e3 * node.floats("contact_position"))
-            else "they"
-        )
+        drawn = "their patches" if contact_patches(node, 1e3 * node.floats("contact_position")) else "they"
         text += f" Near the contacts {drawn} are coloured by what they do in a cycle at the peak{node.cases[node.chosen].where}."
     unmeshed = list(rigid_bodies(node))
     verb = "is rigid and has" if len(unmeshed) == 1 else "are rigid and have"
@@ -264,9 +279,9 @@ def skin_picture(node: Node) -> Plot | None:
         figure.add_traces([*near, *points_near], rows=1, cols=2)
         figure.update_layout(scene2=_scene(low, high, close=True, seen=_eye(node)))
     styled(figure, 480)
-    row = {"orientation": "h", "xanchor": "center", "y": 0, "yanchor": "top", "itemsizing": "constant"}  # fmt: skip
+    row = {"orientation": "h", "xanchor": "center", "y": 0, "yanchor": "top", "itemsizing": "constant"}
     legend = row | {"x": 0.24 if contacts else 0.5, "title": {"text": "contacts"}}
-    shown = node.cases[node.chosen].where if contacts and isinstance(node, Response) and node.chosen >= 0 else ""  # fmt: skip
+    shown = node.cases[node.chosen].where if contacts and isinstance(node, Response) and node.chosen >= 0 else ""
     second = row | {"x": 0.76, "title": {"text": f"at the peak{shown}"}, "font": {"size": 12}}
     scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
     margin = {"l": 0, "r": 0, "t": 62, "b": 70 if contacts else 10}

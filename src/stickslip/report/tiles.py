@@ -16,9 +16,7 @@ _CORNERS_OF_LINE = 2
 _BEHIND = 0.2  # cosine of normals below which a neighbour is of another face
 
 
-def patches(
-    position: FloatArray, frame: FloatArray, area: FloatArray, members: Sequence[int]
-) -> dict[int, FloatArray]:
+def patches(position: FloatArray, frame: FloatArray, area: FloatArray, members: Sequence[int]) -> dict[int, FloatArray]:
     """Return the corners (k, 3) of the patch of each contact point of one contact that has a place and an area.
 
     Parameters
@@ -32,7 +30,7 @@ def patches(
     members
         The points of the contact.
     """
-    known = np.isfinite(area) & (area > 0) & np.isfinite(position).all(axis=1) & np.isfinite(frame).all(axis=(1, 2))  # fmt: skip
+    known = np.isfinite(area) & (area > 0) & np.isfinite(position).all(axis=1) & np.isfinite(frame).all(axis=(1, 2))
     own = np.array([k for k in members if known[k]], dtype=np.int64)
     if not own.size:
         return {}
@@ -47,9 +45,7 @@ def patches(
         plane = (position[near[alike]] - position[k]) @ frame[k, :, :2]
         nearer = [(other, 0.5 * float(other @ other)) for other in plane if np.any(other)]
         inside = [(a @ frame[k, :, :2], -b - float(a @ position[k])) for a, b in edges]
-        corners = _cut(
-            (_WITHIN if edges else _REACH) * np.sqrt(area[k] / np.pi) * circle, nearer + inside
-        )
+        corners = _cut((_WITHIN if edges else _REACH) * np.sqrt(area[k] / np.pi) * circle, nearer + inside)
         if len(corners):
             found[int(k)] = position[k] + corners @ frame[k, :, :2].T
     return found

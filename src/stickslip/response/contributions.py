@@ -43,9 +43,7 @@ class HarmonicContributions:
     bound: float
 
 
-def harmonic_contributions(
-    problem: ForcedProblem, point: ForcedPoint, goal: Goal = "motion"
-) -> HarmonicContributions:
+def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goal = "motion") -> HarmonicContributions:
     """Estimate what each missing harmonic of the reference would change in the outputs at a solved point.
 
     Residuals of the missing harmonics weighted by the adjoints of the outputs (Becker & Rannacher 2001, section 2), with the
@@ -86,9 +84,7 @@ def harmonic_contributions(
         bound = found.bound
         singular = found.mean is None and bound > 0.0
         parts = (
-            np.full(parts.shape, complex(np.inf))
-            if singular
-            else contributions(own, high, point.omega, outputs, found)
+            np.full(parts.shape, complex(np.inf)) if singular else contributions(own, high, point.omega, outputs, found)
         )
     names = problem.system.structure.dofs.labels
     labels = tuple(names[dof] for dof in outputs.dofs)

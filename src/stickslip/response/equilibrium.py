@@ -35,9 +35,7 @@ class _Held:
 
     def linearise(self, x: FloatArray, p: float) -> Linearisation:
         at = self.balance.linearise(x, 0.0)
-        return Linearisation(
-            at.residual + p * x, at.dense_jac() + p * np.eye(x.size), x, at.seconds_contact
-        )
+        return Linearisation(at.residual + p * x, at.dense_jac() + p * np.eye(x.size), x, at.seconds_contact)
 
 
 @by_one_thread
@@ -72,9 +70,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
     # a faint static load beside a large preload cannot be resolved better than the preload's own rounding
     coarser = max(1.0, resting / balance.force_scale)
     balance = replace(
-        balance,
-        force_scale=coarser * balance.force_scale,
-        displacement_scale=coarser * balance.displacement_scale,
+        balance, force_scale=coarser * balance.force_scale, displacement_scale=coarser * balance.displacement_scale
     )
     start = bonded_start(balance, 0.0, system)
     solution = newton(lambda v: balance.linearise(v, 0.0), start, options)

@@ -149,9 +149,7 @@ class _Walk:
         before = [] if self.route.listed else [s.point for s in self.branch if s.point.converged]
         return lost(made) if retraced(self.curve, before, made) else made
 
-    def _kept(
-        self, made: Followed, audit: Followed | None = None, *, begins: bool = False
-    ) -> Iterator[Followed]:
+    def _kept(self, made: Followed, audit: Followed | None = None, *, begins: bool = False) -> Iterator[Followed]:
         """Accept a point, and look at it or at the one before more closely where that is due."""
         silent = made.judged.bound == 0.0
         self.branch.append(_Stop(made, made, silent or audit is not None, audit, begins))
@@ -218,9 +216,7 @@ class _Walk:
             return True
         audit = stop.more
         if audit is None or audit.level != level:
-            audit = yield from self._take(
-                lambda: again(self.curve, "audit", stop.ahead, index, level)
-            )
+            audit = yield from self._take(lambda: again(self.curve, "audit", stop.ahead, index, level))
             stop.more = audit
         if audit.converged and (stop.audited or self.curve.agree(stop.point, audit)):
             stop.audited, stop.ahead = True, audit
@@ -362,9 +358,7 @@ class _Walk:
             return found
         return (yield from self._take(lambda: made))
 
-    def _fresh(
-        self, index: int, level: int, p: float, near: Sequence[Followed], effort: float
-    ) -> Taken:
+    def _fresh(self, index: int, level: int, p: float, near: Sequence[Followed], effort: float) -> Taken:
         make = partial(fresh, self.curve, self.route, index, level, p, near, effort)
         return (yield from self._take(make))
 
@@ -381,13 +375,7 @@ class _Walk:
         for index in reversed(range(len(self.branch))):
             if self.branch[index].point.converged:
                 continue
-            sides = [
-                s.point
-                for s in (
-                    *self.branch[index + 1 : index + 2],
-                    *self.branch[max(index - 1, 0) : index],
-                )
-            ]
+            sides = [s.point for s in (*self.branch[index + 1 : index + 2], *self.branch[max(index - 1, 0) : index])]
             near = [p for p in sides if p.converged]
             missing = self.branch[index].point
             effort = self._left(missing.p, missing.level)

@@ -109,9 +109,7 @@ def by_products(jac: StructuredJacobian) -> Held | None:
 
     rng = np.random.default_rng(0)
     first, second = rng.standard_normal((2, scale.size))
-    largest, _ = _largest(
-        lambda v: jac.matvec(v / scale) / scale, lambda v: jac.rmatvec(v / scale) / scale, first
-    )
+    largest, _ = _largest(lambda v: jac.matvec(v / scale) / scale, lambda v: jac.rmatvec(v / scale) / scale, first)
     try:
         inverse, small = _largest(partial(solve, jac.transposed), partial(solve, jac), second)
     except np.linalg.LinAlgError:

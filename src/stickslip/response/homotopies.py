@@ -73,9 +73,7 @@ class JoiningHarmonics:
         period = balance.forces(x, self.omega)
         joined = _weighted(period, 1.0 - (1.0 - p) * self.higher)
         at = balance.linearise(x, self.omega, joined)
-        return replace(
-            at, by_omega=balance.scaled_forces(self.higher[:, None] * period.coefficients)
-        )
+        return replace(at, by_omega=balance.scaled_forces(self.higher[:, None] * period.coefficients))
 
 
 def _weighted(period: ContactPeriod, share: FloatArray) -> ContactPeriod:

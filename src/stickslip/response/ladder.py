@@ -59,9 +59,7 @@ def without_branch(
             vibration_weights(balance),
             steps=steps_at_most(balance.size, effort),
         )
-    return first_converged(
-        newton(lambda x: balance.linearise(x, omega), start, options) for start in starts
-    )
+    return first_converged(newton(lambda x: balance.linearise(x, omega), start, options) for start in starts)
 
 
 def plain_sweep(
@@ -102,11 +100,7 @@ def at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
 
 
 def _starts(
-    system: System,
-    balance: AnyBalance,
-    options: Newton,
-    omega: float,
-    near: Sequence[FloatArray],
+    system: System, balance: AnyBalance, options: Newton, omega: float, near: Sequence[FloatArray]
 ) -> Iterator[FloatArray]:
     """Yield scaled unknowns to start Newton from."""
     yield from near

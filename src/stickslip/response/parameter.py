@@ -180,9 +180,7 @@ def branch_in_parameter(
         yield _parameter_point(family, omega, found.point)
 
 
-def system_at(
-    system: System, parameter: Parameter, value: float, balance: HarmonicBalance
-) -> System:
+def system_at(system: System, parameter: Parameter, value: float, balance: HarmonicBalance) -> System:
     """Return the system that a member of a family is the `balance` of."""
     changed = parameter(value)[0] if callable(parameter) else system
     return replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
@@ -192,6 +190,4 @@ def _parameter_point(family: BalanceAt, omega: float, point: Point) -> Parameter
     balance = family(point.p)
     motion = balance.linear.recover(omega, balance.coefficients(point.x))
     growing = bool(point.tangent[-1] > 0.0)
-    return ParameterPoint(
-        point.p, omega, motion, point.solution.status, point.solution.iterations, growing
-    )
+    return ParameterPoint(point.p, omega, motion, point.solution.status, point.solution.iterations, growing)

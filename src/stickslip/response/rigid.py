@@ -92,15 +92,11 @@ def rigid_response(
     """
     first, last = omega_range
     if not 0.0 < first <= last < np.inf:
-        raise input_error(
-            "omega_range", f"goes from {first:g} to {last:g} rad/s", "Give 0 < first <= last."
-        )
+        raise input_error("omega_range", f"goes from {first:g} to {last:g} rad/s", "Give 0 < first <= last.")
     how = discretisation or Discretisation()
     # where contacts stick throughout, their coordinates are zero and no measure of a step
     linear = system.condensed(load, how.order, system.outputs)
-    problem = dynamic_lagrangian(
-        linear, system.interface, how.order, how.samples, penalty, how.evaluator
-    )
+    problem = dynamic_lagrangian(linear, system.interface, how.order, how.samples, penalty, how.evaluator)
     for found in plain_sweep(system, problem, omega_range, points, how.newton):
         yield _rigid_point(problem, found.point)
 
@@ -108,6 +104,10 @@ def rigid_response(
 def _rigid_point(problem: DynamicLagrangian, point: Point) -> RigidPoint:
     at = problem.contacts(point.x, point.p)
     return RigidPoint(
-        point.p, problem.linear.recover(point.p, problem.coefficients(point.x)), at.force, at.state,
-        point.solution.status, point.solution.iterations,
-    )  # fmt: skip
+        point.p,
+        problem.linear.recover(point.p, problem.coefficients(point.x)),
+        at.force,
+        at.state,
+        point.solution.status,
+        point.solution.iterations,
+    )

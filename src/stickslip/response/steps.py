@@ -60,8 +60,7 @@ def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> 
     latest = Latest(curve.problem(level))
     patient = replace(following.newton, max_iterations=PATIENT)
     near = first_converged(
-        newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel())
-        for x in curve.starts(known, level)
+        newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel()) for x in curve.starts(known, level)
     )
     point = start_point(latest, near.x, p, following)
     solution = charged(point.solution, [near, point.solution])
@@ -78,13 +77,7 @@ def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
 
 
 def fresh(
-    curve: Curve,
-    route: Route,
-    index: int,
-    level: int,
-    p: float,
-    near: Sequence[Followed],
-    effort: float,
+    curve: Curve, route: Route, index: int, level: int, p: float, near: Sequence[Followed], effort: float
 ) -> Followed:
     """Solve where no branch leads, by all that may help with a share `effort` of the Newton steps of `steps_at_most`; 0: by the corrector alone."""
     solution = curve.fresh(level, p, near, effort)
@@ -154,9 +147,7 @@ def _length(weights: FloatArray, x: FloatArray) -> float:
     return float(np.linalg.norm(weights * x))
 
 
-def _made(
-    curve: Curve, kind: Kind, index: int, level: int, point: Point, latest: Latest
-) -> Followed:
+def _made(curve: Curve, kind: Kind, index: int, level: int, point: Point, latest: Latest) -> Followed:
     judged = Judged()
     if point.solution.status.converged and kind != "audit":
         judged = curve.judge(level, point, latest)

@@ -94,15 +94,9 @@ class System:
     def at(self, omega: float) -> "System":
         """Return the system as it is at a frequency in rad/s; another one only along an engine-order line, at the speed of the frequency."""
         side = self.structure
-        return (
-            replace(self, structure=side.at(side.speed(omega)))
-            if isinstance(side, SpeedLine)
-            else self
-        )
+        return replace(self, structure=side.at(side.speed(omega))) if isinstance(side, SpeedLine) else self
 
-    def condensed(
-        self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS
-    ) -> DynamicStiffness:
+    def condensed(self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS) -> DynamicStiffness:
         """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`; of a wheel that has them for all waves towards which these are judged."""
         side, retained = self.structure, np.union1d(self.retained, more)
         made = side.harmonics if isinstance(side, TunedWheel | SpeedLine) else None
@@ -151,11 +145,7 @@ def _dofs(name: str, given: IntArray, n: int) -> IntArray:
     """Return indices of dofs as an array, after checking that they are some."""
     index = np.asarray(given)
     if index.size and index.dtype.kind not in "iu":
-        raise input_error(
-            f"System.{name}",
-            f"holds {index.reshape(-1)[0]!r}, which is no index",
-            "Give whole numbers.",
-        )
+        raise input_error(f"System.{name}", f"holds {index.reshape(-1)[0]!r}, which is no index", "Give whole numbers.")
     outside = index[(index < 0) | (index >= n)]
     if outside.size:
         raise input_error(

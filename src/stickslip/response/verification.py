@@ -8,14 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.judging import (
-    SAMPLES_A_HARMONIC,
-    UNSEEN,
-    covers,
-    judging_balance,
-    judging_set,
-    judging_set_of,
-)
+from stickslip.harmonic.judging import SAMPLES_A_HARMONIC, UNSEEN, covers, judging_balance, judging_set, judging_set_of
 from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.model.blas_threads import by_one_thread
@@ -53,11 +46,7 @@ class SupportCheck:
 
 
 @by_one_thread
-def check_support(
-    problem: ForcedProblem,
-    points: Sequence[ForcedPoint],
-    factor: int = 2,
-) -> tuple[SupportCheck, ...]:
+def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor: int = 2) -> tuple[SupportCheck, ...]:
     """Predict at every solved point what all harmonics up to a multiple of the reference order, and those of its judging set, would change.
 
     Two Newton steps a point: two contact evaluations and two linear solutions. The first keeps the contact states of the point; the second asks the
@@ -128,9 +117,7 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     return found.error if known else max(found.error, UNSEEN)
 
 
-def _twice(
-    problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float
-) -> Alert:
+def _twice(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float) -> Alert:
     """Return what two Newton steps from a solution towards more harmonics say."""
     first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
     return asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
@@ -165,6 +152,12 @@ def _check(problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint
     alert = _twice(problem, own, enlarged, own.unknowns(point.coefficients), point.omega)
     dof = int(problem.measure.dofs[alert.worst])
     return SupportCheck(
-        point.omega, point.support, enlarged.harmonics, alert.error, alert.harmonic, dof,
-        problem.system.structure.dofs.labels[dof], alert.seconds_contact,
-    )  # fmt: skip
+        point.omega,
+        point.support,
+        enlarged.harmonics,
+        alert.error,
+        alert.harmonic,
+        dof,
+        problem.system.structure.dofs.labels[dof],
+        alert.seconds_contact,
+    )

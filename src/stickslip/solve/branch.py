@@ -105,11 +105,7 @@ class Following:
     corrector: Corrector = "newton"
 
     def __post_init__(self) -> None:
-        for name, choices in (
-            ("parametrisation", Parametrisation),
-            ("predictor", Predictor),
-            ("corrector", Corrector),
-        ):
+        for name, choices in (("parametrisation", Parametrisation), ("predictor", Predictor), ("corrector", Corrector)):
             check_choice(f"Following.{name}", getattr(self, name), get_args(choices))
 
 
@@ -195,11 +191,7 @@ def upward(size: int) -> FloatArray:
 
 
 def tangent_at(
-    problem: Problem,
-    y: FloatArray,
-    previous: FloatArray,
-    following: Following,
-    at: ParameterEvaluation | None = None,
+    problem: Problem, y: FloatArray, previous: FloatArray, following: Following, at: ParameterEvaluation | None = None
 ) -> tuple[FloatArray, float]:
     """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined.
 
@@ -221,9 +213,7 @@ def tangent_at(
         at = problem.linearise(y[:-1], float(y[-1]))
     row = measure.row(previous)
     linear = following.newton.linear
-    tangent, sign = linear.solve_bordered(
-        at.jac, at.jac_p, row[:-1], float(row[-1]), upward(y.size)
-    )
+    tangent, sign = linear.solve_bordered(at.jac, at.jac_p, row[:-1], float(row[-1]), upward(y.size))
     if tangent is None:
         return previous, 0.0
     return tangent / measure.of(tangent), sign

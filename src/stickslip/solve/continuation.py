@@ -71,11 +71,7 @@ def start_point(problem: Problem, x: FloatArray, p: float, following: Following)
 
 
 def trace(
-    problem: Problem,
-    start: Point,
-    end: float,
-    following: Following,
-    marks: Sequence[Mark] = (),
+    problem: Problem, start: Point, end: float, following: Following, marks: Sequence[Mark] = ()
 ) -> Iterator[Point]:
     """Follow a branch from `start`, in the direction of its tangent, until its parameter passes `end`.
 
@@ -147,9 +143,7 @@ def _with_cost(point: Point, spent: list[Solution], rung: Rung = Rung.FULL_STEPS
     return replace(point, solution=replace(solution, rung=max(solution.rung, rung)))
 
 
-def step_to(
-    problem: Problem, point: Point, p: float, following: Following, steps: int = STEPS_BETWEEN
-) -> Point:
+def step_to(problem: Problem, point: Point, p: float, following: Following, steps: int = STEPS_BETWEEN) -> Point:
     """Go from `point`, whose tangent shows growing p, to the value `p`: one predicted step, or the branch between.
 
     The branch is left after so many Newton `steps`, and where it leads away.

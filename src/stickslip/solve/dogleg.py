@@ -74,9 +74,7 @@ class Dogleg:
         self._radius = float(np.linalg.norm(path.newton))
         return beyond
 
-    def _within_region(
-        self, work: Work, now: Iterate, path: _Path, scale: FloatArray
-    ) -> Iterate | None:
+    def _within_region(self, work: Work, now: Iterate, path: _Path, scale: FloatArray) -> Iterate | None:
         """Return the first iterate that decreases the residual as predicted, in smaller and smaller regions."""
         radius, size = self._radius, float(np.linalg.norm(path.residual))
         for _ in range(TRIALS):

@@ -63,16 +63,12 @@ class BorderedElimination:
         out[n:, :n], out[n:, n:] = self._down[0].T, self.corner - self.rows @ inner
         return out
 
-    def reduced(
-        self, right: FloatArray, *, transposed: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+    def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return what is left of right sides, and what they make of the eliminated unknowns; see `Elimination`."""
         n = len(self.columns)
         rows = self.columns.T if transposed else self.rows
         left, inner = self.inside.reduced(right[:n], transposed=transposed)
-        return np.vstack([left, right[n:] - rows @ inner]), np.vstack(
-            [inner, np.zeros_like(right[n:])]
-        )
+        return np.vstack([left, right[n:] - rows @ inner]), np.vstack([inner, np.zeros_like(right[n:])])
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
         """Return all unknowns that those that are left make."""

@@ -40,9 +40,7 @@ def gmres(
     basis = np.empty((most + 1, right.size))
     basis[0] = right / size
     triangle = np.zeros((most, most))
-    turns = np.eye(
-        most + 1
-    )  # the product of all rotations that made the Hessenberg matrix a triangle
+    turns = np.eye(most + 1)  # the product of all rotations that made the Hessenberg matrix a triangle
     rest = np.zeros(most + 1)
     rest[0] = 1.0
     count = 0
@@ -59,14 +57,12 @@ def gmres(
         column[:-1] = turns[: count + 1, : count + 1] @ column[:-1]
         pivot = float(np.hypot(column[-2], column[-1])) or 1.0
         c, s = column[-2] / pivot, column[-1] / pivot
-        turns[count : count + 2] = c * turns[count] + s * turns[count + 1], c * turns[count + 1] - s * turns[count]  # fmt: skip
+        turns[count : count + 2] = c * turns[count] + s * turns[count + 1], c * turns[count + 1] - s * turns[count]
         rest[count], rest[count + 1] = c * rest[count], -s * rest[count]
         triangle[:count, count], triangle[count, count] = column[:-2], pivot
         count += 1
         if not length > np.finfo(float).eps * scale:
             break
         basis[count] = new / length
-    shares = scipy.linalg.solve_triangular(
-        triangle[:count, :count], rest[:count], check_finite=False
-    )
+    shares = scipy.linalg.solve_triangular(triangle[:count, :count], rest[:count], check_finite=False)
     return size * (shares @ basis[:count]), abs(float(rest[count]))

@@ -17,9 +17,7 @@ EPS = float(np.finfo(float).eps)
 LAST = 4.0  # digits that are changed, in units of the last
 PROBES = 6  # changes of the last digits that are tried
 ROUNDING = 2.0  # times the largest change they make, which is still rounding
-FAR = (
-    1e3  # times that change, which is not asked for again until the residual has fallen to a tenth
-)
+FAR = 1e3  # times that change, which is not asked for again until the residual has fallen to a tenth
 COARSEST = 1e-4  # residual that is not called rounding, whatever the last digits do
 
 
@@ -79,9 +77,7 @@ class Work:
         """
         if not now.norm <= COARSEST:
             return False
-        if now.norm > max(
-            0.1 * self.probed, FAR * self.noise
-        ):  # asked not long ago, and far from it
+        if now.norm > max(0.1 * self.probed, FAR * self.noise):  # asked not long ago, and far from it
             return False
         self.probed = now.norm
         digits = np.random.default_rng(0)

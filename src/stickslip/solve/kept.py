@@ -43,9 +43,7 @@ class KeptFactors:
         The last factors where corrections by them ended at a solution; None before, and where a new Jacobian is asked for.
     """
 
-    def __init__(
-        self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None
-    ) -> None:
+    def __init__(self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None) -> None:
         self.inverse: Signed | None = None
         self._known = known
         self._tolerance = tolerance

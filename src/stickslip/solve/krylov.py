@@ -17,24 +17,14 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.operators import Bordered, Corner, Jacobian, array_of, times
 from stickslip.solve.gmres import gmres
-from stickslip.solve.linear import (
-    MOST,
-    Assembled,
-    Dense,
-    LinearSolver,
-)
+from stickslip.solve.linear import MOST, Assembled, Dense, LinearSolver
 from stickslip.solve.preconditioned import Preconditioned, is_either, is_graded, is_preconditioned
 
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
 YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
-GAIN = (
-    0.1  # share of the residual of a bordered system above which another correction does not help
-)
+GAIN = 0.1  # share of the residual of a bordered system above which another correction does not help
 CREDIT = 4.0  # arrays that systems which were cheap by products pay for
-PAUSES = (
-    4,
-    64,
-)  # systems that are factorised before products are tried again: the first time, and at most
+PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first time, and at most
 LEAST = 8  # products that are tried
 COARSE = 1e-4  # tolerance above which rounding is no part of what is left
 ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
@@ -96,9 +86,7 @@ class Krylov:
     max_products: int = 100
     lenient: bool = True
     counts: KrylovCounts = field(default_factory=KrylovCounts)
-    memory: "WeakKeyDictionary[object, _Kept]" = field(
-        default_factory=WeakKeyDictionary, repr=False
-    )
+    memory: "WeakKeyDictionary[object, _Kept]" = field(default_factory=WeakKeyDictionary, repr=False)
 
     def __post_init__(self) -> None:
         check_choice("Krylov.method", self.method, ("gmres", "bicgstab"))
@@ -147,9 +135,7 @@ class Krylov:
         self.counts.failures += 1
         return None
 
-    def _refined(
-        self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float
-    ) -> tuple[FloatArray, float]:
+    def _refined(self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
         """Return a solution and its relative residual, which is `tolerance` where that was reached.
 
         A preconditioner in single precision is linear to that precision only, and inside a border a matrix may be singular, and its
@@ -173,9 +159,7 @@ class Krylov:
             best = left
             solution = solution + self._iterate(jac, kept, rest, tolerance / left)[0]
 
-    def _iterate(
-        self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float
-    ) -> tuple[FloatArray, float]:
+    def _iterate(self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
         """Return a solution and the relative residual that the iteration left, `tolerance` where that was reached."""
         system = _system(jac, kept.preconditioner)
 
@@ -186,12 +170,8 @@ class Krylov:
         if self.method == "gmres":
             y, left = gmres(product, right, tolerance, self.max_products)
             return system.precondition(y), left
-        operator = scipy.sparse.linalg.LinearOperator(
-            (right.size, right.size), matvec=product, dtype=float
-        )
-        y, failed = scipy.sparse.linalg.bicgstab(
-            operator, right, rtol=tolerance, maxiter=self.max_products // 2
-        )
+        operator = scipy.sparse.linalg.LinearOperator((right.size, right.size), matvec=product, dtype=float)
+        y, failed = scipy.sparse.linalg.bicgstab(operator, right, rtol=tolerance, maxiter=self.max_products // 2)
         left = tolerance
         if failed:
             left = float(np.linalg.norm(right - system.product(y)) / np.linalg.norm(right))
@@ -298,9 +278,7 @@ class Automatic:
 
     dense: LinearSolver = Dense()  # noqa: RUF009  # frozen
     krylov: Krylov = field(default_factory=Krylov)
-    accounts: "WeakKeyDictionary[object, dict[float, _Account]]" = field(
-        default_factory=WeakKeyDictionary, repr=False
-    )
+    accounts: "WeakKeyDictionary[object, dict[float, _Account]]" = field(default_factory=WeakKeyDictionary, repr=False)
 
     def __reduce__(self) -> tuple["partial[Automatic]", tuple[()]]:
         """Pickle the solvers alone: what was seen belongs to the problems of one process."""
@@ -327,9 +305,7 @@ class Automatic:
         inside = jac.flat.jac if isinstance(jac, Bordered) else jac
         if not is_either(inside):
             return by(self.krylov, jac)
-        account = self.accounts.setdefault(inside.problem, {}).setdefault(
-            self.krylov.tolerance, _Account()
-        )
+        account = self.accounts.setdefault(inside.problem, {}).setdefault(self.krylov.tolerance, _Account())
         costs, within = inside.costs, inside.shape[0] <= MOST
         if account.arrays > 0 or not costs.products_pay:
             account.arrays = max(account.arrays - 1, 0)

@@ -77,9 +77,7 @@ class LevenbergMarquardt:
         return trial
 
 
-def damped_step(
-    jac: Jacobian, right: FloatArray, scale: FloatArray, damping: float
-) -> FloatArray | None:
+def damped_step(jac: Jacobian, right: FloatArray, scale: FloatArray, damping: float) -> FloatArray | None:
     """Minimise ``|jac s - right|² + damping |scale s|²``.
 
     Parameters

@@ -44,9 +44,7 @@ class _LostError(Exception):
         self.solution = solution
 
 
-def located(
-    problem: Problem, before: Point, after: Point, mark: Mark, following: Following
-) -> Point:
+def located(problem: Problem, before: Point, after: Point, mark: Mark, following: Following) -> Point:
     """Locate a mark between two neighbouring points of a branch.
 
     The branch between them is solved on planes normal to the chord. It meets all of these, whatever corners it has; where the function
@@ -90,12 +88,7 @@ def located(
 
 
 def _narrowed(
-    problem: Problem,
-    before: Point,
-    after: Point,
-    mark: Mark,
-    following: Following,
-    spent: list[Solution],
+    problem: Problem, before: Point, after: Point, mark: Mark, following: Following, spent: list[Solution]
 ) -> tuple[Point, Point, Point]:
     """Look for the mark on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
     known = {0.0: before, 1.0: after}
@@ -156,9 +149,7 @@ def with_tangent(problem: Problem, point: Point, following: Following) -> Point:
     return replace(point, tangent=tangent, orientation=sign)
 
 
-def between(
-    problem: Problem, before: Point, after: Point, marks: Sequence[Mark], following: Following
-) -> list[Point]:
+def between(problem: Problem, before: Point, after: Point, marks: Sequence[Mark], following: Following) -> list[Point]:
     """Return the marks between two neighbouring points of a branch, located, in the order of travel.
 
     A function that changes its sign twice between two points leaves no trace and no mark: take shorter steps.

@@ -60,11 +60,7 @@ class Newton:
             )
         most: Any = self.max_iterations
         if not isinstance(most, int | np.integer) or most < 1:
-            raise input_error(
-                "Newton.max_iterations",
-                f"must be an integer from 1 on, got {most!r}",
-                "25 is usual.",
-            )
+            raise input_error("Newton.max_iterations", f"must be an integer from 1 on, got {most!r}", "25 is usual.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,7 @@ SMALL = 60  # with so many unknowns; with more in proportion,
 MOST_TIMES = 5.0  # up to so many times as many
 PATIENCE = 15  # iterations of a corrector that has no neighbour to start from
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
-ITERATIONS = (
-    6  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
-)
+ITERATIONS = 6  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
 ROUGH = 1e-5  # scaled residual along a homotopy, whose points are no solutions of anything wanted
 ROOTLESS = 200  # points of the homotopy that needs no physics and may lead nowhere
 DIFFERENCE = 1e-6  # change of s for the derivative of a family by s
@@ -207,22 +205,14 @@ class _Relaxed:
         return _At(at.residual - (1.0 - p) * self.start, at.jac, self.start, at.seconds_contact)
 
 
-def _followed(
-    homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: FloatArray, steps: int
-) -> Solution:
+def _followed(homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: FloatArray, steps: int) -> Solution:
     """Follow a homotopy roughly to the end of its last leg, and solve there, within so many Newton steps."""
     rough = replace(
-        options,
-        max_iterations=min(options.max_iterations, ITERATIONS),
-        tolerance=max(options.tolerance, ROUGH),
+        options, max_iterations=min(options.max_iterations, ITERATIONS), tolerance=max(options.tolerance, ROUGH)
     )
     control = replace(STEPS, max_points=homotopy.max_points)
     following = Following(
-        newton=rough,
-        control=control,
-        weights=weights,
-        predictor="parabola",
-        corrector="kept_factors",
+        newton=rough, control=control, weights=weights, predictor="parabola", corrector="kept_factors"
     )
     spent: list[Solution] = []
     x, begins = homotopy.start, homotopy.begins
@@ -246,11 +236,7 @@ def _followed(
 
 
 def _begun(
-    leg: Problem,
-    x: FloatArray,
-    begins: tuple[float, ...],
-    following: Following,
-    spent: list[Solution],
+    leg: Problem, x: FloatArray, begins: tuple[float, ...], following: Following, spent: list[Solution]
 ) -> Point:
     """Return the first point of a leg, or the last attempt at one."""
     for begin in begins:
@@ -262,12 +248,7 @@ def _begun(
 
 
 def _to_the_end(
-    leg: Problem,
-    start: Point,
-    least: float,
-    following: Following,
-    spent: list[Solution],
-    steps: int,
+    leg: Problem, start: Point, least: float, following: Following, spent: list[Solution], steps: int
 ) -> Point:
     """Follow a leg from `start` until p = 1, p < `least`, no step converges, or so many Newton `steps` are spent."""
     point = start

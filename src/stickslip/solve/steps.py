@@ -25,21 +25,14 @@ from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
-SHARP_TURN = (
-    0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
-)
+SHARP_TURN = 0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
 STRAIGHT = 0.97  # cosine above which a branch hardly turns
 EASY = 1  # Newton step
 CLOSE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
 ASIDE = 0.3  # of a step: a parabola that leaves the tangent by more is none of the branch
 PATIENT = 8.0  # smallest steps below which no factors are kept
-LOOKS_AHEAD = (
-    1.0,
-    4.0,
-    16.0,
-    64.0,
-)  # smallest steps at which the far side of a corner is looked for
+LOOKS_AHEAD = (1.0, 4.0, 16.0, 64.0)  # smallest steps at which the far side of a corner is looked for
 NEAR = 2.0  # lengths of a step by which its end may be away: farther, it lies on another piece of the branch
 LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
 ROUND = 300  # Newton steps for the far side of a corner, after which none is looked for
@@ -71,9 +64,7 @@ def across(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _A
     return _Across(at, row, np.append(at.residual, row @ y - value))
 
 
-def take_step(
-    problem: Problem, point: Point, unit: FloatArray, step: float, end: float, following: Following
-) -> Point:
+def take_step(problem: Problem, point: Point, unit: FloatArray, step: float, end: float, following: Following) -> Point:
     """Predict along `unit` and correct; the point says whether that worked.
 
     Parameters
@@ -143,9 +134,7 @@ def _by_factors(
     return (tangent, inverse.sign) if straight else None
 
 
-def _bend(
-    y: FloatArray, before: FloatArray, tangent: FloatArray, following: Following
-) -> FloatArray | None:
+def _bend(y: FloatArray, before: FloatArray, tangent: FloatArray, following: Following) -> FloatArray | None:
     """Return what a parabola through two points, with the tangent of the first of them, has beside that tangent."""
     if following.predictor != "parabola":
         return None
@@ -196,9 +185,7 @@ def _direction(
     return tangent, sign
 
 
-def round_corner(
-    problem: Problem, point: Point, unit: FloatArray, end: float, following: Following
-) -> Point:
+def round_corner(problem: Problem, point: Point, unit: FloatArray, end: float, following: Following) -> Point:
     """Leave a corner of more than a right angle along its far side.
 
     No plane across the old tangent meets that side. Its tangent is that of the Jacobian just beyond the corner, oriented as the path

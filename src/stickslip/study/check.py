@@ -59,9 +59,7 @@ def _free(model: Model) -> list[str]:
     """Say which parts nothing holds, though all contacts stick; an analysis that cannot do with that refuses it by itself."""
     if model.stages is not None:
         return []
-    return [
-        f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))
-    ]
+    return [f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))]
 
 
 def _size(model: Model) -> str:
@@ -73,6 +71,5 @@ def _size(model: Model) -> str:
     mass = f"mass {facts.mass:.6g} kg, " if math.isfinite(facts.mass) else ""
     elements = f"{facts.elements} elements, " if facts.elements else ""
     return (
-        f"{wheel}{facts.nodes} nodes, {elements}{facts.dofs} free dofs, {mass}"
-        f"{len(model.pairs.names)} contact points"
+        f"{wheel}{facts.nodes} nodes, {elements}{facts.dofs} free dofs, {mass}{len(model.pairs.names)} contact points"
     )

@@ -54,7 +54,7 @@ def estimates(fit: LoopFit) -> list[str]:
     both = float(fit.covariance[0, 1]) / (off["k_t"] * off["limit"])
     if math.isfinite(both):
         rows["correlation"] = f"{both:.2f} of stiffness and limit force"
-    rows["residual"] = f"{fit.residual:.3g} N, {100 * fit.residual / swing:.2g} % of the force's range"  # fmt: skip
+    rows["residual"] = f"{fit.residual:.3g} N, {100 * fit.residual / swing:.2g} % of the force's range"
     return [f"{name:<{WIDTH}}{value}" for name, value in rows.items()]
 
 
@@ -62,7 +62,7 @@ def study_lines(fit: LoopFit) -> list[str]:
     """Return the lines for the table of a contact in a study file."""
     head = ['per = "interface"   # the whole contact that was measured']
     limit = {True: "friction_coefficient", False: "slip_limit_n"}[fit.normal_load is not None]
-    value, off = (fit.mu, fit.deviations["mu"]) if fit.normal_load else (fit.limit, fit.deviations["limit"])  # fmt: skip
+    value, off = (fit.mu, fit.deviations["mu"]) if fit.normal_load else (fit.limit, fit.deviations["limit"])
     stiffness = _line("tangential_stiffness_n_per_m", fit.k_t, fit.deviations["k_t"])
     own = [stiffness, _line(limit, value, off)]
     if fit.normal_load is None:

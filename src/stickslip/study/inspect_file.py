@@ -15,9 +15,12 @@ from stickslip.study.keep.progress import LOG
 WIDTH = 26  # of the column of names
 # what the arguments of readers are called here
 _OPTIONS = {
-    "mesh": "--mesh", "mass": "part.NAME.mass in a study", "nodes": "part.NAME.nodes in a study", "ignore": "",
+    "mesh": "--mesh",
+    "mass": "part.NAME.mass in a study",
+    "nodes": "part.NAME.nodes in a study",
+    "ignore": "",
     "use": "Read it in Python, keep it with save_structure (.npz) and give that: use",
-}  # fmt: skip
+}
 
 
 def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[str]:

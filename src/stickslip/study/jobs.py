@@ -15,29 +15,13 @@ import numpy as np
 
 from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analyses.analysis import Analysis, Job
-from stickslip.study.keep.attempts import (
-    begin,
-    clear,
-    file_at_work,
-    left_behind,
-    new_owner,
-    reached,
-)
+from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behind, new_owner, reached
 from stickslip.study.keep.cell import Limits, blas_threads
 from stickslip.study.keep.folder import token_file
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.keep.progress import LOG, at_work
 from stickslip.study.keep.provenance import library_versions
-from stickslip.study.keep.watch import (
-    ASIDE,
-    UNKNOWN,
-    Answer,
-    Parcel,
-    set_aside,
-    solve_far,
-    unknown,
-    watched,
-)
+from stickslip.study.keep.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched
 from stickslip.study.keep.workers import Hands
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
 
@@ -194,13 +178,14 @@ def _ended(future: Future[Any], order: Order, lost: dict[Path, Loss], *, far: bo
         loss = lost.setdefault(order.sealed, Loss())
         loss.count(left_behind(order.sealed))
         if loss.begun < LOST and loss.early < EARLY:
-            LOG.info(
-                f"{label}: its worker was lost ({type(error).__name__}); it is given to another"
-            )
+            LOG.info(f"{label}: its worker was lost ({type(error).__name__}); it is given to another")
             return False
         own = order.packed(new_owner())
         begin(own.sealed, own.file, order.analysis.record)
-        set_aside(own, f"{loss.begun + loss.early} workers were lost with it at the same place ({type(error).__name__}: {error})")  # fmt: skip
+        set_aside(
+            own,
+            f"{loss.begun + loss.early} workers were lost with it at the same place ({type(error).__name__}: {error})",
+        )
         return True
     for line in answer.lines:
         LOG.handle(logging.makeLogRecord(line))

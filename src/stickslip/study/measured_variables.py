@@ -16,11 +16,15 @@ def with_measured(data: xr.Dataset, found: MeasuredPeaks | None) -> xr.Dataset:
         return data
     variables: dict[str, Any] = {
         "measured_value": variable(DIM, found.values, "1", f"value of {found.key} in the test"),
-        "measured_others": variable(DIM, list(found.others), "1", "values of other varied keys in the test; empty where not told"),
-        "measured_excitation_n": variable(DIM, found.excitation, "N", "amplitude of the force that measured amplitudes belong to"),
+        "measured_others": variable(
+            DIM, list(found.others), "1", "values of other varied keys in the test; empty where not told"
+        ),
+        "measured_excitation_n": variable(
+            DIM, found.excitation, "N", "amplitude of the force that measured amplitudes belong to"
+        ),
         **_of("measured_amplitude", found.amplitude, "peak amplitude"),
         **_of("measured_frequency_hz", found.frequency, "peak frequency"),
-    }  # fmt: skip
+    }
     own = {"measured_key": found.key, "measured_file": found.file, "measured_source": found.source}
     return data.assign(variables).assign_attrs(own)
 

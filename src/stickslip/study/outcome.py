@@ -169,12 +169,8 @@ class Book:
             self._tell(stored(self.nodes[name].attrs))
         return Outcome(
             tree=tree,
-            summaries={
-                a.name: a.summary(self.nodes[a.name]) for a in asked if a.name in self.nodes
-            },
-            failed=sum(
-                int(self.nodes[a.name].attrs["failed"]) for a in asked if a.name in self.nodes
-            )
+            summaries={a.name: a.summary(self.nodes[a.name]) for a in asked if a.name in self.nodes},
+            failed=sum(int(self.nodes[a.name].attrs["failed"]) for a in asked if a.name in self.nodes)
             + sum(map(len, self.aside.values())),
             files=(),
         )
@@ -194,9 +190,7 @@ def _unsolved(solved: Solved, note: str) -> Verdict:
 
 def case_variables(cases: Sequence[Case]) -> dict[str, Any]:
     """Return the label of each case, and the values of the varied keys if there are any."""
-    found: dict[str, Any] = {
-        "case_label": variable("case", [c.label for c in cases], "1", "what is varied")
-    }
+    found: dict[str, Any] = {"case_label": variable("case", [c.label for c in cases], "1", "what is varied")}
     keys = list(cases[0].values)
     if keys:
         rows = [[case.values[key] for key in keys] for case in cases]

@@ -63,9 +63,7 @@ class Place:
     def check(self, *, fresh: bool) -> None:
         """Refuse what cannot be, before anything is computed."""
         if self.workers < 1:
-            raise input_error(
-                "--workers", f"must be above zero, got {self.workers}", "Leave it out for one."
-            )
+            raise input_error("--workers", f"must be above zero, got {self.workers}", "Leave it out for one.")
         if isinstance(self.kind, str):
             check_kind(self.kind)
         if self.shard is not None and fresh:
@@ -135,13 +133,9 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
     """
     for name in only:
         if name not in ANALYSES:
-            raise input_error(
-                f"--only {name}", "is no analysis", did_you_mean(name, list(ANALYSES))
-            )
+            raise input_error(f"--only {name}", "is no analysis", did_you_mean(name, list(ANALYSES)))
         if name not in study.asked:
-            raise input_error(
-                f"{study.path}: {name}", "is missing", f"Add the table [{name}] to the study."
-            )
+            raise input_error(f"{study.path}: {name}", "is missing", f"Add the table [{name}] to the study.")
     wanted = [name for name in ANALYSES if name in (only or study.asked)]
     if not wanted:
         raise input_error(
@@ -152,9 +146,7 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
     return [named(name) for name in wanted]
 
 
-def answer(
-    asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None
-) -> Outcome:
+def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None) -> Outcome:
     """Answer one question to models of Python, for whose page is `given` what a study file would have of them; nothing is written."""
     book = Book(Provenance(title, "", library_versions(), json.dumps(given or {}, default=str)))
     found = []
@@ -167,12 +159,8 @@ def answer(
     return book.outcome([asked])
 
 
-def _run(
-    study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]
-) -> Outcome:
-    origin = Provenance(
-        study.title, study.text, library_versions(), study_file=as_text(study.path.name)
-    )
+def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]) -> Outcome:
+    origin = Provenance(study.title, study.text, library_versions(), study_file=as_text(study.path.name))
     book = Book(origin, measured=study.measured)
     store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
@@ -181,9 +169,7 @@ def _run(
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
     to_do = _longest_first([t for t in unfinished.values() if t.analysis in asked])
     if place.shard is not None:
-        own = place.shard.own(
-            _longest_first({t.sealed: t for t in tasks if t.analysis in asked}.values())
-        )
+        own = place.shard.own(_longest_first({t.sealed: t for t in tasks if t.analysis in asked}.values()))
         to_do = [t for t in to_do if t.sealed in {o.sealed for o in own}]
     LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
     files: list[Path] = []
@@ -222,11 +208,7 @@ def _run(
 
 def _refuse_result_of_another(study: Study) -> None:
     """Refuse to replace the result of a study file of another name, unless that one was renamed or removed."""
-    target, home, name = (
-        study.folder / RESULT,
-        study.path.resolve().parent,
-        as_text(study.path.name),
-    )
+    target, home, name = (study.folder / RESULT, study.path.resolve().parent, as_text(study.path.name))
     other = str(attributes_there(target).get("study_file", name))
     if other == name:
         return
@@ -285,11 +267,7 @@ def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]
 
 
 def _tasks(
-    study: Study,
-    asked: Sequence[Analysis],
-    cases: Sequence[Case],
-    checks: frozenset[str],
-    versions: Mapping[str, str],
+    study: Study, asked: Sequence[Analysis], cases: Sequence[Case], checks: frozenset[str], versions: Mapping[str, str]
 ) -> list[Task]:
     """Return every case of every analysis of the study; only those asked for are to have the checks."""
     found = []

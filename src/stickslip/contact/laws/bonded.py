@@ -9,11 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import (
-    axial_stiffness,
-    normal_stiffness,
-    tangential_stiffness,
-)
+from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, tangential_stiffness
 from stickslip.units import check_quantities
 
 
@@ -45,9 +41,7 @@ class Bonded:
 
     def parameters(self) -> FloatArray:
         """Return the (7,) row of an elementary contact whose friction limit is infinite."""
-        return element(
-            k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=np.inf, unilateral=False
-        )
+        return element(k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=np.inf, unilateral=False)
 
     def elements(self) -> FloatArray:
         """Return the (1, 7) rows of elementary contacts that the law is the sum of."""

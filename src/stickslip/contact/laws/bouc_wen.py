@@ -8,11 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS, kernel_in
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import (
-    axial_stiffness,
-    normal_stiffness,
-    tangential_stiffness,
-)
+from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, tangential_stiffness
 from stickslip.errors import input_error
 from stickslip.units import check_quantities, quantity
 
@@ -51,9 +47,7 @@ class BoucWen:
     k_t: float = tangential_stiffness()
     beta: float = quantity("shape of the loop β, m to the power of minus the exponent", above=0)
     gamma: float = quantity("shape of the loop γ, above -β and at most β")
-    alpha: float = quantity(
-        "share of the stiffness left at the largest force", default=0.0, least=0, most=1
-    )
+    alpha: float = quantity("share of the stiffness left at the largest force", default=0.0, least=0, most=1)
     a: float = quantity("slope of the hysteretic part at zero force", default=1.0, above=0)
     exponent: float = quantity("sharpness of the knee", default=1.0, least=1, most=20)
     k_w: float = axial_stiffness(default=0.0)

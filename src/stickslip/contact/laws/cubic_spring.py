@@ -9,11 +9,7 @@ from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.polynomial_spring import polynomial_step
-from stickslip.contact.laws.quantities import (
-    axial_stiffness,
-    normal_stiffness,
-    tangential_stiffness,
-)
+from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, tangential_stiffness
 from stickslip.units import check_quantities, quantity
 
 
@@ -83,7 +79,6 @@ class CubicSpring:
     def restores(self) -> BoolArray:
         """Return the (3,) directions t, w, n along which the force opposes every large displacement."""
         linear, cubic = (
-            np.array(v)
-            for v in ((self.k_t, self.k_w, self.k_n), (self.cubic_t, self.cubic_w, self.cubic_n))
+            np.array(v) for v in ((self.k_t, self.k_w, self.k_n), (self.cubic_t, self.cubic_w, self.cubic_n))
         )
         return np.asarray((cubic > 0.0) | ((cubic == 0.0) & (linear > 0.0)))

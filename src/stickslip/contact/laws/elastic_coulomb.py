@@ -79,9 +79,13 @@ class ElasticCoulomb:
     def parameters(self) -> FloatArray:
         """Return the (7,) row of the elementary contact."""
         return element(
-            k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=self.mu, preload=self.preload,
+            k_t=self.k_t,
+            k_w=self.k_w,
+            k_n=self.k_n,
+            mu=self.mu,
+            preload=self.preload,
             residual_traction=self.residual_traction,
-        )  # fmt: skip
+        )
 
     def elements(self) -> FloatArray:
         """Return the (1, 7) rows of elementary contacts that the law is the sum of."""

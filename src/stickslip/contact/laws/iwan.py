@@ -10,12 +10,7 @@ from stickslip.contact.element import ROUND_OFF, element
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.contact.laws.iwan_populations import Population, UniformBand
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import (
-    axial_stiffness,
-    normal_stiffness,
-    slip_limit,
-    tangential_stiffness,
-)
+from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, slip_limit, tangential_stiffness
 from stickslip.units import check_quantities
 
 
@@ -104,11 +99,15 @@ class Iwan:
         shares = self.population.sliders()[0]
         rows = [
             element(
-                k_t=self.k_t * k, k_w=self.k_w * k, k_n=self.k_n if i == 0 else 0.0, mu=1.0, preload=limit,
+                k_t=self.k_t * k,
+                k_w=self.k_w * k,
+                k_n=self.k_n if i == 0 else 0.0,
+                mu=1.0,
+                preload=limit,
                 unilateral=False,
             )
             for i, (k, limit) in enumerate(zip(shares, self._limits(), strict=True))
-        ]  # fmt: skip
+        ]
         return np.array(rows)
 
     def initial_state(self) -> FloatArray:

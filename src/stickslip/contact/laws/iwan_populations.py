@@ -42,12 +42,8 @@ class UniformBand:
     """
 
     n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
-    half_width: float = quantity(
-        "half of the band over the mean distance", default=1.0, above=0, most=1
-    )
-    elastic_share: float = quantity(
-        "share of the stiffness that never slips", default=0.0, least=0, below=1
-    )
+    half_width: float = quantity("half of the band over the mean distance", default=1.0, above=0, most=1)
+    elastic_share: float = quantity("share of the stiffness that never slips", default=0.0, least=0, below=1)
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -131,9 +127,7 @@ class FirstLoading:
                 "Give two corners or more, with finite numbers.",
             )
         if np.any(np.diff([0.0, *x]) <= 0.0):
-            raise input_error(
-                "FirstLoading.displacement", f"must rise from above zero, got {x}", "Sort it."
-            )
+            raise input_error("FirstLoading.displacement", f"must rise from above zero, got {x}", "Sort it.")
         slopes = self._slopes()
         if slopes[-1] < 0.0 or np.any(np.diff(slopes) >= 0.0):
             raise input_error(

@@ -69,9 +69,7 @@ class PolynomialSpring:
         check_quantities(self)
         if not any(c for c in (*self.along_t, *self.along_w, *self.along_n)):
             raise input_error(
-                "PolynomialSpring",
-                "all coefficients are zero",
-                "Give at least one, or remove the contact.",
+                "PolynomialSpring", "all coefficients are zero", "Give at least one, or remove the contact."
             )
 
     def parameters(self) -> FloatArray:

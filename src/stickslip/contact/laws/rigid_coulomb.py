@@ -60,9 +60,12 @@ class RigidCoulomb:
         if self.preload is not None:
             return Jenkins(k_t=stiffness, k_w=stiffness, limit=self.mu * self.preload)
         return ElasticCoulomb(
-            k_t=stiffness if self.mu > 0.0 else 0.0, k_w=stiffness if self.mu > 0.0 else 0.0,
-            k_n=stiffness, mu=self.mu, preload=-stiffness * self.initial_gap,
-        )  # fmt: skip
+            k_t=stiffness if self.mu > 0.0 else 0.0,
+            k_w=stiffness if self.mu > 0.0 else 0.0,
+            k_n=stiffness,
+            mu=self.mu,
+            preload=-stiffness * self.initial_gap,
+        )
 
     def parameters(self) -> NoReturn:
         """Refuse: there is no force to compute from a gap."""

@@ -10,26 +10,8 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP, STICK
-from stickslip.contact.planar.motion import (
-    AT_LIMIT,
-    TINY,
-    Motion,
-    accelerations,
-    fill_stages,
-    place,
-    rates,
-)
-from stickslip.contact.planar.radau import (
-    CROWDED,
-    EVEN,
-    HIGHEST,
-    INNER,
-    NEARLY,
-    NODES,
-    PART,
-    POWER,
-    STAGES,
-)
+from stickslip.contact.planar.motion import AT_LIMIT, TINY, Motion, accelerations, fill_stages, place, rates
+from stickslip.contact.planar.radau import CROWDED, EVEN, HIGHEST, INNER, NEARLY, NODES, PART, POWER, STAGES
 from stickslip.contact.planar.slip import (
     Piece,
     collocate,
@@ -45,15 +27,9 @@ from stickslip.contact.planar.slip import (
 )
 from stickslip.contact.planar.stick import never_reached, slip_begins
 
-STARTED, CLOSED, FOLLOWED = (
-    0,
-    1,
-    2,
-)  # how a segment begins: with the period, with the contact, after another segment
+STARTED, CLOSED, FOLLOWED = (0, 1, 2)  # how a segment begins: with the period, with the contact, after another segment
 MODE, ANGLE, Z_X, Z_Y = range(4)  # of a state
-START, END, STATE, PLACE_X, PLACE_Y, DIRECTION, FIRST, COUNT, ORIGIN = range(
-    9
-)  # columns of segments
+START, END, STATE, PLACE_X, PLACE_Y, DIRECTION, FIRST, COUNT, ORIGIN = range(9)  # columns of segments
 # columns of pieces; θ at start and stages fill the rest
 PIECE_START, PIECE_WIDTH, PIECE_KIND, PIECE_ANGLE = range(4)
 
@@ -90,9 +66,15 @@ def course_room(m):  # type: ignore[no-untyped-def]
     """
     order = (m - 1) // 2
     return Course(
-        Motion(np.empty((6, m)), np.empty(8)), piece_room(), np.zeros(4), np.zeros(4), np.zeros((2, 2)), np.empty((64 + 32 * order, 9)),
-        np.empty((256 + 96 * order, STAGES + 4)), np.zeros(4, np.int64),
-    )  # fmt: skip
+        Motion(np.empty((6, m)), np.empty(8)),
+        piece_room(),
+        np.zeros(4),
+        np.zeros(4),
+        np.zeros((2, 2)),
+        np.empty((64 + 32 * order, 9)),
+        np.empty((256 + 96 * order, STAGES + 4)),
+        np.zeros(4, np.int64),
+    )
 
 
 @njit(**INNER)
@@ -230,7 +212,7 @@ def _cut(course, tau, width, kind, share):  # type: ignore[no-untyped-def]
     fill_stages(course.motion, tau, short, even, piece.at)
     for j in range(1, STAGES + 1):
         c = part * NODES[j]
-        piece.angle[j] = interpolated(whole, c if kind == EVEN else (1.0 - (1.0 - c) ** (1.0 / POWER)) / NEARLY)  # fmt: skip
+        piece.angle[j] = interpolated(whole, c if kind == EVEN else (1.0 - (1.0 - c) ** (1.0 / POWER)) / NEARLY)
     collocate(piece)
     return short
 

@@ -9,26 +9,13 @@ import numpy as np
 
 from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP
-from stickslip.contact.planar.course import (
-    ANGLE,
-    CLOSED,
-    COUNT,
-    MODE,
-    STARTED,
-    STATE,
-    Z_X,
-    Z_Y,
-    begin_at,
-    begin_closed,
-)
+from stickslip.contact.planar.course import ANGLE, CLOSED, COUNT, MODE, STARTED, STATE, Z_X, Z_Y, begin_at, begin_closed
 from stickslip.contact.planar.motion import TINY, X, Y, place
 from stickslip.contact.planar.radau import INNER, PART
 from stickslip.contact.slider import PERIOD
 
 MAX_PERIODS = 400
-_ROUNDING = (
-    1e-13  # change over a period that counts as none, as a share of the smaller of limit and motion
-)
+_ROUNDING = 1e-13  # change over a period that counts as none, as a share of the smaller of limit and motion
 _ROUND_OFF = 1e-15  # of the displacement
 _NEAR = 1e-7  # distance from the periodic state that the derivatives by the start bridge, in the same measure
 _NOTHING = 1e-13  # share of the largest limit at which a contact counts as just closing
@@ -86,12 +73,7 @@ def forgets(memory):  # type: ignore[no-untyped-def]
     if not np.isfinite(size):
         return inverse, False
     if abs(det) > _KEPT * max(size, 1.0):
-        inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1] = (
-            d / det,
-            -b / det,
-            -c / det,
-            a / det,
-        )
+        inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1] = (d / det, -b / det, -c / det, a / det)
         return inverse, True
     matrix = np.array([[a, b], [c, d]])
     left, sizes, right = np.linalg.svd(matrix)

@@ -125,10 +125,5 @@ def fill_stages(motion, start, width, kind, at):  # type: ignore[no-untyped-def]
             limit += waves[L, 2 * h - 1] * c + waves[L, 2 * h] * s
             rate += waves[L_RATE, 2 * h - 1] * c + waves[L_RATE, 2 * h] * s
         limit = max(limit, 0.0)
-        at[AT_X_RATE, j], at[AT_Y_RATE, j], at[AT_LIMIT, j], at[AT_LIMIT_RATE, j] = (
-            x,
-            y,
-            limit,
-            rate,
-        )
+        at[AT_X_RATE, j], at[AT_Y_RATE, j], at[AT_LIMIT, j], at[AT_LIMIT_RATE, j] = (x, y, limit, rate)
         at[SHARE, j] = limit / (width * PACE[kind, j + 1])

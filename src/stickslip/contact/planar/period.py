@@ -98,7 +98,7 @@ def _assemble(motion, k, rows, correction, start_rows, work, coefficients, block
                 out = blocks[_BLOCKS[a, b], p]
                 for j in range(m):
                     column = b * m + j
-                    out[j] += sums[first + column] + u * start_rows[0, column] + v * start_rows[1, column]  # fmt: skip
+                    out[j] += sums[first + column] + u * start_rows[0, column] + v * start_rows[1, column]
             own = blocks[_BLOCKS[a, a], p]
             for j in range(m):
                 own[j] += k * work.matrix[p, j]
@@ -140,39 +140,85 @@ def _contact(run, follow_rows, gaps, row, gap, grid, room, coefficients, blocks,
 
 _cube = types.float64[:, :, ::1]
 _ARRAYS = (
-    types.int64, types.int64, _cube, types.float64[:, ::1], types.float64[:, ::1], _cube, _cube, types.float64[:, :, :, ::1],
-    _cube, types.int64[:, :, ::1], types.boolean[::1],
-)  # fmt: skip
+    types.int64,
+    types.int64,
+    _cube,
+    types.float64[:, ::1],
+    types.float64[:, ::1],
+    _cube,
+    _cube,
+    types.float64[:, :, :, ::1],
+    _cube,
+    types.int64[:, :, ::1],
+    types.boolean[::1],
+)
 _SOME = types.void(types.int64, types.int64, *_ARRAYS)
 _run_at, _follow_rows_at, _some_at = function_at(RUN), function_at(FOLLOW_ROWS), function_at(_SOME)
 
 
 def _some(  # type: ignore[no-untyped-def]
     start, end, run_address, rows_address, polynomials, elements, grid, gap, coefficients, blocks, force, state, settled
-):  # fmt: skip
+):
     """Evaluate the contacts from `start` to before `end`."""
     run, follow_rows = _run_at(run_address), _follow_rows_at(rows_address)
     m = polynomials.shape[2]
     room = (
-        scratch(m, grid.shape[1], gap.shape[2]), course_room(m), rows_room(m), np.zeros(2), np.zeros((2, 3 * m + 2)),
-    )  # fmt: skip
+        scratch(m, grid.shape[1], gap.shape[2]),
+        course_room(m),
+        rows_room(m),
+        np.zeros(2),
+        np.zeros((2, 3 * m + 2)),
+    )
     for c in range(start, end):
         settled[c] = _contact(
-            run, follow_rows, polynomials[c], elements[c], gap[c], grid, room, coefficients[c], blocks[c], force[c], state[c]
-        )  # fmt: skip
+            run,
+            follow_rows,
+            polynomials[c],
+            elements[c],
+            gap[c],
+            grid,
+            room,
+            coefficients[c],
+            blocks[c],
+            force[c],
+            state[c],
+        )
 
 
 def _shared(  # type: ignore[no-untyped-def]
-    shares, some_address, run_address, rows_address, polynomials, elements, grid, gap, coefficients, blocks, force, state, settled
-):  # fmt: skip
+    shares,
+    some_address,
+    run_address,
+    rows_address,
+    polynomials,
+    elements,
+    grid,
+    gap,
+    coefficients,
+    blocks,
+    force,
+    state,
+    settled,
+):
     """Do the same as `_some` for all contacts, in `shares` that threads take in turn."""
     n = gap.shape[0]
     for share in prange(shares):
         some = _some_at(some_address)
         some(
-            share * n // shares, (share + 1) * n // shares,
-            run_address, rows_address, polynomials, elements, grid, gap, coefficients, blocks, force, state, settled,
-        )  # fmt: skip
+            share * n // shares,
+            (share + 1) * n // shares,
+            run_address,
+            rows_address,
+            polynomials,
+            elements,
+            grid,
+            gap,
+            coefficients,
+            blocks,
+            force,
+            state,
+            settled,
+        )
 
 
 @cache
@@ -184,7 +230,7 @@ def _compiled() -> Any:
 @cache
 def _threads() -> Any:
     """Compile when there are contacts enough to be shared."""
-    return njit(types.void(types.int64, types.int64, *_ARRAYS), cache=True, parallel=True)(_shared)  # fmt: skip
+    return njit(types.void(types.int64, types.int64, *_ARRAYS), cache=True, parallel=True)(_shared)
 
 
 @lru_cache(maxsize=32)
@@ -227,7 +273,19 @@ def planar_period(
             each[:] = np.nan
         state[:] = OPEN
         return coefficients.reshape(width, m).T, blocks, force, state, 0
-    arrays = (address_of(run, RUN), address_of(follow_rows, FOLLOW_ROWS), polynomials, elements, _grid((m - 1) // 2), gap, coefficients, blocks, force, state, settled)  # fmt: skip
+    arrays = (
+        address_of(run, RUN),
+        address_of(follow_rows, FOLLOW_ROWS),
+        polynomials,
+        elements,
+        _grid((m - 1) // 2),
+        gap,
+        coefficients,
+        blocks,
+        force,
+        state,
+        settled,
+    )
     shares = thread_shares(n)
     if shares > 1:
         _threads()(shares, address_of(_compiled(), _SOME), *arrays)

@@ -8,12 +8,7 @@ from stickslip.arrays import FloatArray
 
 STAGES = 8
 # Of compiled functions that only compiled ones call: their arrays need no way in from Python, which takes long to compile.
-INNER: Any = {
-    "cache": True,
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
+INNER: Any = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # Of those that one function alone calls: they are compiled with it, and not once before.
 PART: Any = {**INNER, "inline": "always"}
 
@@ -38,16 +33,11 @@ NODES = np.concatenate([[0.0], _nodes(STAGES)])  # the start of a piece and its 
 _VALUES = _legendre(NODES, STAGES)
 _TO_LEGENDRE = np.linalg.inv(_VALUES)
 _RATE = np.column_stack(
-    [
-        2.0 * np.polynomial.legendre.Legendre.basis(j).deriv()(2.0 * NODES - 1.0)
-        for j in range(STAGES + 1)
-    ]
+    [2.0 * np.polynomial.legendre.Legendre.basis(j).deriv()(2.0 * NODES - 1.0) for j in range(STAGES + 1)]
 )
 RATE = np.ascontiguousarray((_RATE @ _TO_LEGENDRE)[1:])  # (s, s + 1) derivative at the stages
 BEND = np.ascontiguousarray(RATE[-1] @ (_RATE @ _TO_LEGENDRE))  # second derivative at the end
-HIGHEST = np.ascontiguousarray(
-    _TO_LEGENDRE[-1]
-)  # coefficient of the Legendre polynomial of degree s
+HIGHEST = np.ascontiguousarray(_TO_LEGENDRE[-1])  # coefficient of the Legendre polynomial of degree s
 FINE = 16  # points between which a polynomial of a piece is looked at
 TO_FINE = np.ascontiguousarray(_legendre(np.arange(1, FINE + 1) / FINE, STAGES) @ _TO_LEGENDRE)
 BARYCENTRIC = np.array([1.0 / np.prod(c - np.delete(NODES, i)) for i, c in enumerate(NODES)])

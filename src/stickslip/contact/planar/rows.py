@@ -75,11 +75,22 @@ def rows_room(m):  # type: ignore[no-untyped-def]
     q = 3 * m + 2
     wide = 2 * q + 2
     return Rows(
-        np.empty((2, q)), np.empty(q), np.empty((2, m)), np.empty((STAGES, q)), np.empty((STAGES, STAGES)),
-        np.empty(STAGES, np.int64), np.empty(STAGES), np.empty((SIN + 1, STAGES)), np.empty((_NODES_AT_ONCE, m)),
-        np.empty((_NODES_AT_ONCE, wide)), np.empty((m, wide)), np.empty((m, wide)),
-        np.empty((2, 2 * m - 1)), np.empty((2, 2, 2 * m - 1)), np.empty((2, 2 * m - 1)),
-    )  # fmt: skip
+        np.empty((2, q)),
+        np.empty(q),
+        np.empty((2, m)),
+        np.empty((STAGES, q)),
+        np.empty((STAGES, STAGES)),
+        np.empty(STAGES, np.int64),
+        np.empty(STAGES),
+        np.empty((SIN + 1, STAGES)),
+        np.empty((_NODES_AT_ONCE, m)),
+        np.empty((_NODES_AT_ONCE, wide)),
+        np.empty((m, wide)),
+        np.empty((m, wide)),
+        np.empty((2, 2 * m - 1)),
+        np.empty((2, 2, 2 * m - 1)),
+        np.empty((2, 2 * m - 1)),
+    )
 
 
 @njit(**INNER)
@@ -172,7 +183,13 @@ def _fill_nodes(motion, piece, k, slope, count, rows):  # type: ignore[no-untype
     """Solve for the rows of the angle at the stages of a piece and store those of the force from node `count` on."""
     m = motion.waves.shape[1]
     q = 3 * m + 2
-    start, width, kind, angles, at = piece[PIECE_START], piece[PIECE_WIDTH], int(piece[PIECE_KIND]), piece[PIECE_ANGLE:], rows.at  # fmt: skip
+    start, width, kind, angles, at = (
+        piece[PIECE_START],
+        piece[PIECE_WIDTH],
+        int(piece[PIECE_KIND]),
+        piece[PIECE_ANGLE:],
+        rows.at,
+    )
     fill_stages(motion, start, width, kind, at)
     linearise(at, angles, rows.matrix, rows.right)
     for j in range(STAGES):
@@ -233,7 +250,7 @@ def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def
         turn /= pace
         across = at[AT_LIMIT, j] * turn
         own, force = rows.stages[j], rows.force[count + j]
-        share = by_n * ((y_bend * cos - x_bend * sin) * time + across / width - turn * at[AT_LIMIT_RATE, j] * time)  # fmt: skip
+        share = by_n * ((y_bend * cos - x_bend * sin) * time + across / width - turn * at[AT_LIMIT_RATE, j] * time)
         grown = by_n * at[AT_LIMIT_RATE, j] * time
         basis_at(tau, rows.basis)
         weight = WEIGHTS[j] * pace / PERIOD
@@ -241,7 +258,7 @@ def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def
             own[2 * m + p] += share * at_end[p]
             force[2 * m + p] += grown * cos * at_end[p]
             force[q + 2 * m + p] += grown * sin * at_end[p]
-            change = (weight if p == 0 else 2.0 * weight) * (rows.basis[0, p] / width + time * rows.basis[1, p])  # fmt: skip
+            change = (weight if p == 0 else 2.0 * weight) * (rows.basis[0, p] / width + time * rows.basis[1, p])
             moved[0, p] += change * force[2 * q]
             moved[1, p] += change * force[2 * q + 1]
     for p in range(m):

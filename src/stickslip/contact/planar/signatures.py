@@ -18,6 +18,6 @@ _piece = _named((_plane, _line, _line, _plane, _whole, _line, _line), Piece)
 _course = _named((_motion, _piece, _line, _line, _plane, _plane, _plane, _whole), Course)
 _rows = _named(
     (_plane, _line, _plane, _plane, _plane, _whole, _line, *(_plane,) * 6, types.float64[:, :, ::1], _plane), Rows
-)  # fmt: skip
+)
 RUN = types.void(_course, types.float64, types.float64, types.int64)
 FOLLOW_ROWS = types.void(_course, types.float64, types.float64, _rows, types.boolean)

@@ -10,26 +10,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.cache import njit
-from stickslip.contact.planar.motion import (
-    AT_LIMIT_RATE,
-    AT_X_RATE,
-    AT_Y_RATE,
-    SHARE,
-    SIN,
-    TINY,
-)
-from stickslip.contact.planar.radau import (
-    BARYCENTRIC,
-    BEND,
-    FINE,
-    INNER,
-    NODES,
-    PART,
-    RATE,
-    STAGES,
-    TIMES,
-    TO_FINE,
-)
+from stickslip.contact.planar.motion import AT_LIMIT_RATE, AT_X_RATE, AT_Y_RATE, SHARE, SIN, TINY
+from stickslip.contact.planar.radau import BARYCENTRIC, BEND, FINE, INNER, NODES, PART, RATE, STAGES, TIMES, TO_FINE
 
 _CLOSE = 1e-5  # last step of Newton's method: what is left is its square
 _MOST_STEPS = 12
@@ -51,9 +33,14 @@ class Piece(NamedTuple):
 def piece_room():  # type: ignore[no-untyped-def]
     """Allocate a `Piece`."""
     return Piece(
-        np.empty((SIN + 1, STAGES)), np.empty(STAGES + 1), np.zeros(2), np.empty((STAGES, STAGES)), np.empty(STAGES, np.int64),
-        np.empty(STAGES), np.empty(STAGES + 1),
-    )  # fmt: skip
+        np.empty((SIN + 1, STAGES)),
+        np.empty(STAGES + 1),
+        np.zeros(2),
+        np.empty((STAGES, STAGES)),
+        np.empty(STAGES, np.int64),
+        np.empty(STAGES),
+        np.empty(STAGES + 1),
+    )
 
 
 @njit(**INNER)
@@ -209,7 +196,7 @@ def slip_speed(piece):  # type: ignore[no-untyped-def]
     at = piece.at
     for j in range(STAGES):
         angle = piece.angle[j + 1]
-        piece.speed[j + 1] = at[AT_X_RATE, j] * np.cos(angle) + at[AT_Y_RATE, j] * np.sin(angle) - at[AT_LIMIT_RATE, j]  # fmt: skip
+        piece.speed[j + 1] = at[AT_X_RATE, j] * np.cos(angle) + at[AT_Y_RATE, j] * np.sin(angle) - at[AT_LIMIT_RATE, j]
 
 
 @njit(**INNER)

@@ -71,9 +71,7 @@ def _below(gap, slope, bend, third):  # type: ignore[no-untyped-def]
     if curved > 0.0:
         h = min(h, np.sqrt(gap / curved))
     fall = -slope
-    h = max(
-        h, 2.0 * fall / (0.5 * curved + np.sqrt(0.25 * curved**2 + 2.0 * third * fall / 3.0) + TINY)
-    )
+    h = max(h, 2.0 * fall / (0.5 * curved + np.sqrt(0.25 * curved**2 + 2.0 * third * fall / 3.0) + TINY))
     return max(h, -3.0 * bend / third)
 
 
@@ -96,13 +94,13 @@ def slip_begins(motion, z_x, z_y, tau, end, after_slip):  # type: ignore[no-unty
     reach = np.hypot(motion.waves[X, 0] - z_x, motion.waves[Y, 0] - z_y) + b[0]
     third = 2.0 * reach * b[3] + 6.0 * b[1] * b[2] + 6.0 * b[5] * b[6] + 2.0 * b[4] * b[7] + TINY
     for _ in range(_MOST_STEPS):
-        x, y, limit, x_rate, y_rate, limit_rate, x_bend, y_bend, limit_bend = place_and_rates(motion, tau)  # fmt: skip
+        x, y, limit, x_rate, y_rate, limit_rate, x_bend, y_bend, limit_bend = place_and_rates(motion, tau)
         x -= z_x
         y -= z_y
         size = np.hypot(x, y)
         gap = max((limit - size) * (limit + size), 0.0)
         slope = 2.0 * (x * x_rate + y * y_rate - limit * limit_rate)
-        bend = 2.0 * (x_rate**2 + y_rate**2 - limit_rate**2 + x * x_bend + y * y_bend - limit * limit_bend)  # fmt: skip
+        bend = 2.0 * (x_rate**2 + y_rate**2 - limit_rate**2 + x * x_bend + y * y_bend - limit * limit_bend)
         if after_slip:
             gap, slope, after_slip = 0.0, 0.0, False
         elif gap == 0.0 and slope > 0.0:

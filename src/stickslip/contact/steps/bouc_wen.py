@@ -54,9 +54,7 @@ def loaded(y, u, n):  # type: ignore[no-untyped-def]
     target = _way_up(p, n)[0] + u
     if target > SATURATED / n + 1.0:
         return 1.0
-    for _ in range(
-        STEPS
-    ):  # the way is concave in p: from below Newton's method goes up and overshoots at most once
+    for _ in range(STEPS):  # the way is concave in p: from below Newton's method goes up and overshoots at most once
         way, slope = _way_up(p, n)
         step = (target - way) / slope
         p = max(p + step, 0.0)

@@ -53,9 +53,7 @@ def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[n
         limit = before + share * rise
         size = math.hypot(m_t, m_w)
     a_t, a_w, rest = m_t / size, m_w / size, 1.0 - share
-    e_t, e_w, kept, q_t, q_w, q_limit, q_after = slipped(
-        k_t, k_w, a_t, a_w, rest * way_t, rest * way_w, limit, after
-    )
+    e_t, e_w, kept, q_t, q_w, q_limit, q_after = slipped(k_t, k_w, a_t, a_w, rest * way_t, rest * way_w, limit, after)
     turn_t, turn_w = -kept * a_w / size, kept * a_t / size  # by the force where it meets the limit
     by_share = turn_t * pull_t + turn_w * pull_w - q_t * way_t - q_w * way_w + q_limit * rise
     steep = m_t * pull_t + m_w * pull_w - limit * rise
@@ -66,16 +64,7 @@ def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[n
     if outside:
         along, across = by_t * o_t + by_w * o_w, (by_w * o_t - by_t * o_w) * before / start
         by_t, by_w, by_before = -across * o_w, across * o_t, by_before + along
-    return (
-        e_t,
-        e_w,
-        by_way[0],
-        by_way[1],
-        by_t,
-        by_w,
-        by_before,
-        q_after + share * (q_limit - moved * limit),
-    )
+    return (e_t, e_w, by_way[0], by_way[1], by_t, by_w, by_before, q_after + share * (q_limit - moved * limit))
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,18 +115,30 @@ def _slip(way, state, parameters, limit, closing, share, force, jac):  # type: i
         e_t, e_w, q_t, q_w, q_limit = grown(k_t, k_w, part * way[0], part * way[1], limit)
         by_share = q_t * way[0] + q_w * way[1]
         row = (
-            part * q_t, part * q_w, by_share * by_gap - q_limit * mu * k_n,
-            0.0, 0.0, -part * q_t, -part * q_w, by_share * by_before,
-        )  # fmt: skip
+            part * q_t,
+            part * q_w,
+            by_share * by_gap - q_limit * mu * k_n,
+            0.0,
+            0.0,
+            -part * q_t,
+            -part * q_w,
+            by_share * by_before,
+        )
     else:
         f_t, f_w = k_t * (state[2] - state[0]), k_w * (state[3] - state[1])
         e_t, e_w, p_t, p_w, p_ft, p_fw, p_before, p_after = _slip_on(
             k_t, k_w, way[0], way[1], f_t, f_w, mu * state[4], limit
         )
         row = (
-            p_t, p_w, -p_after * mu * k_n,
-            -k_t * p_ft, -k_w * p_fw, k_t * p_ft - p_t, k_w * p_fw - p_w, mu * p_before,
-        )  # fmt: skip
+            p_t,
+            p_w,
+            -p_after * mu * k_n,
+            -k_t * p_ft,
+            -k_w * p_fw,
+            k_t * p_ft - p_t,
+            k_w * p_fw - p_w,
+            mu * p_before,
+        )
     for d, along, across in ((0, e_t, -e_w), (1, e_w, e_t)):
         force[d] = limit * along
         for a in range(3):

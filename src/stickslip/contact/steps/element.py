@@ -26,9 +26,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
     jac[2, 2] = slope
     for d in range(2):
         k, x, s = parameters[d], displacement[d], state[d]
-        if (
-            k == 0.0 or is_open or parameters[MU] == 0.0
-        ):  # without friction the slider follows, also where x rests
+        if k == 0.0 or is_open or parameters[MU] == 0.0:  # without friction the slider follows, also where x rests
             status[d] = OPEN if is_open else STICK if k == 0.0 else SLIP
             force[d] = 0.0
             new_state[d] = x

@@ -21,9 +21,7 @@ def strategy_named(name: str, threshold: float | None = None, **options: bool) -
         ``per_dof`` and ``repeats`` of those that have them (`strategies.options_of`).
     """
     own = _class_of(name)
-    strategy: Strategy = (
-        own(**options) if threshold is None else own(threshold=threshold, **options)
-    )
+    strategy: Strategy = own(**options) if threshold is None else own(threshold=threshold, **options)
     return strategy
 
 

@@ -120,9 +120,7 @@ def factored(jac: FloatArray | StructuredJacobian, solve: Solve | None) -> Facto
     return Factored(jac, (lu, pivots) if usable else None, None)
 
 
-def _by_factors(
-    factors: tuple[FloatArray, IntArray], right: FloatArray, *, transposed: bool
-) -> FloatArray:
+def _by_factors(factors: tuple[FloatArray, IntArray], right: FloatArray, *, transposed: bool) -> FloatArray:
     solution, _ = scipy.linalg.lapack.dgetrs(*factors, right, trans=int(transposed))
     return np.asarray(solution)
 
@@ -134,9 +132,7 @@ def mean_jacobian(
     if isinstance(one, StructuredJacobian) and isinstance(other, StructuredJacobian):
         return replace(one, blocks=0.5 * (one.blocks + other.blocks))
     if isinstance(one, StructuredJacobian) or isinstance(other, StructuredJacobian):
-        raise input_error(
-            "mean_jacobian", "was given an array and products", "Take both of one problem."
-        )
+        raise input_error("mean_jacobian", "was given an array and products", "Take both of one problem.")
     return np.asarray(0.5 * (one + other))
 
 
@@ -301,9 +297,7 @@ def _adjoints(
     return np.asarray(both[:, :k] + 1j * both[:, k:])
 
 
-def _relative(
-    high: HarmonicBalance, omega: float, outputs: Outputs, change: FloatArray
-) -> ComplexArray:
+def _relative(high: HarmonicBalance, omega: float, outputs: Outputs, change: FloatArray) -> ComplexArray:
     """Return the relative changes of the outputs by a change of the scaled unknowns."""
     own = high.coefficients(change)[: int(np.max(outputs.harmonics, initial=0)) + 1]
     return outputs.relative(high.linear.recover_change(omega, own))

@@ -15,9 +15,7 @@ from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 
 Form = Literal["newton", "published"]
-SILENCE = (
-    1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
-)
+SILENCE = 1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +136,7 @@ def asked_again(
 
 
 def _led_to(
-    high: HarmonicBalance,
-    q: ComplexArray,
-    omega: float,
-    start: FloatArray,
-    measure: ErrorMeasure,
-    seconds: float,
+    high: HarmonicBalance, q: ComplexArray, omega: float, start: FloatArray, measure: ErrorMeasure, seconds: float
 ) -> Alert:
     """Return what steps from the low-order coefficients to the scaled unknowns `start` say."""
     before = high.linear.recover(omega, q)
@@ -156,9 +149,7 @@ def _led_to(
 def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
     """Solve by LU factors; None where the matrix is singular."""
     try:
-        return np.asarray(
-            np.linalg.solve(jac if isinstance(jac, np.ndarray) else jac.dense(), right)
-        )
+        return np.asarray(np.linalg.solve(jac if isinstance(jac, np.ndarray) else jac.dense(), right))
     except np.linalg.LinAlgError:
         return None
 

@@ -8,14 +8,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.judging import covers
-from stickslip.harmonic.selection.adjoint import (
-    Estimate,
-    Goal,
-    Outputs,
-    contributions,
-    estimate,
-    outputs_of,
-)
+from stickslip.harmonic.selection.adjoint import Estimate, Goal, Outputs, contributions, estimate, outputs_of
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.support import Harmonics
@@ -48,11 +41,7 @@ class GoalOriented:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.left_out <= 1.0:
-            raise input_error(
-                "GoalOriented.left_out",
-                f"must lie from 0 to 1, got {self.left_out}",
-                "0.2 is usual.",
-            )
+            raise input_error("GoalOriented.left_out", f"must lie from 0 to 1, got {self.left_out}", "0.2 is usual.")
         hint = "'motion' is what the Jacobian Alert judges."
         check_choice("GoalOriented.goal", self.goal, get_args(Goal), hint)
 

@@ -57,13 +57,9 @@ class GuardedAlert:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.quick <= 1.0:
-            raise input_error(
-                "GuardedAlert.quick", f"must lie from 0 to 1, got {self.quick}", "0.5 is usual."
-            )
+            raise input_error("GuardedAlert.quick", f"must lie from 0 to 1, got {self.quick}", "0.5 is usual.")
         if self.steps < 0:
-            raise input_error(
-                "GuardedAlert.steps", f"must not be negative, got {self.steps}", "3 is usual."
-            )
+            raise input_error("GuardedAlert.steps", f"must not be negative, got {self.steps}", "3 is usual.")
 
     def judge(self, step: Step) -> Verdict:
         """Predict the change that all harmonics would make, and doubt it."""
@@ -76,15 +72,11 @@ class GuardedAlert:
             kept.append((factored(jac, step.solve), float(np.linalg.norm(right))))
             return kept[-1][0].solve(right)
 
-        alert = jacobian_alert(
-            step.balance, high, step.x, step.omega, step.measure, solve, events=step.events
-        )
+        alert = jacobian_alert(step.balance, high, step.x, step.omega, step.measure, solve, events=step.events)
         if not kept and not covers(step.balance, high):
             # silent on harmonics that the reference has; what acts on the others of the judging set?
             wide = judging_balance(step.balance, high.harmonics)
-            alert = jacobian_alert(
-                step.balance, wide, step.x, step.omega, step.measure, step.solve, events=step.events
-            )
+            alert = jacobian_alert(step.balance, wide, step.x, step.omega, step.measure, step.solve, events=step.events)
             known = covers(step.balance, wide)
             error = alert.error if known else max(alert.error, UNSEEN)
             return self._verdict(step, error, wide.coefficients(alert.start))
@@ -115,12 +107,7 @@ class GuardedAlert:
         return self._followed(step, beyond, wide, period, residual)
 
     def _followed(
-        self,
-        step: Step,
-        beyond: HarmonicBalance,
-        x: FloatArray,
-        period: ContactPeriod,
-        residual: float,
+        self, step: Step, beyond: HarmonicBalance, x: FloatArray, period: ContactPeriod, residual: float
     ) -> tuple[float, ComplexArray]:
         """Go on by Newton's method until the answer is clear; see `_doubted`."""
         begin = beyond.unknowns(step.balance.coefficients(step.x))
@@ -187,11 +174,7 @@ def doubled(reference: HarmonicBalance) -> HarmonicBalance:
 
 
 def truncated(
-    high: HarmonicBalance,
-    beyond: HarmonicBalance,
-    period: ContactPeriod,
-    omega: float,
-    solve: Solve | None = None,
+    high: HarmonicBalance, beyond: HarmonicBalance, period: ContactPeriod, omega: float, solve: Solve | None = None
 ) -> FloatArray:
     """Return what the harmonics that a reference leaves out would add to its scaled residual, each solved alone.
 
@@ -233,7 +216,7 @@ def _moved(
         moved -= force
         moved[rows_among(beyond.harmonics, high.harmonics)] = 0.0
         found = solve(beyond.by_parts(omega, own), moved.reshape(-1) / beyond.force_scale)
-        return np.zeros_like(force) if found is None else beyond.displacement_scale * found.reshape(force.shape)  # fmt: skip
+        return np.zeros_like(force) if found is None else beyond.displacement_scale * found.reshape(force.shape)
     for place, h in enumerate(beyond.harmonics):
         if h in high.harmonics:
             continue

@@ -37,8 +37,6 @@ class JacobianAlert:
         high = step.reference
         if step.balance.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)
-        alert = jacobian_alert(
-            step.balance, high, step.x, step.omega, step.measure, step.solve, self.form, step.events
-        )
+        alert = jacobian_alert(step.balance, high, step.x, step.omega, step.measure, step.solve, self.form, step.events)
         again = high.harmonics if alert.error > self.threshold else None
         return Verdict(alert.error, again, step.smallest, high.coefficients(alert.start))

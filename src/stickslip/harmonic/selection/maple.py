@@ -5,12 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.harmonic.selection.spectrum import (
-    next_up,
-    raised,
-    shares_by_dof,
-    spectral_shares,
-)
+from stickslip.harmonic.selection.spectrum import next_up, raised, shares_by_dof, spectral_shares
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.support import of_all
 
@@ -50,10 +45,7 @@ class Maple:
         place = {h: i for i, h in enumerate(step.balance.harmonics)}
         own = step.supports
         last = np.array([shares[place[s[-1]], i] for i, s in enumerate(own)])
-        more = tuple(
-            next_up(step, s) if share > self.threshold else s
-            for s, share in zip(own, last, strict=True)
-        )
+        more = tuple(next_up(step, s) if share > self.threshold else s for s, share in zip(own, last, strict=True))
         largest = float(last.max(initial=0.0))
         if more == own:
             return Verdict(largest, None, of_all(own), following_by_dof=own)

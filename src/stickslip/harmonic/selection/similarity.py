@@ -148,9 +148,7 @@ def harmonic_block_norms(
         )
     matrix = _scaled(balance, x, omega, scales, whole=part == "jacobian")
     places = _rows(balance)
-    norms = np.array(
-        [[np.linalg.norm(matrix[np.ix_(a, b)], ord=2) for b in places] for a in places]
-    )
+    norms = np.array([[np.linalg.norm(matrix[np.ix_(a, b)], ord=2) for b in places] for a in places])
     return norms if part != "missing" else np.where(_neglected(balance, kept or ()), norms, 0.0)
 
 
@@ -166,16 +164,10 @@ def natural_scales(balance: HarmonicBalance) -> FloatArray:
 
 
 def _scaled(
-    balance: HarmonicBalance,
-    x: FloatArray,
-    omega: float,
-    scales: FloatArray | None,
-    whole: bool = True,
+    balance: HarmonicBalance, x: FloatArray, omega: float, scales: FloatArray | None, whole: bool = True
 ) -> FloatArray:
     """Return J, or K̂ alone, in units of `scales`."""
-    matrix = balance.linearise(x, omega).dense_jac() / (
-        balance.displacement_scale / balance.force_scale
-    )
+    matrix = balance.linearise(x, omega).dense_jac() / (balance.displacement_scale / balance.force_scale)
     if not whole:
         matrix = matrix - real_matrix([balance.linear_block(omega, h) for h in balance.harmonics])
     own = natural_scales(balance) if scales is None else np.asarray(scales, dtype=float)

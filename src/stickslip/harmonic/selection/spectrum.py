@@ -93,12 +93,7 @@ def raised(step: Step) -> Harmonics | None:
 
 
 def foretold(
-    step: Step,
-    indicator: float,
-    following: Harmonics,
-    *,
-    repeats: bool,
-    by_dof: ByDof | None = None,
+    step: Step, indicator: float, following: Harmonics, *, repeats: bool, by_dof: ByDof | None = None
 ) -> Verdict:
     """Return the verdict of a rule that foretells the next frequency.
 

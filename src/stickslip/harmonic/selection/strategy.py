@@ -271,11 +271,7 @@ def check_strategy(strategy: object) -> None:
     if isinstance(strategy, type):
         raise input_error("Sweep.selection", f"is the class {name}", f"Make one: {name}().")
     if not callable(getattr(strategy, "judge", None)):
-        raise input_error(
-            "Sweep.selection",
-            f"is a {name}, which has no method judge",
-            "Give a name or a Strategy.",
-        )
+        raise input_error("Sweep.selection", f"is a {name}, which has no method judge", "Give a name or a Strategy.")
     threshold = getattr(strategy, "threshold", None)
     if not isinstance(threshold, (int, float)) or np.isnan(threshold):
         raise input_error(
@@ -285,9 +281,7 @@ def check_strategy(strategy: object) -> None:
         )
     if not isinstance(getattr(strategy, "verifies", None), bool):
         raise input_error(
-            f"{name}.verifies",
-            "is neither True nor False",
-            "True: a verdict says how good the solution itself is.",
+            f"{name}.verifies", "is neither True nor False", "True: a verdict says how good the solution itself is."
         )
 
 

@@ -32,9 +32,7 @@ HELD = {
     "sliding": (False, True, True),
     "free": (False, False, False),
 }
-POINTS, WEIGHTS = (
-    0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True)
-)
+POINTS, WEIGHTS = (0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
 
 
 @dataclass(frozen=True)
@@ -69,10 +67,7 @@ class Beam:
     second_moment: float = quantity("second moment of area for its bending", "m4", above=0)
     material: Material = quantity("the table of its material")  # noqa: RUF009
     shear_coefficient: float | None = quantity(
-        "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli",
-        default=None,
-        above=0,
-        usual=2,
+        "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli", default=None, above=0, usual=2
     )
     second_moment_y: float | None = quantity(
         'second moment of area for deflections along y, with bending = "both"; left out: the same',
@@ -81,10 +76,7 @@ class Beam:
         above=0,
     )
     ends: tuple[End, End] = quantity(
-        "how the first and the last end are held",
-        default=("clamped", "free"),
-        choices=get_args(End),
-        entries=(2, 2),
+        "how the first and the last end are held", default=("clamped", "free"), choices=get_args(End), entries=(2, 2)
     )
 
     def __post_init__(self) -> None:
@@ -157,13 +149,9 @@ def rotating_beam(
         If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are asked for without axial motion.
     """
     if elements < 1 or bending not in get_args(Bending):
-        raise input_error(
-            "beam", f"got {elements} elements and bending {bending!r}", "One or more, y, z or both."
-        )
+        raise input_error("beam", f"got {elements} elements and bending {bending!r}", "One or more, y, z or both.")
     if not 0 <= hub_radius < math.inf or not math.isfinite(speed):
-        raise input_error(
-            "rotating_beam", f"got hub radius {hub_radius} and speed {speed}", "In m and rad/s."
-        )
+        raise input_error("rotating_beam", f"got hub radius {hub_radius} and speed {speed}", "In m and rad/s.")
     if speed and tuple(shape.ends) != ("clamped", "free"):
         raise input_error(
             "rotating_beam: ends",
@@ -192,17 +180,13 @@ def rotating_beam(
     kept = _free(shape, elements, axial)
     square = np.ix_(kept, kept)
     dofs = _dofs(shape, elements, hub_radius, bending).take(kept)
-    return Structure(mass[square], damping[square], stiffness[square], dofs, _sets(dofs, bending, elements))  # fmt: skip
+    return Structure(mass[square], damping[square], stiffness[square], dofs, _sets(dofs, bending, elements))
 
 
-def _both(
-    shape: Beam, elements: int, speed: float, hub_radius: float, axial: bool, coriolis: bool
-) -> Structure:
+def _both(shape: Beam, elements: int, speed: float, hub_radius: float, axial: bool, coriolis: bool) -> Structure:
     """Return the beam that bends in both planes, node by node; stretching goes with the lag, which Coriolis forces couple to it."""
     across = replace(shape, second_moment=shape.second_moment_y or shape.second_moment)
-    lag = rotating_beam(
-        across, elements, speed, hub_radius=hub_radius, bending="y", axial=axial, coriolis=coriolis
-    )
+    lag = rotating_beam(across, elements, speed, hub_radius=hub_radius, bending="y", axial=axial, coriolis=coriolis)
     flap = rotating_beam(shape, elements, speed, hub_radius=hub_radius, bending="z")
     table = join_dofs({"lag": lag.dofs, "flap": flap.dofs})
     rank = np.array([COMPONENTS.index(component) for component in table.component])
@@ -216,11 +200,7 @@ def _both(
     component = np.array(dofs.component)
     sets = {
         name: np.flatnonzero(np.isin(component, kinds))
-        for name, kinds in (
-            ("deflection", ("y", "z")),
-            ("rotation", ("ry", "rz")),
-            ("axial", ("x",)),
-        )
+        for name, kinds in (("deflection", ("y", "z")), ("rotation", ("ry", "rz")), ("axial", ("x",)))
     }
     moves = np.isin(component, ("x", "y", "z"))
     sets["tip"] = np.flatnonzero(moves & (dofs.node == elements))
@@ -245,9 +225,7 @@ def _element(
     u, stretch = _axial_shapes(size)
     if bending == "z":  # a positive rotation about y lowers what lies along x
         flip = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
-        w, slope, theta, curvature, strain = (
-            a * flip for a in (w, slope, theta, curvature, strain)
-        )
+        w, slope, theta, curvature, strain = (a * flip for a in (w, slope, theta, curvature, strain))
     weight = size * WEIGHTS
 
     def integral(left: FloatArray, right: FloatArray, factor: float | FloatArray) -> FloatArray:
@@ -258,9 +236,7 @@ def _element(
     if math.isfinite(shear):
         elastic += integral(strain, strain, shear)
     # fibres of a section that tilts out of the plane of rotation leave their radius, those of one that turns within it do not
-    softening = integral(u, u, rA) + (
-        integral(w, w, rA) if bending == "y" else integral(theta, theta, rI)
-    )
+    softening = integral(u, u, rA) + (integral(w, w, rA) if bending == "y" else integral(theta, theta, rI))
     coriolis = np.zeros((6, 6))
     if bending == "y":
         across = integral(w, u, 2 * speed * rA)
@@ -287,20 +263,10 @@ def _shapes(size: float, flexibility: float) -> tuple[FloatArray, ...]:
         (-6 * x**2 + 6 * x + f) / size,
         3 * x**2 - (2 - f) * x - f / 2,
     ]
-    theta = [
-        6 * (x**2 - x) / size,
-        3 * x**2 - (4 + f) * x + 1 + f,
-        -6 * (x**2 - x) / size,
-        3 * x**2 - (2 - f) * x,
-    ]
-    curvature = [
-        6 * (2 * x - 1) / size**2,
-        (6 * x - 4 - f) / size,
-        -6 * (2 * x - 1) / size**2,
-        (6 * x - 2 + f) / size,
-    ]
+    theta = [6 * (x**2 - x) / size, 3 * x**2 - (4 + f) * x + 1 + f, -6 * (x**2 - x) / size, 3 * x**2 - (2 - f) * x]
+    curvature = [6 * (2 * x - 1) / size**2, (6 * x - 4 - f) / size, -6 * (2 * x - 1) / size**2, (6 * x - 2 + f) / size]
     strain = [-f / size * one, -f / 2 * one, f / size * one, -f / 2 * one]
-    return tuple(_placed(values, (0, 1, 3, 4)) / (1 + f) for values in (w, slope, theta, curvature, strain))  # fmt: skip
+    return tuple(_placed(values, (0, 1, 3, 4)) / (1 + f) for values in (w, slope, theta, curvature, strain))
 
 
 def _axial_shapes(size: float) -> tuple[FloatArray, FloatArray]:
@@ -328,9 +294,7 @@ def _dofs(shape: Beam, elements: int, hub_radius: float, bending: Direction) -> 
     points = np.zeros((elements + 1, 3))
     points[:, 0] = hub_radius + np.linspace(0.0, shape.length, elements + 1)
     names = ("y", "rz", "x") if bending == "y" else ("z", "ry", "x")
-    return Dofs(
-        np.repeat(np.arange(elements + 1), 3), names * (elements + 1), np.repeat(points, 3, axis=0)
-    )
+    return Dofs(np.repeat(np.arange(elements + 1), 3), names * (elements + 1), np.repeat(points, 3, axis=0))
 
 
 def _sets(dofs: Dofs, bending: Direction, elements: int) -> dict[str, IntArray]:

@@ -104,9 +104,7 @@ def dissected(pattern: Matrix, kept: IntArray) -> Dissection:
 def _grouped(pattern: Matrix, kept: IntArray) -> tuple[IntArray, list[IntArray], Matrix]:
     """Return the group of each row, the rows of each, and the graph of groups: rows with the same pattern, as the dofs of a node."""
     n = pattern.shape[0]
-    ones = scipy.sparse.csr_array(
-        (np.ones(pattern.nnz), pattern.indices, pattern.indptr), shape=(n, n)
-    )
+    ones = scipy.sparse.csr_array((np.ones(pattern.nnz), pattern.indices, pattern.indptr), shape=(n, n))
     random = np.random.default_rng(0).random(n)
     own = np.zeros(n)
     own[kept] = 1.0
@@ -122,9 +120,7 @@ def _grouped(pattern: Matrix, kept: IntArray) -> tuple[IntArray, list[IntArray],
     return group, members, graph
 
 
-def _cut(
-    graph: Matrix, nodes: IntArray, size: IntArray, pieces: list[tuple[IntArray, tuple[int, ...]]]
-) -> int:
+def _cut(graph: Matrix, nodes: IntArray, size: IntArray, pieces: list[tuple[IntArray, tuple[int, ...]]]) -> int:
     """Append the pieces of `nodes`, the separator after its halves; return its place."""
     halves = None
     if size[nodes].sum() > LEAF and nodes.size > 2:
@@ -188,12 +184,8 @@ def _separator(graph: Matrix, inside: BoolArray) -> BoolArray:
     target = across.indices[out]
     left, row = np.unique(source, return_inverse=True)
     right, column = np.unique(target, return_inverse=True)
-    edges = scipy.sparse.csr_array(
-        (np.ones(row.size), (row, column)), shape=(left.size, right.size)
-    )
-    match = scipy.sparse.csgraph.maximum_bipartite_matching(
-        edges, perm_type="column"
-    )  # of each left vertex
+    edges = scipy.sparse.csr_array((np.ones(row.size), (row, column)), shape=(left.size, right.size))
+    match = scipy.sparse.csgraph.maximum_bipartite_matching(edges, perm_type="column")  # of each left vertex
     partner = np.full(right.size, -1)
     partner[match[match >= 0]] = np.flatnonzero(match >= 0)
     # Kőnig: what alternating paths from unmatched left vertices reach

@@ -18,8 +18,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 CHUNK = 200_000  # cells x quadrature points x nodes worked on at once: 20 to 100 MB
 TET_PLACES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 HEX_PLACES = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
-    dtype=float,
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
 )
 
 
@@ -101,12 +100,7 @@ def library() -> Any:
 def library_element(width: int) -> tuple[Any, IntArray]:
     """Return scikit-fem's element with `width` nodes, and the (k,) VTK node at each of its own places."""
     skfem = library()
-    element = {
-        4: skfem.ElementTetP1,
-        10: skfem.ElementTetP2,
-        8: skfem.ElementHex1,
-        20: skfem.ElementHexS2,
-    }[width]()
+    element = {4: skfem.ElementTetP1, 10: skfem.ElementTetP2, 8: skfem.ElementHex1, 20: skfem.ElementHexS2}[width]()
     distance = np.abs(element.doflocs[:, None] - reference_places(width)).sum(axis=2)
     return element, np.asarray(distance.argmin(axis=1), dtype=np.int64)
 
@@ -158,15 +152,11 @@ def check_jacobians(mesh: SolidMesh, shape: Shape) -> None:
     for cell in bad[:5]:
         x, y, z = mesh.points[mesh.cells[cell]].mean(axis=0)
         nodes = ", ".join(str(mesh.numbers[node]) for node in mesh.cells[cell][:4])
-        named.append(
-            f"cell {mesh.cell_numbers[cell]} (nodes {nodes}, ...) near ({x:.6g}, {y:.6g}, {z:.6g}) m"
-        )
+        named.append(f"cell {mesh.cell_numbers[cell]} (nodes {nodes}, ...) near ({x:.6g}, {y:.6g}, {z:.6g}) m")
     more = f" and {len(bad) - 5} more" if len(bad) > 5 else ""
     raise input_error(
         "mesh",
-        f"{len(bad)} of {len(mesh.cells)} cells have a zero or negative Jacobian: "
-        + "; ".join(named)
-        + more,
+        f"{len(bad)} of {len(mesh.cells)} cells have a zero or negative Jacobian: " + "; ".join(named) + more,
         "Check the node order (VTK's) if all of them do; else move mid-side nodes to the middle of their edges "
         "(gmsh: Mesh.SecondOrderLinear = 1) or mesh finer where the surface is curved.",
     )
@@ -204,9 +194,7 @@ class NodeBlocks:
         """Add the numbers (m, k, k, entries) of a piece of the cells to `store`."""
         place = self._place[piece].ravel()
         starts = np.arange(len(place) + 1, dtype=np.int32)
-        gather = scipy.sparse.csc_array(
-            (np.ones(len(place)), place, starts), shape=(len(store), len(place))
-        )
+        gather = scipy.sparse.csc_array((np.ones(len(place)), place, starts), shape=(len(store), len(place)))
         store += gather @ values.reshape(len(place), -1)
 
     def matrix(self, store: FloatArray) -> Matrix:

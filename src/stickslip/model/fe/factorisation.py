@@ -113,9 +113,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
 def _chosen(matrix: Matrix, backend: str) -> str:
     """Return the name of what factorises `matrix`."""
     if backend not in BACKENDS:
-        raise input_error(
-            "factorise: backend", f"got {backend!r}", f"Use one of {', '.join(BACKENDS)}."
-        )
+        raise input_error("factorise: backend", f"got {backend!r}", f"Use one of {', '.join(BACKENDS)}.")
     if backend in ("feral", "multifrontal") and not _hermitian(matrix):
         raise input_error(
             "factorise: backend",
@@ -217,12 +215,7 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
     from scipy.sparse.linalg import splu
 
     try:
-        lu = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=threshold,
-            options={"SymmetricMode": True},
-        )
+        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options={"SymmetricMode": True})
     except RuntimeError as error:
         raise SingularError(f"factorise: {error}") from error
 
@@ -235,9 +228,7 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
 
     if not np.iscomplexobj(matrix):
         return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu", count)
-    return Factorisation(
-        lambda b: np.asarray(lu.solve(np.asarray(b, dtype=complex))), "superlu", count
-    )
+    return Factorisation(lambda b: np.asarray(lu.solve(np.asarray(b, dtype=complex))), "superlu", count)
 
 
 def _multifrontal(matrix: Matrix) -> Factorisation:
@@ -263,9 +254,7 @@ def _feral(matrix: Matrix) -> Factorisation:
         found = _of_feral(feral, matrix)
         left = _residual(matrix, found)
     if not left <= RESIDUAL:
-        raise _DistrustedError(
-            f"it leaves a residual of {left:.1g} in {matrix.shape[0]} equations, above {RESIDUAL:g}"
-        )
+        raise _DistrustedError(f"it leaves a residual of {left:.1g} in {matrix.shape[0]} equations, above {RESIDUAL:g}")
     return found
 
 
@@ -297,8 +286,7 @@ def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
     solver.factor(feral.CscMatrix(lower.shape[0], *pattern, lower.data))
     if solver.inertia.n_zero:
         raise SingularError(
-            f"factorise: the matrix of {lower.shape[0]} equations is singular: "
-            f"{solver.inertia.n_zero} pivots vanish"
+            f"factorise: the matrix of {lower.shape[0]} equations is singular: {solver.inertia.n_zero} pivots vanish"
         )
     return solver
 

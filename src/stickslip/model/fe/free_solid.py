@@ -15,9 +15,7 @@ RIGID = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it 
 MISMATCH = 2e-4
 
 
-def inertia_relief(
-    solid: RotatingSolid, tie: Matrix | None = None
-) -> tuple[FloatArray, FloatArray] | None:
+def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[FloatArray, FloatArray] | None:
     """Return the static displacement of a free solid under its centrifugal load, in balance with its own inertia.
 
     The load less the inertia of the rigid motions that it would cause is in balance by itself, and deforms the solid; what is taken

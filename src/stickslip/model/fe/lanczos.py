@@ -19,15 +19,10 @@ PROBE = 2  # new directions that look for equal frequencies beyond the eight
 STEPS = 5  # with them
 KNOWN = 1e-10  # a change of an eigenvalue above which they have found one
 ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
-NOTHING = (
-    1e-24,
-    1e-12,
-)  # squared length over the largest, at first and once normalised: only rounding
+NOTHING = (1e-24, 1e-12)  # squared length over the largest, at first and once normalised: only rounding
 
 
-def lanczos(
-    mass: Matrix, n: int, solve: Solve, shift: float, kind: type
-) -> tuple[FloatArray, Matrix]:
+def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tuple[FloatArray, Matrix]:
     """Return the `n` eigenvalues of ``K φ = λ M φ`` nearest to `shift`, and M-orthonormal vectors.
 
     Parameters
@@ -93,9 +88,7 @@ def lanczos(
     rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
     if rank < n:
         raise input_error(
-            "normal_modes",
-            f"{n} asked of {size} dofs whose mass has the rank {rank}",
-            "Ask for at most as many.",
+            "normal_modes", f"{n} asked of {size} dofs whose mass has the rank {rank}", "Ask for at most as many."
         )
     return shift + 1.0 / largest, known @ turn
 

@@ -89,9 +89,7 @@ class Multifrontal:
         return x if np.iscomplexobj(self.rest) else x.view(float)
 
 
-def multifrontal(
-    matrix: Matrix, kept: IntArray | None = None, dissection: Dissection | None = None
-) -> Multifrontal:
+def multifrontal(matrix: Matrix, kept: IntArray | None = None, dissection: Dissection | None = None) -> Multifrontal:
     """Factorise a sparse Hermitian matrix whose eliminated rows are positive definite.
 
     Parameters

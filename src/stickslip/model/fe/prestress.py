@@ -62,9 +62,7 @@ def prestress_terms(
         small = _strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
         large = _strain_operator(turn, slopes)
         m, q, k, _ = slopes.shape
-        stressed = (volume[:, :, None, None] * (_elasticity(lame[piece]) @ large)).reshape(
-            m, 6 * q, 3 * k
-        )
+        stressed = (volume[:, :, None, None] * (_elasticity(lame[piece]) @ large)).reshape(m, 6 * q, 3 * k)
         mixed = small.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         square = large.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         stress = volume[:, :, None, None] * second_stress(lame[piece], turn, green)
@@ -76,9 +74,7 @@ def prestress_terms(
     return PrestressTerms(*(places.matrix(store) for store in stores))
 
 
-def internal_force(
-    mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray
-) -> FloatArray:
+def internal_force(mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray) -> FloatArray:
     """Return the (nodes, 3) forces in N that hold the solid at a finite displacement (nodes, 3)."""
     force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
     for piece in chunks(mesh, shape):
@@ -92,9 +88,7 @@ def internal_force(
     return force
 
 
-def displacement_gradients(
-    mesh: SolidMesh, slopes: FloatArray, piece: slice, displacement: FloatArray
-) -> FloatArray:
+def displacement_gradients(mesh: SolidMesh, slopes: FloatArray, piece: slice, displacement: FloatArray) -> FloatArray:
     """Return (m, q, 3, 3) gradients ``∂u_a / ∂x_b`` of a displacement (nodes, 3) in a piece of the cells."""
     moved = displacement[mesh.cells[piece]].transpose(0, 2, 1)
     return np.asarray(moved[:, None] @ slopes)
@@ -116,10 +110,7 @@ def second_stress(lame: FloatArray, turn: FloatArray, green: bool) -> FloatArray
 def _strain_operator(turn: FloatArray, slopes: FloatArray) -> FloatArray:
     """Return (m, q, 6, 3k): ``sym(turnᵀ ∇v)`` of the k nodes' displacements v, shears doubled."""
     product = np.einsum("mqac,mqkd->mqcdka", turn, slopes)
-    rows = [
-        product[:, :, c, d] if c == d else product[:, :, c, d] + product[:, :, d, c]
-        for c, d in PAIRS
-    ]
+    rows = [product[:, :, c, d] if c == d else product[:, :, c, d] + product[:, :, d, c] for c, d in PAIRS]
     stacked = np.stack(rows, axis=2)
     return stacked.reshape(*stacked.shape[:3], -1)
 

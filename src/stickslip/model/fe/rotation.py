@@ -82,9 +82,7 @@ class RotatingSolid:
     nodal_mass: Matrix
     centrifugal: FloatArray
     _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
-    _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def spin_softening(self) -> Matrix:
@@ -126,9 +124,7 @@ class RotatingSolid:
         """Return the (n,) load in N at `speed` in rad/s, on the undeformed solid."""
         return speed**2 * self.centrifugal
 
-    def displacement(
-        self, speed: float, *, tie: Matrix | None = None, nonlinear: bool = False
-    ) -> FloatArray:
+    def displacement(self, speed: float, *, tie: Matrix | None = None, nonlinear: bool = False) -> FloatArray:
         """Return the static displacement under the centrifugal load.
 
         Parameters
@@ -158,11 +154,7 @@ class RotatingSolid:
         return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
 
     def polynomial(
-        self,
-        tie: Matrix | None = None,
-        *,
-        tangent: Tangent = "consistent",
-        unit: FloatArray | None = None,
+        self, tie: Matrix | None = None, *, tangent: Tangent = "consistent", unit: FloatArray | None = None
     ) -> SpeedPolynomial:
         """Return the stiffness as a polynomial of the speed, exact where the static displacement is linear.
 
@@ -214,9 +206,7 @@ class RotatingSolid:
         _check_speed(speed)
         if tangent not in TANGENTS:
             raise input_error(
-                "RotatingSolid.at_speed",
-                f"there is no tangent {tangent!r}",
-                did_you_mean(tangent, list(TANGENTS)),
+                "RotatingSolid.at_speed", f"there is no tangent {tangent!r}", did_you_mean(tangent, list(TANGENTS))
             )
         if tangent == "nonlinear":
             start = speed**2 * self._unit_displacement(tie)
@@ -238,9 +228,7 @@ class RotatingSolid:
 
     def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
         where = self.at_nodes(displacement)
-        terms = prestress_terms(
-            self.mesh, self.material, self._shape, self._places, where, green=green
-        )
+        terms = prestress_terms(self.mesh, self.material, self._shape, self._places, where, green=green)
         parts = (terms.linear, terms.quadratic, terms.geometric)
         return PrestressTerms(*(self._of_dofs(part) for part in parts))
 
@@ -257,9 +245,7 @@ class RotatingSolid:
             self._displacements[key] = _solve(self.structure.stiffness, self.centrifugal, tie)
         return self._displacements[key]
 
-    def _equilibrium(
-        self, speed: float, tie: Matrix | None, start: FloatArray
-    ) -> tuple[FloatArray, Matrix]:
+    def _equilibrium(self, speed: float, tie: Matrix | None, start: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return displacement (n,) and tangent (n, n) of the equilibrium at finite displacement."""
         displacement, S = start, self.spin_softening
         goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))

@@ -13,14 +13,7 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
 from stickslip.model.dofs import nodal_dofs
-from stickslip.model.fe.elements import (
-    EXACT,
-    Quadrature,
-    check_jacobians,
-    library,
-    library_element,
-    shape_functions,
-)
+from stickslip.model.fe.elements import EXACT, Quadrature, check_jacobians, library, library_element, shape_functions
 from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
@@ -107,19 +100,13 @@ def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
             held[mesh.node_sets[name]] = True
         elif name != "root":
             raise input_error(
-                "clamped",
-                f"there is no node set {name!r}",
-                nearest_and_known(name, list(mesh.node_sets)),
+                "clamped", f"there is no node set {name!r}", nearest_and_known(name, list(mesh.node_sets))
             )
     return held
 
 
 def support(
-    mesh: SolidMesh,
-    mass: Matrix,
-    stiffness: Matrix,
-    clamped: tuple[str, ...],
-    held: BoolArray | None,
+    mesh: SolidMesh, mass: Matrix, stiffness: Matrix, clamped: tuple[str, ...], held: BoolArray | None
 ) -> tuple[Structure, IntArray]:
     """Take supported components out of the matrices of a free body.
 
@@ -132,11 +119,7 @@ def support(
     fixed = np.repeat(still[:, None], 3, axis=1)
     if held is not None:
         if held.shape != fixed.shape:
-            raise input_error(
-                "held",
-                f"has shape {held.shape} for {len(still)} nodes",
-                "Give x, y, z of each node.",
-            )
+            raise input_error("held", f"has shape {held.shape} for {len(still)} nodes", "Give x, y, z of each node.")
         fixed = fixed | held
     moving = np.flatnonzero(~fixed.ravel())
     new = np.full(fixed.size, -1)
@@ -164,9 +147,7 @@ def node_dofs(nodes: IntArray) -> IntArray:
     return np.asarray((3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
 
-def integrate(
-    mesh: SolidMesh, material: Materials, quadrature: Quadrature
-) -> tuple[Matrix, Matrix]:
+def integrate(mesh: SolidMesh, material: Materials, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
     """Return mass and stiffness of the free body, dofs node-major in the mesh's own order."""
     check_nodes(mesh)
     for degree in {quadrature.stiffness, quadrature.mass}:
@@ -183,9 +164,7 @@ def integrate(
         nodes, local = np.unique(cells, return_inverse=True)
         part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
         rows = node_dofs(nodes)
-        place = scipy.sparse.csr_array(
-            (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows))
-        )
+        place = scipy.sparse.csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows)))
         M, K = _integrate(part, one, quadrature)
         mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
     return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
@@ -208,9 +187,7 @@ def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Materia
     return material
 
 
-def _integrate(
-    mesh: SolidMesh, material: Material, quadrature: Quadrature
-) -> tuple[Matrix, Matrix]:
+def _integrate(mesh: SolidMesh, material: Material, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
     """Integrate a body of one material.
 
     Both matrices are put together from scalar integrals, ``∫ φ_p φ_q`` and ``∫ ∂_a φ_p ∂_b φ_q``:
@@ -227,9 +204,7 @@ def _integrate(
     D = {}
     for a in range(3):
         for b in range(a, 3):
-            D[a, b] = assemble(
-                lambda u, v, _, a=a, b=b: v.grad[a] * u.grad[b], quadrature.stiffness
-            )
+            D[a, b] = assemble(lambda u, v, _, a=a, b=b: v.grad[a] * u.grad[b], quadrature.stiffness)
             D[b, a] = D[a, b].T
     first, second = material.lame
     trace = second * (D[0, 0] + D[1, 1] + D[2, 2])
@@ -248,9 +223,7 @@ def check_nodes(mesh: SolidMesh) -> None:
     orphans = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
     if orphans.size:
         raise input_error(
-            "mesh",
-            f"{orphans.size} nodes belong to no element, e.g. {mesh.numbers[orphans[0]]}",
-            "Remove them.",
+            "mesh", f"{orphans.size} nodes belong to no element, e.g. {mesh.numbers[orphans[0]]}", "Remove them."
         )
 
 

@@ -47,15 +47,10 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     offset = np.array([geometry.pitch, 0.0, 0.0])
     on_second = np.array([side == "curved" for side in contacts.side], dtype=bool)
     targets = contacts.position - on_second[:, None] * offset
-    marks = {
-        "force": _force_place(geometry),
-        "edge": _section(geometry, 0.5)[0],
-    }
+    marks = {"force": _force_place(geometry), "edge": _section(geometry, 0.5)[0]}
     marks["tip"] = _section(geometry, 1.0)[2]
     on_shank = geometry.force_span < 0.0
-    points, cells = _mesh_blade(
-        geometry, np.vstack([targets, marks["force"]]) if on_shank else targets
-    )
+    points, cells = _mesh_blade(geometry, np.vstack([targets, marks["force"]]) if on_shank else targets)
     nearest = _match(points, np.vstack([targets, *(marks[k] for k in ("force", "edge", "tip"))]))
     n = len(points)
     contact = nearest[:-3] + n * on_second
@@ -67,10 +62,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     sets |= {"force": np.array([force]), "output": np.array([tip, edge, tip + n])}
     faces = (_underside(geometry, points, 1), _underside(geometry, points, -1) + n)
     for name, own, face in zip(
-        ("underside_1", "underside_2"),
-        (contact[~on_second], contact[on_second]),
-        faces,
-        strict=True,
+        ("underside_1", "underside_2"), (contact[~on_second], contact[on_second]), faces, strict=True
     ):
         sets[name] = own if own.size else face
     sets |= {"tip1": np.array([tip]), "edge1": np.array([edge]), "tip2": np.array([tip + n])}
@@ -91,14 +83,10 @@ def check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
         flat = side == "flat"
         inward = x if flat else geometry.pitch - x
         angle = geometry.flat_angle if flat else geometry.curved_angle
-        off = z * math.cos(angle) - (
-            edge * math.cos(angle) - (geometry.half_width - inward) * math.sin(angle)
-        )
+        off = z * math.cos(angle) - (edge * math.cos(angle) - (geometry.half_width - inward) * math.sin(angle))
         inside = geometry.shank_thickness / 2 < inward < geometry.half_width
         if abs(off) > MATCH or not inside or abs(y) >= geometry.platform_depth / 2:
-            misses.append(
-                f"{name} at ({x:.6g}, {y:.6g}, {z:.6g}) m, {off:.3g} m from the {side} side's plane"
-            )
+            misses.append(f"{name} at ({x:.6g}, {y:.6g}, {z:.6g}) m, {off:.3g} m from the {side} side's plane")
     if misses:
         raise input_error(
             "mesh_blade_pair",
@@ -180,10 +168,7 @@ def _mesh_blade(geometry: BladePair, targets: FloatArray) -> tuple[FloatArray, I
 def _build(occ: Any, geometry: BladePair) -> None:
     """Build foot, shank with platform, and airfoil, fused into one solid."""
     g = geometry
-    foot = occ.addBox(
-        -g.foot_width / 2, -g.foot_depth / 2, -g.foot_height,
-        g.foot_width, g.foot_depth, g.foot_height,
-    )  # fmt: skip
+    foot = occ.addBox(-g.foot_width / 2, -g.foot_depth / 2, -g.foot_height, g.foot_width, g.foot_depth, g.foot_height)
     edge, (flat, curved) = g.platform_height - g.platform_edge, g.shank_tops
     w, s = g.half_width, g.shank_thickness / 2
     outline = [(s, 0), (s, flat), (w, edge), (w, g.platform_height)]
@@ -192,9 +177,7 @@ def _build(occ: Any, geometry: BladePair) -> None:
     lines = [occ.addLine(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
     face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
     body = [e for e in occ.extrude([(2, face)], 0, g.platform_depth, 0) if e[0] == 3]
-    wires = [
-        _wire(occ, _section(g, span)) for span in sorted({0.0, max(g.force_span, 0.0), 0.5, 1.0})
-    ]
+    wires = [_wire(occ, _section(g, span)) for span in sorted({0.0, max(g.force_span, 0.0), 0.5, 1.0})]
     airfoil = occ.addThruSections(wires, makeSolid=True, makeRuled=True)
     occ.fuse([(3, foot)], body + [e for e in airfoil if e[0] == 3])
 
@@ -237,9 +220,15 @@ def _set_sizes(field: Any, geometry: BladePair) -> None:
     for size, low, high in zip(sizes, levels, levels[1:], strict=False):
         tag = field.add("Box")
         for key, value in {
-            "VIn": size, "VOut": far, "ZMin": low, "ZMax": high,
-            "XMin": -far, "XMax": far, "YMin": -far, "YMax": far,
-        }.items():  # fmt: skip
+            "VIn": size,
+            "VOut": far,
+            "ZMin": low,
+            "ZMax": high,
+            "XMin": -far,
+            "XMax": far,
+            "YMin": -far,
+            "YMax": far,
+        }.items():
             field.setNumber(tag, key, value)
         boxes.append(tag)
     smallest = field.add("Min")

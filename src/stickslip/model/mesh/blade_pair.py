@@ -60,20 +60,14 @@ class BladePair:
     pitch: float = length("distance of the two blades along x", 0.056)
     foot_width: float = length("extent of the foot along x", 0.034)
     foot_depth: float = length("extent of the foot along y", 0.048)
-    foot_height: float = length(
-        "extent of the foot along z; its bottom and flanks are clamped", 0.020
-    )
+    foot_height: float = length("extent of the foot along z; its bottom and flanks are clamped", 0.020)
     shank_thickness: float = length("extent of the shank along x", 0.0132)
     platform_gap: float = length("clearance between neighbouring platforms along x", 0.001)
     platform_depth: float = length("extent of shank and platform along y", 0.048)
     platform_height: float = length("height of the platform's top above the foot", 0.110)
     platform_edge: float = length("thickness of the platform at its edges", 0.004)
-    flat_angle: float = angle(
-        "inclination from x of the underside of blade 1", 45, above=0, below=90
-    )
-    curved_angle: float = angle(
-        "inclination from x of the underside of blade 2", 60, above=0, below=90
-    )
+    flat_angle: float = angle("inclination from x of the underside of blade 1", 45, above=0, below=90)
+    curved_angle: float = angle("inclination from x of the underside of blade 2", 60, above=0, below=90)
     airfoil_length: float = length("length of the airfoil from the platform to the tip", 0.160)
     hub_chord: float = length("chord of the airfoil at the platform", 0.046)
     tip_chord: float = length("chord of the airfoil at the tip", 0.040)
@@ -126,8 +120,7 @@ class BladePair:
         if self.hub_chord >= self.platform_depth or reach >= self.half_width:
             raise _bad(
                 "hub_chord",
-                f"the airfoil's hub section ({self.hub_chord} m × {2 * reach} m) "
-                "overhangs the platform",
+                f"the airfoil's hub section ({self.hub_chord} m × {2 * reach} m) overhangs the platform",
                 "Make it smaller than the platform.",
             )
         if self.foot_width < self.shank_thickness or self.foot_depth < self.platform_depth:

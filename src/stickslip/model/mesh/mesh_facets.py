@@ -7,10 +7,7 @@ from stickslip.model.mesh.solid_mesh import HEX_FACES, TET_FACES, SolidMesh
 
 # edges of second-order cells in the order of their mid nodes, which follow the corners
 TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-HEX_EDGES = (
-    *((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7)),
-    *((0, 4), (1, 5), (2, 6), (3, 7)),
-)
+HEX_EDGES = (*((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7)), *((0, 4), (1, 5), (2, 6), (3, 7)))
 
 
 def facets_of(mesh: SolidMesh, nodes: IntArray) -> IntArray:
@@ -42,9 +39,7 @@ def _skin(mesh: SolidMesh) -> IntArray:
     pattern = _pattern(mesh)
     corners = 3 if mesh.cells.shape[1] in (4, 10) else 4
     faces = mesh.cells[:, pattern].reshape(-1, pattern.shape[1])
-    _, first, count = np.unique(
-        np.sort(faces[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
-    )
+    _, first, count = np.unique(np.sort(faces[:, :corners], axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(faces[np.sort(first[count == 1])])
 
 
@@ -56,10 +51,7 @@ def _pattern(mesh: SolidMesh) -> IntArray:
         return corners
     first = 4 if kind == 10 else 8
     place = {pair: first + i for i, pair in enumerate(edges)}
-    middles = [
-        [place[min(a, b), max(a, b)] for a, b in zip(row, np.roll(row, -1), strict=True)]
-        for row in corners
-    ]
+    middles = [[place[min(a, b), max(a, b)] for a, b in zip(row, np.roll(row, -1), strict=True)] for row in corners]
     return np.hstack([corners, np.array(middles)])
 
 

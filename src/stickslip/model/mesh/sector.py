@@ -40,18 +40,13 @@ class BladedSector:
         If the parts do not fit together, or reach into the neighbours.
     """
 
-    sectors: int = quantity(
-        "number of sectors (blades) of the wheel", default=24, least=3, usual=500
-    )
+    sectors: int = quantity("number of sectors (blades) of the wheel", default=24, least=3, usual=500)
     disk: DiskProfile = field(default_factory=DiskProfile, metadata=table("the disk"))
     platform: Platform | None = field(
-        default_factory=Platform,
-        metadata=table("what carries the airfoil; left out: it stands on the rim"),
+        default_factory=Platform, metadata=table("what carries the airfoil; left out: it stands on the rim")
     )
     airfoil: Airfoil = field(default_factory=Airfoil, metadata=table("the blade"))
-    shroud: Shroud | None = field(
-        default=None, metadata=table("a ring segment on the blade; left out: none")
-    )
+    shroud: Shroud | None = field(default=None, metadata=table("a ring segment on the blade; left out: none"))
     disk_size: float = length("element size in the disk", 0.012)
     platform_size: float = length("element size in platform and shroud", 0.008)
     airfoil_size: float = length("element size in the airfoil", 0.010)
@@ -106,12 +101,7 @@ class BladedSector:
         neck = p.neck_width / 2
         meets = lower - (lower * slope - neck) * math.tan(p.underside_angle)
         side = np.array(
-            [
-                [self._sunk(neck), neck],
-                [meets, neck],
-                [lower, lower * slope],
-                [p.top_radius, p.top_radius * slope],
-            ]
+            [[self._sunk(neck), neck], [meets, neck], [lower, lower * slope], [p.top_radius, p.top_radius * slope]]
         )
         return np.vstack([side, side[::-1] * [1, -1]])
 
@@ -152,8 +142,7 @@ class BladedSector:
         if np.hypot(*meets) <= rim:
             raise _bad(
                 "platform.top_radius",
-                f"{p.top_radius} m: the underside meets the neck at {meets[0]:.6g} m, inside the rim "
-                f"of radius {rim} m",
+                f"{p.top_radius} m: the underside meets the neck at {meets[0]:.6g} m, inside the rim of radius {rim} m",
                 "Raise the platform, make it thinner, or its underside flatter.",
             )
 
@@ -197,25 +186,15 @@ class BladedSector:
             return
         inner = self.shroud_radius - s.thickness / 2
         if inner <= self.base_radius:
-            raise _bad(
-                "shroud.span", f"{s.span} puts the shroud into the blade's foot", "Move it outward."
-            )
+            raise _bad("shroud.span", f"{s.span} puts the shroud into the blade's foot", "Move it outward.")
         if s.gap >= self.shroud_radius * self.pitch:
             raise _bad("shroud.gap", f"{s.gap} m leaves no shroud", "Make the gap smaller.")
         if s.span < 1 and inner + s.thickness >= self.tip_radius:
-            raise _bad(
-                "shroud.span",
-                f"{s.span} lets the shroud end at the tip",
-                "Use 1, or move it inward.",
-            )
+            raise _bad("shroud.span", f"{s.span} lets the shroud end at the tip", "Use 1, or move it inward.")
         outline = self.airfoil.section(s.span)
         y, z = outline.T
-        ahead = _turned_y(self.shroud_radius, y, -self.shroud_angle / 2) - z * math.tan(
-            s.face_angle
-        )
-        behind = _turned_y(self.shroud_radius, y, self.shroud_angle / 2) - z * math.tan(
-            s.face_angle
-        )
+        ahead = _turned_y(self.shroud_radius, y, -self.shroud_angle / 2) - z * math.tan(s.face_angle)
+        behind = _turned_y(self.shroud_radius, y, self.shroud_angle / 2) - z * math.tan(s.face_angle)
         if np.any(ahead >= 0) or np.any(behind <= 0):
             raise _bad(
                 "shroud.face_angle",

@@ -130,9 +130,7 @@ def _shroud(occ: Any, geometry: BladedSector) -> tuple[int, int]:
     corners = np.array(
         [
             [geometry.shroud_radius + a * shroud.thickness / 2, s * math.tan(shroud.face_angle), s]
-            for a, s in zip(
-                (-1, 1, 1, -1), np.array([-1, -1, 1, 1]) * shroud.depth / 2, strict=True
-            )
+            for a, s in zip((-1, 1, 1, -1), np.array([-1, -1, 1, 1]) * shroud.depth / 2, strict=True)
         ]
     )
     angle = geometry.shroud_angle

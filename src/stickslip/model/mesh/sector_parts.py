@@ -123,9 +123,7 @@ class Airfoil:
         If a length is not positive, or a thickness exceeds its chord.
     """
 
-    airfoil_length: float = length(
-        "from the platform's top (without platform: from the rim) to the tip", 0.105
-    )
+    airfoil_length: float = length("from the platform's top (without platform: from the rim) to the tip", 0.105)
     hub_chord: float = length("chord at the hub", 0.030)
     tip_chord: float = length("chord at the tip", 0.026)
     hub_thickness: float = length("thickness at the hub", 0.0050)
@@ -187,15 +185,11 @@ class Shroud:
         If a length is not positive, the span is outside (0, 1], or the angle is too steep.
     """
 
-    span: float = quantity(
-        "place as a fraction of the airfoil's length; 1 is the tip", default=1.0, above=0, most=1
-    )
+    span: float = quantity("place as a fraction of the airfoil's length; 1 is the tip", default=1.0, above=0, most=1)
     thickness: float = length("extent along the radius", 0.004)
     depth: float = length("extent along the axis", 0.026)
     gap: float = length("clearance to the neighbour's shroud; 0 lets them touch", 0.0, least=0)
-    face_angle: float = angle(
-        "inclination of the contact faces from the axial plane", 20, least=-75, most=75
-    )
+    face_angle: float = angle("inclination of the contact faces from the axial plane", 20, least=-75, most=75)
 
     def __post_init__(self) -> None:
         check_quantities(self)

@@ -11,9 +11,7 @@ from stickslip.errors import input_error, missing_package
 
 CELL_NAMES = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20"}
 TET_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])  # outward
-HEX_FACES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-)  # outward
+HEX_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])  # outward
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +63,7 @@ class SolidMesh:
                 object.__setattr__(self, name, np.arange(count))
             elif getattr(self, name).shape != (count,):
                 raise input_error(
-                    f"SolidMesh.{name}",
-                    f"has shape {getattr(self, name).shape} for {count}",
-                    "Give one number each.",
+                    f"SolidMesh.{name}", f"has shape {getattr(self, name).shape} for {count}", "Give one number each."
                 )
 
     @property
@@ -75,9 +71,7 @@ class SolidMesh:
         """(k, 3) corner nodes of the skin's triangles, oriented outward; a quadrilateral gives two."""
         pattern = TET_FACES if self.cells.shape[1] in (4, 10) else HEX_FACES
         faces = self.cells[:, pattern].reshape(-1, pattern.shape[1])
-        _, first, count = np.unique(
-            np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-        )
+        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
         skin = faces[np.sort(first[count == 1])]
         if skin.shape[1] == 4:
             skin = skin[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)

@@ -58,10 +58,7 @@ def read_abaqus_matrices(
         files["damping"] = Path(damping)
     entries = {name: _read_entries(path) for name, path in files.items()}
     keys = np.unique(np.concatenate([e[0].ravel() for e in entries.values()]))
-    matrices = {
-        name: _matrix(entries[name], keys, files[name], supports=name == "stiffness")
-        for name in entries
-    }
+    matrices = {name: _matrix(entries[name], keys, files[name], supports=name == "stiffness") for name in entries}
     held = matrices["stiffness"].diagonal() >= HELD
     free = np.flatnonzero(~held)
     cut = {name: matrix[free][:, free] for name, matrix in matrices.items()}
@@ -69,9 +66,7 @@ def read_abaqus_matrices(
     table = find_nodes(nodes, units)
     dofs = table.dofs(node, [COMPONENTS[i] for i in direction])
     none = scipy.sparse.csr_array((len(free), len(free)))
-    raw = Structure(
-        cut["mass"], cut.get("damping", none), cut["stiffness"], dofs, table.dof_sets(dofs)
-    )
+    raw = Structure(cut["mass"], cut.get("damping", none), cut["stiffness"], dofs, table.dof_sets(dofs))
     structure = in_si(raw, units)
     if plausible:
         check_units(structure, units, str(stiffness))
@@ -92,9 +87,7 @@ def read_coordinate_matrix(path: Path | str) -> Matrix:
     table = _table(path, 3)
     index = whole_numbers(path, table, ("row", "column")) - 1
     if len(index) and index.min() < 0:
-        raise input_error(
-            str(path), f"has row or column {index.min() + 1}", "Rows are counted from 1."
-        )
+        raise input_error(str(path), f"has row or column {index.min() + 1}", "Rows are counted from 1.")
     n = int(index.max()) + 1 if len(index) else 0
     if n > len(index):
         raise input_error(
@@ -130,9 +123,7 @@ def _read_entries(path: Path) -> tuple[IntArray, FloatArray]:
 def _table(path: Path, columns: int) -> FloatArray:
     """Return the numbers of a file, whose comments start with a star."""
     lines = read_text(path).splitlines()
-    kept = "\n".join(
-        "" if line.lstrip().startswith("*") else line.rstrip().rstrip(",") for line in lines
-    )
+    kept = "\n".join("" if line.lstrip().startswith("*") else line.rstrip().rstrip(",") for line in lines)
     separator = "," if "," in kept else None
     table = number_table(path, kept, columns, separator=separator)
     if not len(table):
@@ -140,9 +131,7 @@ def _table(path: Path, columns: int) -> FloatArray:
     return table
 
 
-def _matrix(
-    entries: tuple[IntArray, FloatArray], keys: IntArray, path: Path, *, supports: bool
-) -> Matrix:
+def _matrix(entries: tuple[IntArray, FloatArray], keys: IntArray, path: Path, *, supports: bool) -> Matrix:
     """Return the matrix on the dofs `keys`; 1e36 is left out of the symmetry check, as it hides all else."""
     index, values = np.searchsorted(keys, entries[0]), entries[1]
     held = np.zeros(len(values), dtype=bool)

@@ -12,13 +12,7 @@ import scipy
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
-from stickslip.model.readers.ansys_nodes import (
-    COMPONENTS,
-    AnsysNodes,
-    no_nodes,
-    read_ansys_nodes,
-    rotations,
-)
+from stickslip.model.readers.ansys_nodes import COMPONENTS, AnsysNodes, no_nodes, read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_records import HEADER, Records, long_pointer, open_records
 from stickslip.model.readers.nodal_axes import rotation_to_global
 from stickslip.model.readers.units import Units, check_units, in_si
@@ -28,11 +22,7 @@ FULL = 4
 
 
 def read_ansys_full(
-    path: Path | str,
-    *,
-    nodes: Path | str | None = None,
-    units: Units | None = None,
-    plausible: bool = True,
+    path: Path | str, *, nodes: Path | str | None = None, units: Units | None = None, plausible: bool = True
 ) -> Structure:
     """Read mass, stiffness and, where written, damping from the ``.full`` file of an ANSYS analysis.
 
@@ -73,9 +63,7 @@ def read_ansys_full(
     damping = _matrix(file, header, (28, 29), (34, 39), "damping")
     if mass is None or stiffness is None:
         raise input_error(
-            str(path),
-            "lacks the mass or the stiffness matrix",
-            "Run a modal analysis, then read its .full.",
+            str(path), "lacks the mass or the stiffness matrix", "Run a modal analysis, then read its .full."
         )
     used = (abs(stiffness) + abs(mass)).sum(axis=1) > 0
     order = np.lexsort((component, node))
@@ -113,8 +101,7 @@ def _supported(file: Records, header: IntArray) -> int:
     n, end = int(header[1]), long_pointer(header[22], header[23])
     if not 0 < n <= len(file.words) or not 0 < end <= len(file.words):
         raise file.damaged(
-            "header of the matrices",
-            f"tells of {n} equations and {end} words, the file has {len(file.words)}",
+            "header of the matrices", f"tells of {n} equations and {end} words, the file has {len(file.words)}"
         )
     return n
 
@@ -194,9 +181,7 @@ def _matrix(
     return (half + half.T - scipy.sparse.diags_array(half.diagonal())).tocsr()
 
 
-def _structure(
-    matrices: list[Matrix], node: IntArray, component: IntArray, known: AnsysNodes, place: str
-) -> Structure:
+def _structure(matrices: list[Matrix], node: IntArray, component: IntArray, known: AnsysNodes, place: str) -> Structure:
     """Put mass, damping, stiffness and nodes together, in the file's units and the global axes."""
     position, sets = known.of_dofs(node, place)
     turned = known.numbers[known.angles.any(axis=1)]

@@ -26,18 +26,9 @@ from stickslip.model.readers.ansys_blocks import (
 from stickslip.model.readers.units import Units, check_material
 
 COUPLED = ("coupled_1", "coupled_2")
-NODES_OF_SOLID = {
-    185: (8, 4),
-    186: (20,),
-    187: (10, 4),
-}  # element type -> its regular numbers of nodes
+NODES_OF_SOLID = {185: (8, 4), 186: (20,), 187: (10, 4)}  # element type -> its regular numbers of nodes
 # values of KEYOPT other than 0 that leave these solids as they are read: SOLID186 with full integration, and output
-HARMLESS_OPTIONS = {
-    (186, 2): ("1",),
-    (185, 5): ("1", "2"),
-    (186, 5): ("1", "2"),
-    (187, 5): ("1", "2"),
-}
+HARMLESS_OPTIONS = {(186, 2): ("1",), (185, 5): ("1", "2"), (186, 5): ("1", "2"), (187, 5): ("1", "2")}
 WHAT_OPTIONS = {
     (185, 2): "another integration than full: reduced, or with enhanced strains",
     (185, 3): "layers",
@@ -48,12 +39,22 @@ WHAT_OPTIONS = {
 }
 # tables of what a material does beyond small vibration: plasticity, creep, and friction of contacts
 BEYOND_VIBRATION = {
-    "PLAS", "BISO", "BKIN", "MISO", "MKIN", "KINH", "NLIS", "CHAB", "CREE", "RATE", "FRIC", "CZM", "FAIL", "FCLI",
-}  # fmt: skip
-WITHOUT_STIFFNESS = {
-    154,
-    200,
-}  # surface effect elements for pressures, and meshes that are not solved
+    "PLAS",
+    "BISO",
+    "BKIN",
+    "MISO",
+    "MKIN",
+    "KINH",
+    "NLIS",
+    "CHAB",
+    "CREE",
+    "RATE",
+    "FRIC",
+    "CZM",
+    "FAIL",
+    "FCLI",
+}
+WITHOUT_STIFFNESS = {154, 200}  # surface effect elements for pressures, and meshes that are not solved
 
 
 def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> SolidMesh:
@@ -88,9 +89,7 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     numbers = blocks.numbers[order]
     missing = np.setdiff1d(used, numbers)
     if len(missing):
-        raise input_error(
-            str(path), f"has elements at node {missing[0]}, which is not there", CUT_SHORT
-        )
+        raise input_error(str(path), f"has elements at node {missing[0]}, which is not there", CUT_SHORT)
     points = blocks.points[order][np.searchsorted(numbers, used)]
     named = dict(blocks.node_sets) | dict(zip(COUPLED, _coupled(blocks).T, strict=True))
     sets = {name: np.flatnonzero(np.isin(used, members)) for name, members in named.items()}
@@ -138,9 +137,7 @@ def read_ansys_materials(
             continue
         try:
             material = Material(
-                young_modulus=units.stress * values["EX"],
-                poisson_ratio=poisson,
-                density=units.density * values["DENS"],
+                young_modulus=units.stress * values["EX"], poisson_ratio=poisson, density=units.density * values["DENS"]
             )
         except InputError as error:
             raise error.inside(place) from None
@@ -253,9 +250,7 @@ def _solids(path: Path, blocks: Blocks) -> IntArray:
     others = sorted(set(kinds.tolist()) - NODES_OF_SOLID.keys() - WITHOUT_STIFFNESS)
     if others:
         raise input_error(
-            str(path),
-            f"has elements of the types {others}; a mesh of solids holds SOLID185, 186 and 187",
-            WRITE,
+            str(path), f"has elements of the types {others}; a mesh of solids holds SOLID185, 186 and 187", WRITE
         )
     _check_options(blocks)
     rows = np.flatnonzero(np.isin(kinds, list(NODES_OF_SOLID)))

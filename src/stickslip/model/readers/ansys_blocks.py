@@ -16,9 +16,7 @@ from stickslip.errors import input_error
 from stickslip.model.readers.keywords import LARGEST
 from stickslip.model.readers.text import read_text
 
-HEAD = (
-    11  # numbers before the nodes of an element: material, type, ..., number of nodes, -, element
-)
+HEAD = 11  # numbers before the nodes of an element: material, type, ..., number of nodes, -, element
 TYPE, COUNT, NUMBER = 1, 8, 10  # places among them
 CUT_SHORT = "The file was cut short: write or copy it again."
 WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDWRITE,DB,model,cdb."
@@ -109,14 +107,10 @@ def read_blocks(path: Path) -> Blocks:
             at += 1
         else:
             if command in KEPT:
-                commands.append(
-                    (f"{path}: line {at + 1}", [w.split("!")[0].strip() for w in words])
-                )
+                commands.append((f"{path}: line {at + 1}", [w.split("!")[0].strip() for w in words]))
             at += 1
     if not nodes:
-        raise input_error(
-            str(path), "has no block of nodes (NBLOCK)", "Write it with CDWRITE,DB,model,cdb."
-        )
+        raise input_error(str(path), "has no block of nodes (NBLOCK)", "Write it with CDWRITE,DB,model,cdb.")
     table = np.vstack(nodes)
     return Blocks(
         table[:, 0].astype(np.int64),
@@ -141,50 +135,33 @@ def integer(word: str) -> int:
 
 def is_whole(word: str) -> bool:
     """Whether `integer` reads a word as a number from zero on."""
-    return (
-        word.isascii()
-        and word.isdecimal()
-        and len(word) <= len(str(LARGEST))
-        and int(word) <= LARGEST
-    )
+    return word.isascii() and word.isdecimal() and len(word) <= len(str(LARGEST)) and int(word) <= LARGEST
 
 
 def _whole(path: Path, line: int, word: str) -> int:
     try:
         return integer(word)
     except ValueError as error:
-        raise input_error(
-            f"{path}: line {line + 1}", f"{word[:40]!r} is no whole number", CUT_SHORT
-        ) from error
+        raise input_error(f"{path}: line {line + 1}", f"{word[:40]!r} is no whole number", CUT_SHORT) from error
 
 
 def _format(path: Path, lines: list[str], at: int) -> tuple[int, int, int]:
     """Return count and width of whole numbers, and the width of real ones, from ``(3i9,6e21.13e3)``."""
     text = lines[at] if at < len(lines) else ""
-    found = re.fullmatch(
-        r"\((\d{1,3})i(\d{1,3})(?:,\d{0,3}e(\d{1,3})\.\d+(?:e\d)?)?\)", text.strip().lower()
-    )
+    found = re.fullmatch(r"\((\d{1,3})i(\d{1,3})(?:,\d{0,3}e(\d{1,3})\.\d+(?:e\d)?)?\)", text.strip().lower())
     if not found or not int(found[1]) or not int(found[2]):
-        raise input_error(
-            f"{path}: line {at + 1}",
-            f"{text[:40]!r} is no format such as (3i9,6e21.13e3)",
-            CUT_SHORT,
-        )
+        raise input_error(f"{path}: line {at + 1}", f"{text[:40]!r} is no format such as (3i9,6e21.13e3)", CUT_SHORT)
     return int(found[1]), int(found[2]), int(found[3] or 0)
 
 
 def _block_end(lines: list[str], at: int) -> int:
     """Return the first line from `at` on that starts like a command or ends a block: ``N,R5.3,LOC,-1`` or ``-1``."""
-    while (
-        at < len(lines) and lines[at][:1] in " 0123456789" and lines[at].strip() not in {"", "-1"}
-    ):
+    while at < len(lines) and lines[at][:1] in " 0123456789" and lines[at].strip() not in {"", "-1"}:
         at += 1
     return at
 
 
-def _fields(
-    path: Path, lines: list[str], first: int, width: int, kind: Callable[[str], float]
-) -> list[list[float]]:
+def _fields(path: Path, lines: list[str], first: int, width: int, kind: Callable[[str], float]) -> list[list[float]]:
     """Cut lines into fields of a width; blank ones are zeros."""
     table = []
     for number, line in enumerate(lines, first + 1):
@@ -193,9 +170,7 @@ def _fields(
             table.append([kind(field) if field.strip() else 0 for field in row])
         except ValueError as error:
             raise input_error(
-                f"{path}: line {number}",
-                f"{line[:60]!r} holds something else than numbers",
-                CUT_SHORT,
+                f"{path}: line {number}", f"{line[:60]!r} holds something else than numbers", CUT_SHORT
             ) from error
     return table
 
@@ -210,15 +185,11 @@ def _node_block(path: Path, lines: list[str], at: int) -> tuple[FloatArray, int]
     numbers = _fields(path, [line[:width] for line in body], first, width, integer)
     rest = _fields(path, [line[split:] for line in body], first, max(real, 1), float)
     if any(len(row) != 1 for row in numbers) or any(len(row) > 6 for row in rest) or not real:
-        raise input_error(
-            f"{path}: line {at + 1}", "the nodes do not follow their format", CUT_SHORT
-        )
+        raise input_error(f"{path}: line {at + 1}", "the nodes do not follow their format", CUT_SHORT)
     expected = stated[4] if len(stated) > 4 else ""
     if is_whole(expected) and int(expected) != len(body):
         raise input_error(
-            f"{path}: line {end + 1}",
-            f"the block of nodes ends after {len(body)} of {expected}",
-            CUT_SHORT,
+            f"{path}: line {end + 1}", f"the block of nodes ends after {len(body)} of {expected}", CUT_SHORT
         )
     table = np.zeros((len(body), 7))
     table[:, 0] = [row[0] for row in numbers]
@@ -227,9 +198,7 @@ def _node_block(path: Path, lines: list[str], at: int) -> tuple[FloatArray, int]
     return table, end
 
 
-def _element_block(
-    path: Path, lines: list[str], at: int, heads: list[list[int]], corners: list[IntArray]
-) -> int:
+def _element_block(path: Path, lines: list[str], at: int, heads: list[list[int]], corners: list[IntArray]) -> int:
     """Append the elements of a block; return the line after it."""
     words = [word.strip().upper() for word in lines[at].split(",")]
     if "SOLID" not in words[2:3]:
@@ -249,17 +218,11 @@ def _element_block(
         while 0 < len(nodes) < count and i < len(table):
             nodes, i = nodes + [int(number) for number in table[i]], i + 1
         if not count or len(nodes) != count:
-            raise input_error(
-                f"{path}: line {row + i}",
-                f"an element has {len(nodes)} of its {count} nodes",
-                CUT_SHORT,
-            )
+            raise input_error(f"{path}: line {row + i}", f"an element has {len(nodes)} of its {count} nodes", CUT_SHORT)
         heads.append(line[:HEAD])
         corners.append(np.array(nodes, dtype=np.int64))
     if end >= len(lines) or lines[end].strip() != "-1":
-        raise input_error(
-            f"{path}: line {end + 1}", "the block of elements has no end (-1)", CUT_SHORT
-        )
+        raise input_error(f"{path}: line {end + 1}", "the block of elements has no end (-1)", CUT_SHORT)
     return end + 1
 
 
@@ -278,11 +241,7 @@ def _component(path: Path, lines: list[str], at: int, sets: dict[str, IntArray])
             break
         read, line = read + found, line + 1
     if len(read) != size:
-        raise input_error(
-            f"{path}: line {line}",
-            f"component {words[1]} has {len(read)} of {size} numbers",
-            CUT_SHORT,
-        )
+        raise input_error(f"{path}: line {line}", f"component {words[1]} has {len(read)} of {size} numbers", CUT_SHORT)
     if words[2].upper().startswith("NODE"):
         sets[words[1].lower()] = _ranges(path, at, read, len(lines))
     return line
@@ -294,18 +253,12 @@ def _ranges(path: Path, at: int, read: list[int], most: int) -> IntArray:
     for i, number in enumerate(read):
         first = number if number > 0 else (read[i - 1] + 1 if i and read[i - 1] > 0 else 0)
         if not first or abs(number) - first > most:
-            raise input_error(
-                f"{path}: line {at + 1}",
-                f"the component has a range that ends at {number}",
-                CUT_SHORT,
-            )
+            raise input_error(f"{path}: line {at + 1}", f"the component has a range that ends at {number}", CUT_SHORT)
         members.append(np.arange(first, abs(number) + 1))
     return np.concatenate(members) if members else np.empty(0, dtype=np.int64)
 
 
-def _property(
-    path: Path, at: int, words: list[str], properties: dict[int, dict[str, float]]
-) -> None:
+def _property(path: Path, at: int, words: list[str], properties: dict[int, dict[str, float]]) -> None:
     """Keep a material property; one that depends on temperature is refused."""
     if words[0].upper() == "MP":  # MP,EX,1,2.1e11
         name, number, first, values = words[1:2], words[2:3], "1", words[3:4]
@@ -316,13 +269,9 @@ def _property(
         return
     if first != "1" or len(given) > 1:
         raise input_error(
-            f"{path}: line {at + 1}",
-            f"{name[0]} depends on temperature",
-            "Write the model with one value a property.",
+            f"{path}: line {at + 1}", f"{name[0]} depends on temperature", "Write the model with one value a property."
         )
     try:
         properties.setdefault(_whole(path, at, number[0]), {})[name[0].upper()] = float(given[0])
     except ValueError as error:
-        raise input_error(
-            f"{path}: line {at + 1}", f"{given[0][:40]!r} is no number", CUT_SHORT
-        ) from error
+        raise input_error(f"{path}: line {at + 1}", f"{given[0][:40]!r} is no number", CUT_SHORT) from error

@@ -52,9 +52,7 @@ class AnsysNodes:
                 f"has {len(unknown)} nodes that the file of nodes lacks, e.g. {unknown[0]}",
                 "Give the .cdb or .rst of the same model.",
             )
-        sets = {
-            name: np.flatnonzero(np.isin(node, members)) for name, members in self.node_sets.items()
-        }
+        sets = {name: np.flatnonzero(np.isin(node, members)) for name, members in self.node_sets.items()}
         return self.points[at], {name: members for name, members in sets.items() if len(members)}
 
 
@@ -95,9 +93,7 @@ def _nodes_of_results(file: Records) -> AnsysNodes:
     return _sorted(table[:, 0].astype(np.int64), table[:, 1:4], table[:, 4:7], {})
 
 
-def _sorted(
-    numbers: IntArray, points: FloatArray, angles: FloatArray, sets: Mapping[str, IntArray]
-) -> AnsysNodes:
+def _sorted(numbers: IntArray, points: FloatArray, angles: FloatArray, sets: Mapping[str, IntArray]) -> AnsysNodes:
     order = np.argsort(numbers, kind="stable")
     return AnsysNodes(numbers[order], points[order], angles[order], sets)
 

@@ -59,13 +59,10 @@ class Records:
         length, flags = int(self.words[pointer]), int(self.words[pointer + 1])
         start, end = pointer + 2, pointer + 2 + length
         if length < 0 or end >= total:
-            raise self.damaged(
-                what, f"at word {pointer} has {length} words, the file ends at {total}"
-            )
+            raise self.damaged(what, f"at word {pointer} has {length} words, the file ends at {total}")
         if self.words[end] != length:
             raise self.damaged(
-                what,
-                f"at word {pointer} has {length} words by its start and {self.words[end]} by its end",
+                what, f"at word {pointer} has {length} words by its start and {self.words[end]} by its end"
             )
         numbers = self._unpacked(self.words[start:end], flags, most, what)
         if len(numbers) > most:
@@ -98,11 +95,7 @@ class Records:
         return input_error(f"{self.path}: {what}", problem, CUT_SHORT)
 
     def _unpacked(self, words: IntArray, flags: int, most: int, what: str) -> FloatArray:
-        kind = np.dtype(
-            ("<i2" if flags & HALF else "<i4")
-            if flags & INTEGER
-            else ("<f4" if flags & HALF else "<f8")
-        )
+        kind = np.dtype(("<i2" if flags & HALF else "<i4") if flags & INTEGER else ("<f4" if flags & HALF else "<f8"))
         if flags & ZLIB:
             raise input_error(
                 f"{self.path}: {what}",
@@ -174,25 +167,15 @@ def open_records(path: Path | str, kind: int) -> Records:
     """
     path = Path(path)
     if not path.is_file():
-        near = did_you_mean(
-            path.name, [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        )
-        raise input_error(
-            str(path),
-            "there is no such file",
-            near if near.startswith("Did") else "Check the path.",
-        )
+        near = did_you_mean(path.name, [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else [])
+        raise input_error(str(path), "there is no such file", near if near.startswith("Did") else "Check the path.")
     count = path.stat().st_size // 4
     if count <= HEADER:
-        raise input_error(
-            str(path), f"has {count} words, a header needs more than {HEADER}", CUT_SHORT
-        )
+        raise input_error(str(path), f"has {count} words, a header needs more than {HEADER}", CUT_SHORT)
     try:
         words = np.memmap(path, dtype="<i4", mode="r", shape=(count,))
     except OSError as error:
-        raise input_error(
-            str(path), f"cannot be read ({error.strerror})", "Check the path."
-        ) from error
+        raise input_error(str(path), f"cannot be read ({error.strerror})", "Check the path.") from error
     if words[0] != 100:
         raise _not_ansys(path, words)
     records = Records(path, np.asarray(words))

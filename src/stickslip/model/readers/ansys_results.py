@@ -14,14 +14,7 @@ from stickslip.model.readers.units import Units
 
 RESULT = 12
 MODAL = 2
-ANALYSES = {
-    0: "static",
-    1: "buckling",
-    2: "modal",
-    3: "harmonic",
-    4: "transient",
-    7: "substructure",
-}
+ANALYSES = {0: "static", 1: "buckling", 2: "modal", 3: "harmonic", 4: "transient", 7: "substructure"}
 UNDEFINED = 2.0**100  # what ANSYS writes where a node has no result
 
 
@@ -86,9 +79,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     node = np.repeat(numbers[order], len(components))
     position, _ = known.of_dofs(node, str(path))
     shapes = _turned(shapes, components, rotations(known, numbers[order]))
-    dofs = Dofs(
-        node, tuple(COMPONENTS[c] for c in components) * len(numbers), units.length * position
-    )
+    dofs = Dofs(node, tuple(COMPONENTS[c] for c in components) * len(numbers), units.length * position)
     # φᵀMφ = 1 in the file's units and in SI: a rotation's part is per length
     scale = units.lengths(dofs) / (np.sqrt(units.mass) * units.length)
     cyclic = long_pointer(header[16], header[43])
@@ -143,9 +134,7 @@ def _mode(file: Records, pointer: int, n_nodes: int, n_components: int) -> Float
     if len(head) < 150:
         raise file.damaged("header of a result", f"has {len(head)} numbers")
     if head[18]:
-        raise input_error(
-            str(file.path), "holds complex modes", "Give undamped modes: MODOPT,LANB."
-        )
+        raise input_error(str(file.path), "holds complex modes", "Give undamped modes: MODOPT,LANB.")
     width = int(head[19]) + int(head[97])
     at = pointer + (long_pointer(head[104], head[105]) or int(head[10]))
     values, after = file.record(at, n_nodes * max(width, 1), "displacements of a mode")
@@ -182,9 +171,7 @@ def _turned(shapes: FloatArray, components: list[int], turn: FloatArray) -> Floa
     return turned
 
 
-def _harmonic_indices(
-    file: Records, pointer: int, room: int, frequencies: FloatArray, sectors: int
-) -> IntArray:
+def _harmonic_indices(file: Records, pointer: int, room: int, frequencies: FloatArray, sectors: int) -> IntArray:
     """Return the signed harmonic index of each mode.
 
     Old releases write no signs: there the second of two equal frequencies is the negative one.

@@ -123,21 +123,15 @@ def _read_dof(path: Path) -> tuple[IntArray, list[str]]:
     nodes, components = [], []
     for number, line in enumerate(text.splitlines(), 1):
         node, _, direction = line.strip().partition(".")
-        if not (
-            node.isdecimal() and len(node) < LONGEST and direction in {"1", "2", "3", "4", "5", "6"}
-        ):
+        if not (node.isdecimal() and len(node) < LONGEST and direction in {"1", "2", "3", "4", "5", "6"}):
             raise input_error(
-                f"{path}: line {number}",
-                f"needs node.direction, got {line[:60]!r}",
-                "Give the .dof file of CalculiX.",
+                f"{path}: line {number}", f"needs node.direction, got {line[:60]!r}", "Give the .dof file of CalculiX."
             )
         nodes.append(int(node))
         components.append(COMPONENTS[int(direction) - 1])
     pairs = set(zip(nodes, components, strict=True))
     if not nodes or len(pairs) < len(nodes):
-        raise input_error(
-            str(path), "names a dof twice, or none", "Give the .dof file of a single run."
-        )
+        raise input_error(str(path), "names a dof twice, or none", "Give the .dof file of a single run.")
     return np.array(nodes, dtype=np.int64), components
 
 
@@ -164,9 +158,7 @@ def _read_matrix(path: Path, n: int) -> Matrix:
     stored = np.zeros(size, dtype=bool)
     stored[index[index[:, 0] == index[:, 1], 0]] = True
     if not stored.all():
-        raise input_error(
-            str(path), f"lacks the diagonal of equation {np.flatnonzero(~stored)[0] + 1}", CUT_SHORT
-        )
+        raise input_error(str(path), f"lacks the diagonal of equation {np.flatnonzero(~stored)[0] + 1}", CUT_SHORT)
     return matrix if size == n else _complex(matrix, n, path)
 
 

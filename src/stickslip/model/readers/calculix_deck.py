@@ -76,9 +76,7 @@ class Deck:
         """The only material; an `InputError` where there are several."""
         used = sorted(set(self.cell_material))
         if len(used) != 1:
-            raise input_error(
-                "Deck.material", f"there are {len(used)}: {', '.join(used)}", "Use assemble_deck."
-            )
+            raise input_error("Deck.material", f"there are {len(used)}: {', '.join(used)}", "Use assemble_deck.")
         return self.materials[used[0]]
 
     @property
@@ -98,13 +96,7 @@ QUADRATURES = {
 }
 
 
-def read_deck(
-    path: Path | str,
-    *,
-    units: Units = SI,
-    ignore: tuple[str, ...] = (),
-    plausible: bool = True,
-) -> Deck:
+def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = (), plausible: bool = True) -> Deck:
     """Read an input deck of CalculiX or Abaqus.
 
     Parameters
@@ -187,8 +179,7 @@ def assemble_deck(deck: Deck) -> Structure:
         nodes, local = np.unique(cells, return_inverse=True)
         part = SolidMesh(deck.mesh.points[nodes], local.reshape(cells.shape), {})
         place = scipy.sparse.csr_array(
-            (np.ones(3 * len(nodes)), (node_dofs(nodes), np.arange(3 * len(nodes)))),
-            shape=(n, 3 * len(nodes)),
+            (np.ones(3 * len(nodes)), (node_dofs(nodes), np.arange(3 * len(nodes)))), shape=(n, 3 * len(nodes))
         )
         M, K = integrate(part, deck.materials[name], rules)
         mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
@@ -215,9 +206,7 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
     for name, _, place in model.sections:
         for what, table in (("*ELASTIC", model.elastic), ("*DENSITY", model.density)):
             if name not in table:
-                raise input_error(
-                    place, f"material {name!r} has no {what}", _found_instead(model, name)
-                )
+                raise input_error(place, f"material {name!r} has no {what}", _found_instead(model, name))
         modulus, ratio = model.elastic[name]
         modulus, density = units.stress * modulus, units.density * model.density[name]
         if plausible:
@@ -296,9 +285,7 @@ def _axis(model: DeckModel, units: Units) -> Axis:
         parallel = np.linalg.norm(first.cross @ axis.unit) < PAIRED
         away = float(np.linalg.norm(first.arm(np.array([axis.origin]))))
         if not parallel or away > PAIRED * max(1.0, float(np.linalg.norm(axis.origin))):
-            raise input_error(
-                place, "its axis is another one than that of the cyclic symmetry", "Use one axis."
-            )
+            raise input_error(place, "its axis is another one than that of the cyclic symmetry", "Use one axis.")
     return first
 
 

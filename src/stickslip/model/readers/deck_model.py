@@ -16,19 +16,10 @@ from stickslip.model.readers.deck_words import (
     SILENT,
     TOLD,
 )
-from stickslip.model.readers.keywords import (
-    Block,
-    members,
-    real_number,
-    unique_in_order,
-    whole_number,
-)
+from stickslip.model.readers.keywords import Block, members, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import NodeTable
 
-NODES_OF = {
-    "C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10,
-    "C3D8": 8, "C3D20": 20, "C3D20R": 20,
-}  # fmt: skip
+NODES_OF = {"C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10, "C3D8": 8, "C3D20": 20, "C3D20R": 20}
 
 
 @dataclass
@@ -48,9 +39,7 @@ class DeckModel:
     sections: list[tuple[str, str, str]] = field(default_factory=list)  # material, set, place
     fixed: dict[str, list[IntArray]] = field(default_factory=lambda: {"x": [], "y": [], "z": []})
     speed_squares: list[float] = field(default_factory=list)
-    axes: list[tuple[str, list[float], list[float]]] = field(
-        default_factory=list
-    )  # place, origin, direction
+    axes: list[tuple[str, list[float], list[float]]] = field(default_factory=list)  # place, origin, direction
     sectors: int | None = None
     tie: tuple[IntArray, IntArray] | None = None  # nodes of the dependent and the independent face
     ignored: list[str] = field(default_factory=list)
@@ -144,9 +133,7 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
         block.check_parameters()
         kind = block.parameter("TYPE").upper()
         if kind not in NODES_OF and "ELEMENT" in passed:
-            model.ignored.append(
-                f"elements {kind} ({block.path.name}: line {block.line}), as asked"
-            )
+            model.ignored.append(f"elements {kind} ({block.path.name}: line {block.line}), as asked")
             continue
         if kind in OTHER_BRICKS:
             what, remedy = OTHER_BRICKS[kind]
@@ -170,15 +157,11 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
         if "ELSET" in block.parameters:
             named.setdefault(block.parameters["ELSET"].upper(), []).append(rows[:, 0])
     if not sum(map(len, parts)):
-        raise input_error(
-            model.nodes.place, "has no *ELEMENT", "Give the deck with the mesh, solid elements."
-        )
+        raise input_error(model.nodes.place, "has no *ELEMENT", "Give the deck with the mesh, solid elements.")
     model.cells = np.vstack(parts)
     if len(np.unique(model.cells[:, 0])) < len(model.cells):
         number, times = np.unique(model.cells[:, 0], return_counts=True)
-        raise input_error(
-            model.nodes.place, f"defines element {number[times > 1][0]} twice", "Give it once."
-        )
+        raise input_error(model.nodes.place, f"defines element {number[times > 1][0]} twice", "Give it once.")
     model.element_sets = members(
         blocks, "ELSET", model.cells[:, 0], {name: np.concatenate(p) for name, p in named.items()}
     )
@@ -206,16 +189,12 @@ def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
     for place, fields in block.rows():
         row += [whole_number(text, place, "node") for text in fields]
         if len(row) > count + 1:
-            raise input_error(
-                place, f"an element has {len(row) - 1} nodes, not {count}", "Check TYPE and lines."
-            )
+            raise input_error(place, f"an element has {len(row) - 1} nodes, not {count}", "Check TYPE and lines.")
         if len(row) == count + 1:
             yield row
             row = []
     if row:
-        raise input_error(
-            place, f"the last element has {len(row) - 1} nodes of {count}", "The file is cut short."
-        )
+        raise input_error(place, f"the last element has {len(row) - 1} nodes of {count}", "The file is cut short.")
 
 
 def _material(model: DeckModel, block: Block, material: str) -> None:
@@ -278,11 +257,7 @@ def _boundary(model: DeckModel, block: Block) -> None:
             if len(fields) < 2:
                 raise input_error(place, "names no direction", "Write node, first, last.")
             first = whole_number(fields[1], place, "direction")
-            last = (
-                whole_number(fields[2] or str(first), place, "direction")
-                if len(fields) > 2
-                else first
-            )
+            last = whole_number(fields[2] or str(first), place, "direction") if len(fields) > 2 else first
         value = real_number(fields[3], place, "value") if len(fields) > 3 else 0.0
         if value:
             raise unread(block, f"a prescribed displacement of {value:g} is not read")
@@ -320,9 +295,7 @@ def _distributed_load(model: DeckModel, block: Block) -> None:
             model.ignored.append(f"load {kind or '?'} ({place})")
             continue
         if len(fields) < 9:
-            raise input_error(
-                place, f"CENTRIF with {len(fields)} fields", "Give speed², a point and a direction."
-            )
+            raise input_error(place, f"CENTRIF with {len(fields)} fields", "Give speed², a point and a direction.")
         numbers = [real_number(text, place, "CENTRIF value") for text in fields[2:9]]
         if numbers[0] < 0:
             raise input_error(place, f"speed² is {numbers[0]:g}", "It cannot be negative.")
@@ -338,9 +311,7 @@ def _whole_model(model: DeckModel, name: str, place: str, what: str) -> None:
     inside = model.element_sets.get(name.upper(), np.empty(0, dtype=np.int64))
     if not np.isin(model.cells[:, 0], inside).all():
         raise input_error(
-            place,
-            f"{what} {name!r}, which is not the set of all elements",
-            "Name a set that holds all of them.",
+            place, f"{what} {name!r}, which is not the set of all elements", "Name a set that holds all of them."
         )
 
 
@@ -355,9 +326,7 @@ def _initial(model: DeckModel, block: Block) -> None:
 def _step(model: DeckModel, block: Block) -> None:
     """List a nonlinear step as ignored: its stiffness is that of another state."""
     if block.parameters.get("NLGEOM", "NO").strip().upper() != "NO":
-        model.ignored.append(
-            f"NLGEOM of *STEP ({block.path.name}: line {block.line}): statics is linear here"
-        )
+        model.ignored.append(f"NLGEOM of *STEP ({block.path.name}: line {block.line}): statics is linear here")
 
 
 def _cyclic_model(model: DeckModel, block: Block) -> None:

@@ -5,13 +5,7 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
 from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
-from stickslip.model.readers.deck_model import (
-    DeckModel,
-    nodes_named,
-    passed_over,
-    unknown,
-    unread,
-)
+from stickslip.model.readers.deck_model import DeckModel, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, unique_in_order, whole_number
 
 # corners of the faces S1, S2, …, counted from 0
@@ -73,9 +67,7 @@ def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, plac
     elif kind == "ELEMENT":
         parts = [_face_nodes(model, fields, where) for where, fields in block.rows()]
     else:
-        raise input_error(
-            block.place, f"a surface of TYPE={kind} is not read", "Use TYPE=NODE or ELEMENT."
-        )
+        raise input_error(block.place, f"a surface of TYPE={kind} is not read", "Use TYPE=NODE or ELEMENT.")
     if not parts:
         raise input_error(block.place, "holds no nodes", "List node sets or element faces.")
     return unique_in_order(np.concatenate(parts))
@@ -87,9 +79,7 @@ def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
     faces = TET_FACES if count in (4, 10) else HEX_FACES
     face = fields[1].upper() if len(fields) > 1 else ""
     if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
-        raise input_error(
-            place, f"{face!r} is no face of {model.element_type}", f"Write S1 to S{len(faces)}."
-        )
+        raise input_error(place, f"{face!r} is no face of {model.element_type}", f"Write S1 to S{len(faces)}.")
     corners = faces[int(face[1:]) - 1]
     edges = TET_EDGES if count == 10 else HEX_EDGES if count == 20 else ()
     first = 4 if count == 10 else 8

@@ -34,9 +34,7 @@ def check_unique(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
         )
 
 
-def from_triangle(
-    rows: IntArray, columns: IntArray, values: FloatArray, n: int, place: str
-) -> Matrix:
+def from_triangle(rows: IntArray, columns: IntArray, values: FloatArray, n: int, place: str) -> Matrix:
     """Return the symmetric (n, n) CSR matrix of which one triangle, or all of it, is given.
 
     Parameters

@@ -16,12 +16,7 @@ from stickslip.model.readers.units import SI, Units
 
 # element type -> nodes, and where VTK's nodes stand (the format lists a brick's upright edges before its top ones)
 HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
-CELLS: dict[int, tuple[int, ...]] = {
-    1: tuple(range(8)),
-    3: tuple(range(4)),
-    4: HEX20,
-    6: tuple(range(10)),
-}
+CELLS: dict[int, tuple[int, ...]] = {1: tuple(range(8)), 3: tuple(range(4)), 4: HEX20, 6: tuple(range(10))}
 WIDTHS = {0: 5, 1: 10}  # of a node number in the short and the long format
 VALUE = 12  # characters of a value
 PER_LINE = 6  # values of a line
@@ -88,9 +83,7 @@ class FrdResults:
         raise input_error(
             self.nodes.place,
             f"has no field {name!r}" + ("" if step is None else f" at step {step}"),
-            "It has "
-            + (", ".join(f"{f.name} at step {f.step}" for f in self.fields) or "none")
-            + ".",
+            "It has " + (", ".join(f"{f.name} at step {f.step}" for f in self.fields) or "none") + ".",
         )
 
 
@@ -136,12 +129,9 @@ def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]]) -> SolidMesh | No
 
 def _in_si(field: NodalField, modal: bool, units: Units) -> NodalField:
     displacement = 1 / math.sqrt(units.mass) if modal else units.length
-    factor = {
-        "DISP": displacement,
-        "DISPI": displacement,
-        "STRESS": units.stress,
-        "FORC": units.force,
-    }.get(field.name, 1.0)
+    factor = {"DISP": displacement, "DISPI": displacement, "STRESS": units.stress, "FORC": units.force}.get(
+        field.name, 1.0
+    )
     frequency = None if field.frequency_hz is None else field.frequency_hz / units.time
     return replace(field, values=factor * field.values, frequency_hz=frequency)
 
@@ -178,9 +168,7 @@ class _Frd:
 
     def nodes(self) -> NodeTable:
         if not self.tables:
-            raise input_error(
-                str(self.path), "holds no nodes", "Ask for output with *NODE FILE in the deck."
-            )
+            raise input_error(str(self.path), "holds no nodes", "Ask for output with *NODE FILE in the deck.")
         numbers, points = (np.concatenate(parts) for parts in zip(*self.tables, strict=True))
         return node_table(numbers, points, str(self.path))
 

@@ -36,7 +36,7 @@ def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:
         near = [p.name for p in Path(path).parent.glob("*.csv")]
         raise input_error(
             str(path), "there is no such file", did_you_mean(Path(path).name, near) if near else "Check the path."
-        )  # fmt: skip
+        )
     table = read_columns(Path(path))
     displacement = table.required("displacement", LENGTHS)
     force = table.required("force", FORCES)
@@ -50,5 +50,5 @@ def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:
         row = next(int(i) for i in again if of[i] in of[:i])
         raise table.wrong(
             row, LOOP, "comes back to an earlier recording", "Give each recording in one piece, or another name."
-        )  # fmt: skip
+        )
     return tuple((displacement[of == name], force[of == name]) for name in names)

@@ -80,10 +80,9 @@ class Block:
     def table(self, columns: int) -> FloatArray:
         """Return data lines that all have the same count of numbers, (rows, columns)."""
         tables = [
-            number_table(s.path, _without_last_commas(s.text), columns, separator=",",
-                         first_line=s.first_line)
+            number_table(s.path, _without_last_commas(s.text), columns, separator=",", first_line=s.first_line)
             for s in self.segments
-        ]  # fmt: skip
+        ]
         return np.vstack(tables) if tables else np.empty((0, columns))
 
 
@@ -103,9 +102,7 @@ def keyword_blocks(path: Path) -> list[Block]:
     blocks: list[Block] = []
     _read_into(blocks, path, [], [0])
     if not blocks:
-        raise input_error(
-            str(path), "has no keyword line", "Give an input deck, with lines such as *NODE."
-        )
+        raise input_error(str(path), "has no keyword line", "Give an input deck, with lines such as *NODE.")
     return blocks
 
 
@@ -116,9 +113,7 @@ def whole_number(text: str, place: str, what: str) -> int:
     except ValueError:
         number = LARGEST + 1
     if abs(number) > LARGEST:
-        raise input_error(
-            place, f"the {what} {text[:SHOWN]!r} is no whole number", "Check the line."
-        )
+        raise input_error(place, f"the {what} {text[:SHOWN]!r} is no whole number", "Check the line.")
     return number
 
 
@@ -129,15 +124,11 @@ def real_number(text: str, place: str, what: str) -> float:
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        raise input_error(
-            place, f"the {what} {text[:SHOWN]!r} is no finite number", "Check the line."
-        )
+        raise input_error(place, f"the {what} {text[:SHOWN]!r} is no finite number", "Check the line.")
     return value
 
 
-def members(
-    blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, IntArray]
-) -> dict[str, IntArray]:
+def members(blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, IntArray]) -> dict[str, IntArray]:
     """Return the sets of nodes or elements that the blocks define, in the order they list them.
 
     Parameters
@@ -170,9 +161,7 @@ def members(
         if not (kind == "NSET" and "ELSET" in block.parameters):
             name = block.parameter(kind).upper()
             parts.setdefault(name, []).extend(_listed(block, parts, known))
-    return {
-        name: unique_in_order(np.concatenate([*p, np.empty(0, int)])) for name, p in parts.items()
-    }
+    return {name: unique_in_order(np.concatenate([*p, np.empty(0, int)])) for name, p in parts.items()}
 
 
 def unique_in_order(values: IntArray) -> IntArray:
@@ -198,9 +187,7 @@ def _listed(block: Block, sets: dict[str, list[IntArray]], known: IntArray) -> I
             number = whole_number(text, place, what)
             index = np.searchsorted(known, number)
             if index == len(known) or known[index] != number:
-                raise input_error(
-                    place, f"there is no {what} {number}", "Define it, or take it out of the set."
-                )
+                raise input_error(place, f"there is no {what} {number}", "Define it, or take it out of the set.")
             yield np.array([number])
 
 
@@ -277,7 +264,5 @@ def _included(block: Block, path: Path, stack: list[Path], count: list[int]) -> 
 
 def _refused(block: Block, name: str, why: str) -> InputError:
     return input_error(
-        block.place,
-        f"the included file {name!r} {why}",
-        "Put the files into one folder, or in one file.",
+        block.place, f"the included file {name!r} {why}", "Put the files into one folder, or in one file."
     )

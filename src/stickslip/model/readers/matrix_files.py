@@ -137,9 +137,7 @@ def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
     components = tuple(columns["component"])
     for line, component in enumerate(components, 2):
         if component not in KINDS:
-            raise input_error(
-                f"{path}: line {line}", f"component {component!r}", f"Use {', '.join(KINDS)}."
-            )
+            raise input_error(f"{path}: line {line}", f"component {component!r}", f"Use {', '.join(KINDS)}.")
     position = np.full((len(node), 3), np.nan)
     placed = np.array([kind != "mode" for kind in components], dtype=bool)
     for i, axis in enumerate(("x", "y", "z")):
@@ -174,14 +172,10 @@ def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
     elif last in HDF5:
         matrix = _from_arrays(_read_hdf5(path, name), name, n, str(path))
     else:
-        raise input_error(
-            str(path), f"unknown kind of matrix file {last!r}", "Use .mtx, .npz or .h5."
-        )
+        raise input_error(str(path), f"unknown kind of matrix file {last!r}", "Use .mtx, .npz or .h5.")
     values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if not np.isfinite(values).all():
-        raise input_error(
-            str(path), f"the {name} has entries that are not finite", "They come from a failed run."
-        )
+        raise input_error(str(path), f"the {name} has entries that are not finite", "They come from a failed run.")
     if values.size and abs(values).max() > ABSURD:
         raise input_error(
             str(path),
@@ -202,9 +196,7 @@ def _check_size(shape: tuple[int, int], n: int | None, stored: int, place: str) 
         )
     if shape != (n, n):
         raise input_error(
-            place,
-            f"is of {shape[0]} x {shape[1]}, the model has {n} dofs",
-            "Give matrices and dofs of the same model.",
+            place, f"is of {shape[0]} x {shape[1]}, the model has {n} dofs", "Give matrices and dofs of the same model."
         )
 
 
@@ -217,9 +209,7 @@ def _read_hdf5(path: Path, name: str) -> Arrays:
     try:
         with h5py.File(path, "r") as file:
             if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-                raise input_error(
-                    str(path), f"holds no {name}, but {', '.join(file)}", "Name it so in the file."
-                )
+                raise input_error(str(path), f"holds no {name}, but {', '.join(file)}", "Name it so in the file.")
             item = file[name]
             if isinstance(item, h5py.Dataset):
                 return {name: _dataset(item, path)}
@@ -237,9 +227,7 @@ def _dataset(dataset: Matrix, path: Path) -> Matrix:
     """Read one dataset of HDF5 into memory if it lies in the file and can be as large as it says."""
     place = f"{path}: {dataset.name}"
     if dataset.external or dataset.is_virtual or dataset.dtype.kind not in "fciuSO":
-        raise input_error(
-            place, "lies in another file or is no array of numbers", "Copy it plainly."
-        )
+        raise input_error(place, "lies in another file or is no array of numbers", "Copy it plainly.")
     if dataset.dtype.kind in "SO":
         return np.array("" if dataset.shape else dataset.asstr()[()])
     if dataset.size * dataset.dtype.itemsize > DEFLATE_RATIO * dataset.id.get_storage_size():
@@ -254,9 +242,7 @@ def _from_arrays(arrays: Arrays, name: str, n: int | None, place: str) -> Matrix
     if name in arrays:
         dense = arrays[name]
         if dense.ndim != 2 or dense.dtype.kind not in "fciu":
-            raise input_error(
-                place, f"{name} is an array of {dense.shape}, no matrix of numbers", "Check it."
-            )
+            raise input_error(place, f"{name} is an array of {dense.shape}, no matrix of numbers", "Check it.")
         _check_size((dense.shape[0], dense.shape[1]), n, dense.size, f"{place}: {name}")
         return dense
     layout = arrays.get("format", np.array("csr"))
@@ -269,10 +255,7 @@ def _from_arrays(arrays: Arrays, name: str, n: int | None, place: str) -> Matrix
             "Write it with scipy.sparse.save_npz, or in the layout of the page on matrix files.",
         )
     data, first, second, shape = (arrays[key] for key in SPARSE[kind])
-    if (
-        any(a.dtype.kind not in "iu" for a in (first, second, shape))
-        or data.dtype.kind not in "fciu"
-    ):
+    if any(a.dtype.kind not in "iu" for a in (first, second, shape)) or data.dtype.kind not in "fciu":
         raise input_error(place, "has indices that are no integers, or no numbers", BROKEN)
     if shape.shape != (2,):
         raise input_error(place, "has a shape that is no pair", BROKEN)

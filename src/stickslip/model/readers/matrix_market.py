@@ -58,9 +58,7 @@ def read_matrix_market(path: Path, n: int | None) -> Matrix:
     table = number_table(path, "\n".join(lines[at + 1 :]), columns, first_line=at + 3)
     expected = counts[2] if sparse else _stored(n, words[4])
     if len(table) != expected:
-        raise input_error(
-            str(path), f"has {len(table)} entries, its header says {expected}", CUT_SHORT
-        )
+        raise input_error(str(path), f"has {len(table)} entries, its header says {expected}", CUT_SHORT)
     values = table[:, -2] + 1j * table[:, -1] if width == 2 else table[:, -1]
     if sparse:
         return _coordinate(path, table, values, n, words[4])
@@ -84,17 +82,13 @@ def _own_size(path: Path, counts: list[int]) -> int:
     stored = counts[2] if len(counts) > 2 else n * columns
     if n != columns or not 0 < n <= MOST_EMPTY * stored:
         raise input_error(
-            str(path),
-            f"is of {n} x {columns} with {stored} entries, no stiffness of a model",
-            "Give a square matrix.",
+            str(path), f"is of {n} x {columns} with {stored} entries, no stiffness of a model", "Give a square matrix."
         )
     return n
 
 
 def _bad_counts(path: Path, line: str, number: int, count: int) -> InputError:
-    return input_error(
-        f"{path}: line {number}", f"needs {count} counts, got {line[:SHOWN]!r}", CUT_SHORT
-    )
+    return input_error(f"{path}: line {number}", f"needs {count} counts, got {line[:SHOWN]!r}", CUT_SHORT)
 
 
 def _stored(n: int, symmetry: str) -> int:
@@ -111,9 +105,7 @@ def _coordinate(path: Path, table: FloatArray, values: FloatArray, n: int, symme
     if symmetry == "general":
         return matrix
     if (rows < columns).any() and (rows > columns).any():
-        raise input_error(
-            str(path), f"is {symmetry}, but has entries on both sides of the diagonal", CUT_SHORT
-        )
+        raise input_error(str(path), f"is {symmetry}, but has entries on both sides of the diagonal", CUT_SHORT)
     other = _mirrored(matrix, symmetry)
     return scipy.sparse.csr_array(matrix + other - scipy.sparse.diags_array(other.diagonal()))
 

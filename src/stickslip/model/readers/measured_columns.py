@@ -57,7 +57,7 @@ class MeasuredColumns:
         at = self.names.index(name)
         return np.array(
             [self._number(line, name, row[at], gaps=gaps) for line, row in zip(self.lines, self.rows, strict=True)]
-        )  # fmt: skip
+        )
 
     def named(self, stem: str, units: Mapping[str, float]) -> tuple[str, float]:
         """Return the name of the column ``STEM_UNIT``, and what makes SI of its numbers; an empty name where there is none.
@@ -67,12 +67,10 @@ class MeasuredColumns:
         InputError
             If there are two.
         """
-        found = [(f"{stem}_{unit}", factor) for unit, factor in units.items() if f"{stem}_{unit}" in self.names]  # fmt: skip
+        found = [(f"{stem}_{unit}", factor) for unit, factor in units.items() if f"{stem}_{unit}" in self.names]
         if len(found) > 1:
             raise input_error(
-                f"{self.path}: line 1",
-                f"has both {found[0][0]} and {found[1][0]}",
-                "Leave one of them out.",
+                f"{self.path}: line 1", f"has both {found[0][0]} and {found[1][0]}", "Leave one of them out."
             )
         return found[0] if found else ("", 1.0)
 
@@ -89,15 +87,13 @@ class MeasuredColumns:
             choices = [f"{stem}_{unit}" for unit in units]
             near = next((n for n in self.names if n.startswith(stem) or stem.startswith(n)), "")
             remedy = f"Rename the column {near!r}." if near else did_you_mean(stem, [*self.names])
-            raise input_error(
-                f"{self.path}: line 1", f"has no column {' or '.join(choices)}", remedy
-            )
+            raise input_error(f"{self.path}: line 1", f"has no column {' or '.join(choices)}", remedy)
         return factor * self.numbers(name)
 
     def unknown(self, name: str, known: Sequence[str], columns: str) -> InputError:
         """Return the complaint about a column that is none of the known ones, with the nearest, or with what `columns` says there are."""
         near = did_you_mean(name, [*known])
-        remedy = near if near.startswith("Did") else f"The columns are {columns}. One of words is called note."  # fmt: skip
+        remedy = near if near.startswith("Did") else f"The columns are {columns}. One of words is called note."
         place = f"{self.path}: {self.word} 1" if self.word == "line" else str(self.path)
         return input_error(place, f"has a column {name!r}, which is not known", remedy)
 
@@ -118,7 +114,7 @@ class MeasuredColumns:
         remedy = "Leave the cell empty where nothing was measured." if gaps else "Mend the line."
         raise input_error(
             f"{self.path}: {self.word} {line}: {name}", f"is no finite number, got {text[:SHOWN]!r}", remedy
-        )  # fmt: skip
+        )
 
 
 def read_columns(path: Path) -> MeasuredColumns:
@@ -142,12 +138,10 @@ def read_columns(path: Path) -> MeasuredColumns:
     if len(table) < 2:
         raise input_error(
             str(path), "holds no numbers", "The first line names the columns, each further line is a row."
-        )  # fmt: skip
+        )
     names = tuple(name.lower() for name in table[0][1])
     _check(path, names, table)
-    return MeasuredColumns(
-        path, names, tuple(line for line, _ in table[1:]), tuple(tuple(row) for _, row in table[1:])
-    )
+    return MeasuredColumns(path, names, tuple(line for line, _ in table[1:]), tuple(tuple(row) for _, row in table[1:]))
 
 
 def same(a: FloatArray | float, b: FloatArray | float) -> BoolArray:

@@ -123,9 +123,7 @@ def read_nastran_op4(
     return structure
 
 
-def _check_size(
-    path: Path, known: NastranDofs, dof_set: str, name: str, shape: tuple[int, int]
-) -> None:
+def _check_size(path: Path, known: NastranDofs, dof_set: str, name: str, shape: tuple[int, int]) -> None:
     """Refuse a matrix that does not belong to the set; the message names the sets of its size."""
     n = len(known.rows(dof_set))
     if shape == (n, n):
@@ -135,9 +133,7 @@ def _check_size(
     raise input_error(
         f"{path}: {name}",
         f"is {shape[0]} x {shape[1]}, the {dof_set}-set of {known.place} has {n} degrees of freedom",
-        f"Sets of that size: {', '.join(fits)}."
-        if fits
-        else f"Give the geometry of the same run; its sets: {sizes}.",
+        f"Sets of that size: {', '.join(fits)}." if fits else f"Give the geometry of the same run; its sets: {sizes}.",
     )
 
 
@@ -168,9 +164,7 @@ def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Str
     )
 
 
-def op4_matrices(
-    path: Path, names: list[str], check: Callable[[str, tuple[int, int]], None]
-) -> dict[str, Matrix]:
+def op4_matrices(path: Path, names: list[str], check: Callable[[str, tuple[int, int]], None]) -> dict[str, Matrix]:
     """Return the named matrices, sparse, as they stand in the file.
 
     Parameters
@@ -191,9 +185,7 @@ def op4_matrices(
         for name, word in plain.items():
             same = [i for i, other in enumerate(there) if other == word]
             if not same:
-                raise input_error(
-                    str(path), f"holds no matrix {word!r}", did_you_mean(word, sorted(set(there)))
-                )
+                raise input_error(str(path), f"holds no matrix {word!r}", did_you_mean(word, sorted(set(there))))
             places[name] = _pick(path, name, len(same)) % len(same)
             check(name, tuple(shapes[same[places[name]]]))
         # sparse, whatever the header says: memory then follows from what is stored
@@ -231,15 +223,11 @@ def real_symmetric(matrix: Matrix, place: str) -> Matrix:
         If it is not square, complex, not finite, or unsymmetric by more than rounding.
     """
     if matrix.shape[0] != matrix.shape[1]:
-        raise input_error(
-            place, f"is {matrix.shape[0]} x {matrix.shape[1]}", "Give square matrices."
-        )
+        raise input_error(place, f"is {matrix.shape[0]} x {matrix.shape[1]}", "Give square matrices.")
     if np.iscomplexobj(matrix.data):
         if matrix.data.imag.any():
             raise input_error(
-                place,
-                "is complex",
-                "Structural damping is an operation on the real stiffness here: write it without.",
+                place, "is complex", "Structural damping is an operation on the real stiffness here: write it without."
             )
         matrix = matrix.real
     if not np.isfinite(matrix.data).all():
@@ -278,11 +266,7 @@ def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> Nastran
     with reading(path):
         with nastran_library("op2").OP2(str(path)) as file:
             there = any(str(name).startswith("LAMA") for name in file.dbnames)
-            found = (
-                file.rdparampost(get_mats=False, get_dr_tables=False, get_ougs=True)
-                if there
-                else {}
-            )
+            found = file.rdparampost(get_mats=False, get_dr_tables=False, get_ougs=True) if there else {}
         table = found.get("lama")
         if table is None:
             raise input_error(
@@ -324,6 +308,4 @@ def _with_modes(path: Path, frequencies: FloatArray, table: Any, units: Units) -
     scale = units.lengths(dofs) / (np.sqrt(units.mass) * units.length)
     shapes = shapes if turn is None else turn @ shapes
     position = units.length * dofs.position
-    return NastranResults(
-        frequencies, scale[:, None] * shapes, Dofs(dofs.node, dofs.component, position)
-    )
+    return NastranResults(frequencies, scale[:, None] * shapes, Dofs(dofs.node, dofs.component, position))

@@ -18,10 +18,38 @@ from stickslip.model.structure import Structure
 SQUARE, SYMMETRIC = 1, 6
 # cards that say where grids lie, to which sets they belong, and tables: all but these change what the matrices are
 BESIDE = {
-    "ASET", "ASET1", "BNDFIX", "BNDFIX1", "BNDFREE", "BNDFREE1", "BSET", "BSET1", "CORD1C", "CORD1R", "CORD1S", "CORD2C",
-    "CORD2R", "CORD2S", "CSET", "CSET1", "DMI", "DTI", "EIGR", "EIGRL", "EPOINT", "EXTRN", "GRDSET", "GRID", "QSET", "QSET1",
-    "SECONCT", "SEBULK", "SPOINT", "USET", "USET1",
-}  # fmt: skip
+    "ASET",
+    "ASET1",
+    "BNDFIX",
+    "BNDFIX1",
+    "BNDFREE",
+    "BNDFREE1",
+    "BSET",
+    "BSET1",
+    "CORD1C",
+    "CORD1R",
+    "CORD1S",
+    "CORD2C",
+    "CORD2R",
+    "CORD2S",
+    "CSET",
+    "CSET1",
+    "DMI",
+    "DTI",
+    "EIGR",
+    "EIGRL",
+    "EPOINT",
+    "EXTRN",
+    "GRDSET",
+    "GRID",
+    "QSET",
+    "QSET1",
+    "SECONCT",
+    "SEBULK",
+    "SPOINT",
+    "USET",
+    "USET1",
+}
 PRINTS = {"EXTOUT", "GRDPNT", "POST", "PRTMAXIM"}  # parameters that choose what is printed
 
 
@@ -95,9 +123,7 @@ def read_nastran_dmig(
     for name in names:
         if name in found and found[name].refused:
             raise input_error(
-                f"{path}: {name}",
-                found[name].refused,
-                "Give square matrices with real and imaginary parts.",
+                f"{path}: {name}", found[name].refused, "Give square matrices with real and imaginary parts."
             )
         if name not in found:
             raise input_error(
@@ -149,9 +175,7 @@ def _matrix(cards: Cards, keys: IntArray, place: str) -> Matrix:
         rows, columns = low, high
     entries = rows.astype(np.int64) * n + columns
     if len(np.unique(entries)) < len(entries):
-        raise input_error(
-            place, "gives an entry twice", "Give each entry once, one triangle if symmetric."
-        )
+        raise input_error(place, "gives an entry twice", "Give each entry once, one triangle if symmetric.")
     matrix = scipy.sparse.coo_array((values, (rows, columns)), shape=(n, n)).tocsr()
     if cards.form == SYMMETRIC:
         matrix = (matrix + matrix.T - scipy.sparse.diags_array(matrix.diagonal())).tocsr()
@@ -168,17 +192,11 @@ def _cards(path: Path) -> dict[str, Cards]:
         name, second = card.fields[0].upper(), card.fields[1]
         if second in {"", "0"}:
             if name in found:
-                raise input_error(
-                    card.place, f"DMIG {name} has a second head", "Give each matrix once."
-                )
+                raise input_error(card.place, f"DMIG {name} has a second head", "Give each matrix once.")
             found[name] = _head(card)
             continue
         if name not in found:
-            raise input_error(
-                card.place,
-                f"DMIG {name} has a column before its head (DMIG {name} 0 ...)",
-                CUT_SHORT,
-            )
+            raise input_error(card.place, f"DMIG {name} has a column before its head (DMIG {name} 0 ...)", CUT_SHORT)
         if not found[name].refused:  # the others are refused only where they are asked for
             _add_column(found[name], card)
     return found

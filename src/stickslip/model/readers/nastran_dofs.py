@@ -15,13 +15,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.readers.nastran_cards import CUT_SHORT, Card, bulk_cards, real, whole
-from stickslip.model.readers.nastran_library import (
-    check_records,
-    existing_file,
-    is_binary,
-    nastran_library,
-    reading,
-)
+from stickslip.model.readers.nastran_library import check_records, existing_file, is_binary, nastran_library, reading
 from stickslip.model.readers.nodal_axes import rotation_to_global
 
 COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # 0 is a scalar point
@@ -30,11 +24,26 @@ MISSED = {
     **dict.fromkeys(("CORD1R", "CORD1C", "CORD1S", "CORD3G", "CORD3R"), "where a coordinate system lies"),
     "GRDSET": "in which systems grids lie that do not",
     "SEQGP": "in which order the grids stand in the matrices",
-}  # fmt: skip
+}
 CONSTRAINTS = {
-    "MPC", "MPCADD", "RBAR", "RBAR1", "RBE1", "RBE2", "RBE3", "RJOINT", "RROD", "RSPLINE", "RTRPLT", "RTRPLT1", "SPC", "SPC1",
-    "SPCADD", "SPCOFF", "SPCOFF1",
-}  # fmt: skip
+    "MPC",
+    "MPCADD",
+    "RBAR",
+    "RBAR1",
+    "RBE1",
+    "RBE2",
+    "RBE3",
+    "RJOINT",
+    "RROD",
+    "RSPLINE",
+    "RTRPLT",
+    "RTRPLT1",
+    "SPC",
+    "SPC1",
+    "SPCADD",
+    "SPCOFF",
+    "SPCOFF1",
+}
 RECTANGULAR, CYLINDRICAL, SPHERICAL = 1, 2, 3
 
 
@@ -86,17 +95,13 @@ class NastranDofs:
     def table(self, rows: IntArray) -> Dofs:
         """Return the table of the degrees of freedom `rows`, in the file's units; modal coordinates have node −1."""
         names = tuple(COMPONENTS[int(c)] for c in self.components[rows])
-        return Dofs(
-            np.where(self.components[rows] == 0, -1, self.ids[rows]), names, self.points[rows]
-        )
+        return Dofs(np.where(self.components[rows] == 0, -1, self.ids[rows]), names, self.points[rows])
 
     def rotation(self, rows: IntArray) -> Matrix | None:
         """Return the rotation of the degrees of freedom `rows` into the basic system; None where all are parallel to it."""
         if not np.isin(self.ids[rows], self.turned).any():
             return None
-        return rotation_to_global(
-            self.ids[rows], self.components[rows], self.turned, self.turns, self.place
-        )
+        return rotation_to_global(self.ids[rows], self.components[rows], self.turned, self.turns, self.place)
 
 
 def read_nastran_dofs(path: Path | str) -> NastranDofs:
@@ -115,9 +120,7 @@ def read_nastran_dofs(path: Path | str) -> NastranDofs:
         table, sets, constraint = (*_table_of_op2(path), "") if binary else _table_of_bulk(path)
     if table is None or not len(table):
         raise input_error(
-            str(path),
-            "holds no grids",
-            "Give bulk data with GRID cards, or an .op2 file written with PARAM,POST,-1.",
+            str(path), "holds no grids", "Give bulk data with GRID cards, or an .op2 file written with PARAM,POST,-1."
         )
     with reading(path):
         return replace(_dofs(table, sets, str(path)), constraint=constraint)
@@ -172,18 +175,14 @@ def _geometry(path: Path) -> tuple[str, str]:
         elif card.name in SYSTEMS:
             number, reference, *points = [*card.fields, *[""] * 8][:11]
             system, systems = _once(number, "coordinate system", seen, card), [reference]
-            lines.append(
-                f"{card.name},{system},{_whole(reference, card)},{_reals(points[:6], card)}"
-            )
+            lines.append(f"{card.name},{system},{_whole(reference, card)},{_reals(points[:6], card)}")
             lines.append("," + _reals(points[6:], card))
         else:
             continue
         for word in systems:
             named.setdefault(_whole(word, card), card.place)
     for system in named.keys() - seen["coordinate system"]:
-        raise input_error(
-            named[system], f"coordinate system {system} is not in the file", "Add its CORD2 card."
-        )
+        raise input_error(named[system], f"coordinate system {system} is not in the file", "Add its CORD2 card.")
     return "\n".join(lines) + "\n", constraint
 
 
@@ -247,7 +246,5 @@ def _axes(rows: FloatArray, grid: int, place: str) -> FloatArray:
         cp, sp = np.cos(polar), np.sin(polar)
         local = np.array([[sp * c, cp * c, -s], [sp * s, cp * s, c], [cp, -sp, 0.0]])
     else:
-        raise input_error(
-            place, f"grid {grid} has an output system of kind {kind}", "Use CORD2R, C or S."
-        )
+        raise input_error(place, f"grid {grid} has an output system of kind {kind}", "Use CORD2R, C or S.")
     return np.asarray(system @ local)

@@ -75,9 +75,7 @@ def check_records(path: Path) -> None:
         length = _mark(bytes(content[at : at + 4]), order) if at + 8 <= size else -1
         end = at + 4 + length
         if length < 0 or end + 4 > size or _mark(bytes(content[end : end + 4]), order) != length:
-            raise input_error(
-                str(path), f"the chain of records breaks at byte {at} of {size}", CUT_SHORT
-            )
+            raise input_error(str(path), f"the chain of records breaks at byte {at} of {size}", CUT_SHORT)
         at = end + 4
 
 
@@ -99,9 +97,7 @@ def check_lines(path: Path) -> None:
                     return
                 _skip_matrix(stream, line)
         except (ValueError, StopIteration) as error:
-            raise input_error(
-                f"{path}: matrix {number}", "breaks off or is garbled", CUT_SHORT
-            ) from error
+            raise input_error(f"{path}: matrix {number}", "breaks off or is garbled", CUT_SHORT) from error
 
 
 def _skip_matrix(lines: Iterator[str], head: str) -> None:
@@ -151,6 +147,4 @@ def reading(path: Path) -> Iterator[None]:
     except StickslipError:
         raise
     except Exception as error:  # pandas under the library raises errors of its own
-        raise input_error(
-            str(path), f"cannot be read ({type(error).__name__}: {error})", CUT_SHORT
-        ) from error
+        raise input_error(str(path), f"cannot be read ({type(error).__name__}: {error})", CUT_SHORT) from error

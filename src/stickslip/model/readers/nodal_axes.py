@@ -7,9 +7,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 
 
-def rotation_to_global(
-    node: IntArray, component: IntArray, turned: IntArray, turns: FloatArray, place: str
-) -> Matrix:
+def rotation_to_global(node: IntArray, component: IntArray, turned: IntArray, turns: FloatArray, place: str) -> Matrix:
     """Return the (n, n) sparse rotation from nodal to global coordinates.
 
     Parameters

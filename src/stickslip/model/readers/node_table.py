@@ -56,9 +56,7 @@ class NodeTable:
     def dofs(self, numbers: IntArray, components: Sequence[str]) -> Dofs:
         """Return the table of dofs of node `numbers` (n,) with `components` (n names)."""
         return Dofs(
-            np.asarray(numbers, dtype=np.int64),
-            tuple(components),
-            self.points[self.index(numbers)].astype(float),
+            np.asarray(numbers, dtype=np.int64), tuple(components), self.points[self.index(numbers)].astype(float)
         )
 
     def dof_sets(self, dofs: Dofs) -> dict[str, IntArray]:
@@ -79,10 +77,7 @@ class NodeTable:
 
 
 def node_table(
-    numbers: IntArray,
-    points: FloatArray,
-    place: str,
-    node_sets: Mapping[str, IntArray] | None = None,
+    numbers: IntArray, points: FloatArray, place: str, node_sets: Mapping[str, IntArray] | None = None
 ) -> NodeTable:
     """Sort nodes by number; refuse numbers that stand twice with different positions."""
     order = np.argsort(numbers, kind="stable")
@@ -92,9 +87,7 @@ def node_table(
         moved = twice[(points[twice] != points[twice + 1]).any(axis=1)]
         if moved.size:
             raise input_error(
-                place,
-                f"defines node {numbers[moved[0]]} twice, at different places",
-                "Give each node once.",
+                place, f"defines node {numbers[moved[0]]} twice, at different places", "Give each node once."
             )
         keep = np.append(np.diff(numbers) > 0, True)
         numbers, points = numbers[keep], points[keep]
@@ -134,9 +127,7 @@ def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
         raise input_error(str(path), "has no *NODE", "Give the deck with the mesh.")
     table = np.vstack(tables)
     numbers = whole_numbers(path, table, ("node number",))[:, 0]
-    sets = members(
-        blocks, "NSET", numbers, {name: np.concatenate(parts) for name, parts in named.items()}
-    )
+    sets = members(blocks, "NSET", numbers, {name: np.concatenate(parts) for name, parts in named.items()})
     return node_table(numbers, table[:, 1:], str(path), sets)
 
 
@@ -186,9 +177,7 @@ def csv_numbers(path: Path, name: str, texts: list[str]) -> FloatArray:
         except ValueError:
             finite = False
         if not finite:
-            raise input_error(
-                str(path), f"column {name!r} holds {text[:SHOWN]!r}, no finite number", "Mend it."
-            )
+            raise input_error(str(path), f"column {name!r} holds {text[:SHOWN]!r}, no finite number", "Mend it.")
     return values
 
 

@@ -18,12 +18,7 @@ from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
 from stickslip.model.readers.frd import FrdResults, read_frd
 from stickslip.model.readers.matrix_files import names_in, read_matrix_files, refuse_other_names
 from stickslip.model.readers.nastran import NastranResults, read_nastran_op2
-from stickslip.model.readers.summary import (
-    ModelSummary,
-    mesh_summary,
-    results_summary,
-    structure_summary,
-)
+from stickslip.model.readers.summary import ModelSummary, mesh_summary, results_summary, structure_summary
 from stickslip.model.readers.text import read_text
 from stickslip.model.readers.units import SI, Units
 from stickslip.model.structure import Structure
@@ -103,9 +98,7 @@ def _path(name: Path | str | None) -> Path | None:
     return None if name is None else Path(name)
 
 
-def model_summary(
-    model: Model, *, n_modes: int = 10, units: Units = SI, say: Say = silent
-) -> ModelSummary:
+def model_summary(model: Model, *, n_modes: int = 10, units: Units = SI, say: Say = silent) -> ModelSummary:
     """Say what is in a model that `read_model` returned.
 
     Parameters
@@ -159,18 +152,20 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
         remarks.append(f"rotates at {deck.speed:.6g} rad/s; frequencies at rest")
     remarks += [f"passed over: {text}" for text in deck.ignored]
     return replace(
-        found, kind=shown.kind, cells=shown.cells, sets=shown.sets, nodes=shown.nodes,
-        members=shown.members, box=shown.box, remarks=(*remarks, *found.remarks),
-    )  # fmt: skip
+        found,
+        kind=shown.kind,
+        cells=shown.cells,
+        sets=shown.sets,
+        nodes=shown.nodes,
+        members=shown.members,
+        box=shown.box,
+        remarks=(*remarks, *found.remarks),
+    )
 
 
 def _calculix(files: _Files) -> Structure:
     return read_calculix_matrices(
-        files.path,
-        units=files.units,
-        mesh=files.mesh or files.nodes,
-        mass=files.mass,
-        plausible=files.plausible,
+        files.path, units=files.units, mesh=files.mesh or files.nodes, mass=files.mass, plausible=files.plausible
     )
 
 
@@ -193,9 +188,8 @@ def _mtx(files: _Files) -> Structure:
     if nodes is None:
         raise _lacks(files.path, "$nodes, a deck or a CSV file with the positions of the nodes")
     return read_abaqus_matrices(
-        files.path, mass, damping=files.damping, nodes=nodes, units=files.units,
-        plausible=files.plausible,
-    )  # fmt: skip
+        files.path, mass, damping=files.damping, nodes=nodes, units=files.units, plausible=files.plausible
+    )
 
 
 def _neutral(files: _Files) -> Structure:
@@ -205,19 +199,12 @@ def _neutral(files: _Files) -> Structure:
     if mass is None:
         raise _lacks(files.path, "$mass, the matrix of the mass")
     return read_matrix_files(
-        files.path, mass, nodes=files.nodes, damping=damping, units=files.units,
-        plausible=files.plausible,
-    )  # fmt: skip
+        files.path, mass, nodes=files.nodes, damping=damping, units=files.units, plausible=files.plausible
+    )
 
 
 def _lacks(path: Path, what: str) -> InputError:
-    return input_error(
-        str(path),
-        "is one matrix, not a whole model",
-        f"Give {what}.",
-        mass="mass=…",
-        nodes="nodes=…",
-    )
+    return input_error(str(path), "is one matrix, not a whole model", f"Give {what}.", mass="mass=…", nodes="nodes=…")
 
 
 _READERS: dict[str, Callable[[_Files], Model]] = {
@@ -226,9 +213,7 @@ _READERS: dict[str, Callable[[_Files], Model]] = {
     ".mas": _calculix,
     ".dof": _calculix,
     ".frd": lambda f: read_frd(f.path, units=f.units),
-    ".full": lambda f: read_ansys_full(
-        f.path, nodes=f.nodes or f.mesh, units=f.units, plausible=f.plausible
-    ),
+    ".full": lambda f: read_ansys_full(f.path, nodes=f.nodes or f.mesh, units=f.units, plausible=f.plausible),
     ".rst": lambda f: read_ansys_results(f.path, units=f.units),
     ".cdb": lambda f: read_ansys_archive(f.path, units=f.units),
     ".op2": lambda f: read_nastran_op2(f.path, units=f.units),

@@ -74,9 +74,7 @@ def doubt_about_positions(structure: Structure) -> str | None:
     rows = rows[:: len(rows) // MOST + 1]
     part = scipy.sparse.coo_array(stiffness[rows])
     # about each row's own node, so that only the places of its neighbours count
-    turns = np.stack(
-        [np.cross(axis, position) for axis in np.eye(3)], axis=2
-    )  # node, component, axis
+    turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=2)  # node, component, axis
     away = np.einsum("mc,mca->ma", part @ translations, turns[rows])
     force = np.linalg.norm(part @ turns[np.arange(structure.n), component] - away)
     arms = np.linalg.norm(position[part.col] - position[rows[part.row]], axis=1)

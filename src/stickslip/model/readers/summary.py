@@ -97,9 +97,7 @@ class ModelSummary:
         return found + [("remark", text) for text in self.remarks]
 
 
-def structure_summary(
-    structure: Structure, *, n_modes: int = 10, units: Units = SI, say: Say = silent
-) -> ModelSummary:
+def structure_summary(structure: Structure, *, n_modes: int = 10, units: Units = SI, say: Say = silent) -> ModelSummary:
     """Summarise matrices.
 
     Parameters
@@ -188,9 +186,7 @@ def _centre(structure: Structure) -> FloatArray | None:
     return None
 
 
-def _with_modes(
-    summary: ModelSummary, structure: Structure, n_modes: int, say: Say
-) -> ModelSummary:
+def _with_modes(summary: ModelSummary, structure: Structure, n_modes: int, say: Say) -> ModelSummary:
     if n_modes < 1:
         return summary
     try:
@@ -199,16 +195,8 @@ def _with_modes(
         return replace(summary, remarks=(*summary.remarks, f"No frequencies: {error}"))
     remarks = summary.remarks
     if modes.rigid:
-        remarks = (
-            *remarks,
-            f"{modes.rigid} of its first {n_modes} modes are rigid: it is not held.",
-        )
-    return replace(
-        summary,
-        rigid_modes=modes.rigid,
-        frequencies_hz=modes.frequencies_hz,
-        remarks=remarks,
-    )
+        remarks = (*remarks, f"{modes.rigid} of its first {n_modes} modes are rigid: it is not held.")
+    return replace(summary, rigid_modes=modes.rigid, frequencies_hz=modes.frequencies_hz, remarks=remarks)
 
 
 def results_summary(

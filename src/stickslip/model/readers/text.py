@@ -37,9 +37,7 @@ def read_text(path: Path) -> str:
     except (EOFError, gzip.BadGzipFile, zlib.error) as error:
         raise input_error(str(path), f"is no whole gzip file ({error})", CUT_SHORT) from error
     except OSError as error:
-        raise input_error(
-            str(path), f"cannot be read ({error.strerror})", "Check the path."
-        ) from error
+        raise input_error(str(path), f"cannot be read ({error.strerror})", "Check the path.") from error
     if len(content) > limit:
         raise input_error(
             str(path),
@@ -115,9 +113,7 @@ def number_table(
     return np.vstack(tables)
 
 
-def _blame(
-    path: Path, text: str, columns: int, separator: str | None, first_line: int
-) -> Exception:
+def _blame(path: Path, text: str, columns: int, separator: str | None, first_line: int) -> Exception:
     """Find the line that spoiled the table."""
     for number, line in enumerate(text.splitlines(), first_line):
         fields = line.split(separator)

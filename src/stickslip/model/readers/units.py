@@ -88,11 +88,7 @@ class Units:
         for units in _known():
             if units.name.lower() == name.lower():
                 return units
-        raise input_error(
-            "units",
-            f"unknown unit system {name!r}",
-            did_you_mean(name, [u.name for u in _known()]),
-        )
+        raise input_error("units", f"unknown unit system {name!r}", did_you_mean(name, [u.name for u in _known()]))
 
     @property
     def force(self) -> float:
@@ -122,14 +118,7 @@ SI = Units.si()
 
 
 def _known() -> tuple[Units, ...]:
-    return (
-        Units.si(),
-        Units.mm_t_s(),
-        Units.mm_kg_ms(),
-        Units.mm_kg_s(),
-        Units.inch_lbf_s(),
-        Units.foot_slug_s(),
-    )
+    return (Units.si(), Units.mm_t_s(), Units.mm_kg_ms(), Units.mm_kg_s(), Units.inch_lbf_s(), Units.foot_slug_s())
 
 
 def in_si(structure: Structure, units: Units) -> Structure:
@@ -247,9 +236,7 @@ def check_material(density: float, young_modulus: float, units: Units, place: st
     raise _material_error(density, young_modulus, units, likely, place)
 
 
-def _material_error(
-    density: float, young_modulus: float, units: Units, likely: list[str], place: str
-) -> InputError:
+def _material_error(density: float, young_modulus: float, units: Units, likely: list[str], place: str) -> InputError:
     return input_error(
         place,
         f"in {units.name} the density is {density:.4g} kg/m³ and Young's modulus {young_modulus:.4g} Pa"

@@ -42,9 +42,7 @@ class RigidBody:
     inertia: tuple[float, float, float] = quantity(
         "moments of inertia [x, y, z] about the centre of mass", "kg_m2", above=0, entries=(3, 3)
     )
-    centre: tuple[float, float, float] = quantity(
-        "centre of mass [x, y, z]", "m", usual=100, entries=(3, 3)
-    )
+    centre: tuple[float, float, float] = quantity("centre of mass [x, y, z]", "m", usual=100, entries=(3, 3))
     axes: tuple[Triple, Triple, Triple] = ALONG_XYZ
 
     def __post_init__(self) -> None:
@@ -105,9 +103,7 @@ class RigidBody:
         stiffness, gyroscopic = np.zeros((6, 6)), np.zeros((6, 6))
         stiffness[:3, :3] = self.mass * cross @ cross
         mixed = np.outer(moment, spin)
-        stiffness[3:, 3:] = (
-            cross @ tensor @ cross - (mixed + mixed.T) / 2 + (spin @ moment) * np.eye(3)
-        )
+        stiffness[3:, 3:] = cross @ tensor @ cross - (mixed + mixed.T) / 2 + (spin @ moment) * np.eye(3)
         gyroscopic[:3, :3] = 2 * self.mass * cross
         gyroscopic[3:, 3:] = np.trace(tensor) * cross - 2 * _cross(moment)
         return replace(rest, stiffness=stiffness, damping=gyroscopic if coriolis else rest.damping)
@@ -140,9 +136,7 @@ def body_of_tensor(mass: float, tensor: FloatArray, centre: FloatArray) -> Rigid
     tilted = np.abs(tensor - np.diag(np.diag(tensor))).max() > SKEW * np.abs(tensor).max()
     moments, columns = np.linalg.eigh(tensor) if tilted else (np.diag(tensor), np.eye(3))
     first, second, third = (_triple(axis) for axis in columns.T)
-    return RigidBody(
-        mass=mass, inertia=_triple(moments), centre=_triple(centre), axes=(first, second, third)
-    )
+    return RigidBody(mass=mass, inertia=_triple(moments), centre=_triple(centre), axes=(first, second, third))
 
 
 def _triple(vector: FloatArray) -> Triple:

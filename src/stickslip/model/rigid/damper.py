@@ -35,9 +35,7 @@ from stickslip.model.rigid.sides import (
 from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
-RISE = (
-    0.001 * math.sqrt(3) / (1 + math.sqrt(3))
-)  # m: planes of 45° and 60° from edges 1 mm apart meet that much higher
+RISE = 0.001 * math.sqrt(3) / (1 + math.sqrt(3))  # m: planes of 45° and 60° from edges 1 mm apart meet that much higher
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,15 +73,10 @@ class FlatCurvedDamper:
     """
 
     apex: tuple[float, float] = quantity(
-        "the point [x, z] where the contact planes meet",
-        "m",
-        default=(0.0275 + RISE, 0.106 + RISE),
-        usual=100,
+        "the point [x, z] where the contact planes meet", "m", default=(0.0275 + RISE, 0.106 + RISE), usual=100
     )
     flat_angle: float = angle("inclination of the flat side from x", 45, above=0, below=90)
-    curved_angle: float = angle(
-        "inclination from x of the plane that touches the curved side", 60, above=0, below=90
-    )
+    curved_angle: float = angle("inclination from x of the plane that touches the curved side", 60, above=0, below=90)
     flat_distances: tuple[float, ...] = length(
         "distances of the lines [L1, L2, ...] from the apex, the nearest first",
         (0.002, 0.029),
@@ -116,10 +109,7 @@ class FlatCurvedDamper:
     curved_width: float | None = strip_width()
     mass: float = quantity("mass of the damper", "kg", default=0.057, above=0)
     inertia: tuple[float, float, float] = quantity(
-        "moments of inertia [x, y, z] about the centre of mass",
-        "kg_m2",
-        default=(8.83e-6, 3.66e-6, 9.99e-6),
-        above=0,
+        "moments of inertia [x, y, z] about the centre of mass", "kg_m2", default=(8.83e-6, 3.66e-6, 9.99e-6), above=0
     )
     centre: tuple[float, float, float] = quantity(
         "centre of mass [x, y, z], from the apex", "m", default=(-0.0032, 0.0, -0.0137), usual=100
@@ -144,17 +134,13 @@ class FlatCurvedDamper:
 
     def _check_extents(self) -> None:
         """Refuse points beyond the stretches that are told to touch."""
-        if self.length is not None and not grow_within(
-            self.sections, -self.length / 2, self.length / 2
-        ):
+        if self.length is not None and not grow_within(self.sections, -self.length / 2, self.length / 2):
             raise input_error(
                 "FlatCurvedDamper.length",
                 f"must hold all sections within half of it, {self.length / 2:.6g} m, of y = 0; they are {self.sections}, got {self.length}",
                 "Give the whole length, or move the sections.",
             )
-        if self.flat_between is not None and not grow_within(
-            self.flat_distances, *self.flat_between
-        ):
+        if self.flat_between is not None and not grow_within(self.flat_distances, *self.flat_between):
             raise input_error(
                 "FlatCurvedDamper.flat_between",
                 f"must hold all lines of the flat side, at {self.flat_distances} m from the apex, got {self.flat_between}",

@@ -11,9 +11,7 @@ ROUNDING = 1e-12  # of the coordinates, below which points lie at one place
 RIGID = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 SHOWN = 5  # node numbers in a message
-NAMES = tuple(
-    f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"
-)
+NAMES = tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz")
 
 
 def refuse_unheld(stiffness: Matrix, dofs: Dofs, place: str) -> None:

@@ -71,11 +71,7 @@ class WedgeDamper:
 
     left_angle: float = quantity("inclination of the left side from x", "deg", above=0, most=90)
     right_angle: float | None = quantity(
-        "inclination of the right side from x; left out: that of the left one",
-        "deg",
-        default=None,
-        above=0,
-        most=90,
+        "inclination of the right side from x; left out: that of the left one", "deg", default=None, above=0, most=90
     )
     top_width: float = metres("width of the section's outer end; 0: it is sharp", least=0)
     height: float = metres("extent of the section along z")
@@ -90,11 +86,7 @@ class WedgeDamper:
         entries=(1, 100),
     )
     right_distances: tuple[float, ...] | None = quantity(
-        "the same of the lines [R1, R2, ...] on the right side",
-        "m",
-        default=None,
-        above=0,
-        entries=(1, 100),
+        "the same of the lines [R1, R2, ...] on the right side", "m", default=None, above=0, entries=(1, 100)
     )
     sections: tuple[float, ...] | None = _axial()
 
@@ -102,12 +94,7 @@ class WedgeDamper:
         check_quantities(self)
         _check_mass(self)
         if 1 / math.tan(self.left_angle) + 1 / math.tan(self.angles[1]) < 1e-6:
-            raise _bad(
-                self,
-                "right_angle",
-                "is upright like the left side: the two never meet",
-                "Incline one.",
-            )
+            raise _bad(self, "right_angle", "is upright like the left side: the two never meet", "Incline one.")
         for side, angle in zip(("left", "right"), self.angles, strict=True):
             given = getattr(self, f"{side}_distances")
             low, high = (depth / math.sin(angle) for depth in self.depths)
@@ -137,9 +124,7 @@ class WedgeDamper:
         """Return the section's corners (4, 2) in x and z, metres: top right, base right, base left, top left."""
         left, right = (1 / math.tan(angle) for angle in self.angles)
         top, base = self.depths
-        return np.array(
-            [[top * right, -top], [base * right, -base], [-base * left, -base], [-top * left, -top]]
-        )
+        return np.array([[top * right, -top], [base * right, -base], [-base * left, -base], [-top * left, -top]])
 
     def body(self) -> RigidBody:
         """Return the wedge as a rigid body, its centre and inertia those of a homogeneous prism."""
@@ -158,9 +143,7 @@ class WedgeDamper:
             places = getattr(self, f"{side}_distances") or middles(low, high)
             lines += [
                 Line(f"{side[0].upper()}{i + 1}", side, angle, side == "left", place, width)
-                for i, (place, width) in enumerate(
-                    zip(places, nearest(places, low, high), strict=True)
-                )
+                for i, (place, width) in enumerate(zip(places, nearest(places, low, high), strict=True))
             ]
         return points_of_lines(lines, self.sections or _evenly(self.length), self.length)
 
@@ -192,11 +175,7 @@ class CylinderDamper:
         "inclination from x of the underside that it touches on the left", "deg", above=0, below=90
     )
     right_angle: float | None = quantity(
-        "the same on the right; left out: that of the left one",
-        "deg",
-        default=None,
-        above=0,
-        below=90,
+        "the same on the right; left out: that of the left one", "deg", default=None, above=0, below=90
     )
     mass: float | None = _own_mass()
     density: float | None = _density()
@@ -223,9 +202,7 @@ class CylinderDamper:
     def outline(self) -> FloatArray:
         """Return its section as a polygon (k, 2) in x and z, metres."""
         angle = np.linspace(0.0, 2 * math.pi, 48, endpoint=False)
-        return np.asarray(
-            self.axis - self.radius * np.column_stack([-np.cos(angle), np.sin(angle)])
-        )
+        return np.asarray(self.axis - self.radius * np.column_stack([-np.cos(angle), np.sin(angle)]))
 
     def body(self) -> RigidBody:
         """Return the cylinder as a rigid body, homogeneous."""
@@ -240,8 +217,7 @@ class CylinderDamper:
         """Return the points of the surfaces ``left`` (line L) and ``right`` (line R), each in order of y."""
         width = math.nan if self.contact_width is None else self.contact_width
         touch = [
-            self.axis + self.radius * side_frame(angle, left=i == 0)[[0, 2], 2]
-            for i, angle in enumerate(self.angles)
+            self.axis + self.radius * side_frame(angle, left=i == 0)[[0, 2], 2] for i, angle in enumerate(self.angles)
         ]
         lines = [
             Line(side[0].upper(), side, angle, side == "left", float(np.linalg.norm(point)), width)
@@ -256,17 +232,11 @@ def _evenly(extent: float) -> Places:
 
 def _check_mass(given: WedgeDamper | CylinderDamper) -> None:
     if (given.mass is None) == (given.density is None):
-        both = (
-            "and the density are both given"
-            if given.mass is not None
-            else "is missing, and so is the density"
-        )
+        both = "and the density are both given" if given.mass is not None else "is missing, and so is the density"
         raise _bad(given, "mass", both, "Give one of them.")
 
 
-def _check_sections(
-    given: WedgeDamper | CylinderDamper, sections: Places | None, extent: float
-) -> None:
+def _check_sections(given: WedgeDamper | CylinderDamper, sections: Places | None, extent: float) -> None:
     if sections is not None and not grow_within(sections, -extent / 2, extent / 2):
         raise _bad(
             given,

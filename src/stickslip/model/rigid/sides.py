@@ -100,10 +100,7 @@ def side_frame(angle: float, *, left: bool) -> FloatArray:
 
 
 def points_of_lines(
-    lines: Sequence[Line],
-    sections: Sequence[float],
-    extent: float | None,
-    apex: tuple[float, float] = (0.0, 0.0),
+    lines: Sequence[Line], sections: Sequence[float], extent: float | None, apex: tuple[float, float] = (0.0, 0.0)
 ) -> ContactPoints:
     """Return the points of `lines` at the `sections` (y in metres), line by line; the `apex` is at (x, z).
 

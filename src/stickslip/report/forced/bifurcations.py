@@ -55,10 +55,15 @@ def _marks(response: Response, own: list[int], kind: str, symbol: str, over: flo
     scale = response.scale
     by = [_divisor(response, int(case[i])) for i in own]
     return go.Scatter(
-        x=hz[own] * over, y=size[own] / by * scale.factor, mode="markers", name=kind, legendgroup="bifurcations",
+        x=hz[own] * over,
+        y=size[own] / by * scale.factor,
+        mode="markers",
+        name=kind,
+        legendgroup="bifurcations",
         marker={"symbol": symbol, "size": 10, "color": "white", "line": {"width": 1.8, "color": MUTED}},
-        customdata=[[told[i]] for i in own], hovertemplate="%{customdata[0]}<extra></extra>",
-    )  # fmt: skip
+        customdata=[[told[i]] for i in own],
+        hovertemplate="%{customdata[0]}<extra></extra>",
+    )
 
 
 def _branches(figure: go.Figure, response: Response, case: ShownCase, over: float) -> int:
@@ -73,12 +78,16 @@ def _branches(figure: go.Figure, response: Response, case: ShownCase, over: floa
         own = at[number_of[at] == branch]
         figure.add_trace(
             go.Scatter(
-                x=hz[own] * over, y=size[own] / _divisor(response, case.index) * response.scale.factor, mode="lines",
-                name="leaves the response", legendgroup="bifurcations", showlegend=False,
+                x=hz[own] * over,
+                y=size[own] / _divisor(response, case.index) * response.scale.factor,
+                mode="lines",
+                name="leaves the response",
+                legendgroup="bifurcations",
+                showlegend=False,
                 line={"color": case.colour, "width": 1.4, "dash": "dot"},
                 hovertemplate="%{x:.2f}: %{y:.4g}<br>a branch that leaves the response<extra></extra>",
             )
-        )  # fmt: skip
+        )
     return int(every.size)
 
 
@@ -92,9 +101,7 @@ def bifurcations(response: Response) -> Table | Words | None:
         return None
     labels = [c.label for c in response.cases]
     title, lines = "Bifurcations", list(beside_bifurcations(response.data, labels))
-    text = (
-        "Where multipliers of the motion cross the unit circle along the branch, or it turns back."
-    )
+    text = "Where multipliers of the motion cross the unit circle along the branch, or it turns back."
     if not response.has("bifurcation_case"):
         return Words((text,), title, lines)
     case = response.integers("bifurcation_case")
@@ -102,10 +109,17 @@ def bifurcations(response: Response) -> Table | Words | None:
     parts = response.values("bifurcation_multiplier", "bifurcation", "part")
     kinds = response.labels_of("bifurcation_kind")
     rows = [
-        [response.cases[int(case[i])].short, kinds[i], fixed(float(hz[i]), 4), _known(float(off[i])),
-         quantity(float(size[i]), response.length), _complex(*parts[i]), _known(float(error[i]))]
+        [
+            response.cases[int(case[i])].short,
+            kinds[i],
+            fixed(float(hz[i]), 4),
+            _known(float(off[i])),
+            quantity(float(size[i]), response.length),
+            _complex(*parts[i]),
+            _known(float(error[i])),
+        ]
         for i in range(len(hz))
-    ]  # fmt: skip
+    ]
     head = ["kind", "frequency (Hz)", "± (Hz)", "amplitude", "multiplier", "±"]
     return response.table(title, (text,), head, rows, items=lines)
 

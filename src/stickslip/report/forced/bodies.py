@@ -29,9 +29,7 @@ def rigid_bodies(response: Response) -> dict[str, list[int]]:
     return {n: at for n, at in found.items() if min(at) >= 0}
 
 
-def body_motion(
-    response: Response, case: ShownCase, at: list[int], samples: int = 96
-) -> tuple[FloatArray, FloatArray]:
+def body_motion(response: Response, case: ShownCase, at: list[int], samples: int = 96) -> tuple[FloatArray, FloatArray]:
     """Coordinates of a rigid body over one period at the peak.
 
     Parameters
@@ -62,9 +60,7 @@ def _caption(response: Response, case: ShownCase, at: list[int]) -> str:
     mean, motion = body_motion(response, case, at)
     largest = np.ptp(motion, axis=1) / 2
     move, turn = int(np.argmax(largest[:3])), int(np.argmax(largest[3:]))
-    means = ", ".join(
-        f"{c} {quantity(float(m), 'm')}" for c, m in zip("xyz", mean[:3], strict=True)
-    )
+    means = ", ".join(f"{c} {quantity(float(m), 'm')}" for c, m in zip("xyz", mean[:3], strict=True))
     return (
         f"Largest translation {quantity(float(largest[move]), 'm')} along {'xyz'[move]}, largest rotation "
         f"{quantity(float(largest[3 + turn]), 'rad')} about {'xyz'[turn]} (half of peak to peak). Mean position, taken "
@@ -72,15 +68,11 @@ def _caption(response: Response, case: ShownCase, at: list[int]) -> str:
     )
 
 
-def _traces(
-    figure: go.Figure, case: ShownCase, motion: FloatArray, angle: Scale, orbit: tuple[int, int]
-) -> None:
+def _traces(figure: go.Figure, case: ShownCase, motion: FloatArray, angle: Scale, orbit: tuple[int, int]) -> None:
     """Add translation, rotation and orbit of one case."""
     time = np.linspace(0, 1, motion.shape[1])
     for name, line, move, turn in zip("xyz", _AXIS_LINES, motion[:3], motion[3:], strict=True):
-        drawn = go.Scatter(
-            x=time, name=name, mode="lines", line=line, legendgroup=name, meta=case.index
-        )
+        drawn = go.Scatter(x=time, name=name, mode="lines", line=line, legendgroup=name, meta=case.index)
         figure.add_trace(go.Scatter(drawn, y=move * 1e6), 1, 1)
         figure.add_trace(go.Scatter(drawn, y=turn * angle.factor, showlegend=False), 1, 2)
     x, y = (motion[k] * 1e6 for k in orbit)
@@ -105,9 +97,7 @@ def _body(response: Response, name: str, at: list[int]) -> Plot:
         figure.update_xaxes(title_text="time / period", col=column)
         figure.update_yaxes(title_text=f"motion about the mean ({unit})", col=column)
     figure.update_xaxes(title_text=f"{'xyz'[first]} (µm)", col=3)
-    figure.update_yaxes(
-        title_text=f"{'xyz'[second]} (µm)", scaleanchor="x3", constrain="domain", col=3
-    )
+    figure.update_yaxes(title_text=f"{'xyz'[second]} (µm)", scaleanchor="x3", constrain="domain", col=3)
     caption = f"Rigid-body motion of {name} about its mean position, in the axes of the model."
     captions = {c.index: _caption(response, c, at) for c in response.peaked}
     title = f"Motion of {name} at the peak"
@@ -143,21 +133,25 @@ def _energy_caption(response: Response, case: ShownCase) -> str:
     )
 
 
-def _energy_traces(
-    figure: go.Figure, response: Response, values: FloatArray, total: FloatArray
-) -> None:
+def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, total: FloatArray) -> None:
     """Add bars at the peak (left) and curves against frequency (right) of all cases."""
     names, colours = response.labels("contact"), group_colours(response)
-    bars = {
-        group: (colours[group], [names[k] for k in at], at) for group, at in response.groups.items()
-    }
+    bars = {group: (colours[group], [names[k] for k in at], at) for group, at in response.groups.items()}
     for case in response.cases:
         peak, at = response.peak(case), response.points(case)
         for group, (bar, x, members) in bars.items() if peak >= 0 else ():
             figure.add_bar(
-                x=x, y=values[peak, members], marker_color=bar, meta=case.index, name=group, legendgroup=group,
-                showlegend=False, hovertemplate="%{x}: %{y:.3g}<extra></extra>", row=1, col=1,
-            )  # fmt: skip
+                x=x,
+                y=values[peak, members],
+                marker_color=bar,
+                meta=case.index,
+                name=group,
+                legendgroup=group,
+                showlegend=False,
+                hovertemplate="%{x}: %{y:.3g}<extra></extra>",
+                row=1,
+                col=1,
+            )
         line = {"color": case.colour, "width": 1.6}
         y = np.where(total[at] > 0, total[at], np.nan)
         curve = go.Scatter(x=response.hz[at], y=y, mode="lines", name=case.short, line=line)
@@ -185,8 +179,7 @@ def energy(response: Response) -> Plot | None:
     figure.update_yaxes(title_text=f"energy ({sums.unit})", col=2)
     figure.update_xaxes(title_text="frequency (Hz)", col=2)
     key = Markup(", ").join(
-        Markup('<b style="color:{}">{}</b>').format(c, g)
-        for g, c in group_colours(response).items()
+        Markup('<b style="color:{}">{}</b>').format(c, g) for g, c in group_colours(response).items()
     )
     told = Markup("Work of the friction forces in one cycle. Left: coloured by contact ({}). {}")
     caption = told.format(key, _widest_range(response, total))
@@ -200,9 +193,7 @@ def _widest_range(response: Response, total: FloatArray) -> str:
     widths = []
     for case in response.cases:
         at = response.points(case)
-        lossy = response.hz[at][
-            np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))
-        ]
+        lossy = response.hz[at][np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))]
         widths.append(float(np.ptp(lossy)) if lossy.size else 0.0)
     if not any(widths):
         return "No point dissipates energy."

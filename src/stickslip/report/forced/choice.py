@@ -72,10 +72,7 @@ def choice(response: Response) -> list[Table | Words]:
     alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
     if response.auto:
         alert, text = _auto_row, _auto_text
-        middle = (
-            "harmonics kept",
-            "largest error predicted of what was accepted; found by audits, which overrule it",
-        )
+        middle = ("harmonics kept", "largest error predicted of what was accepted; found by audits, which overrule it")
     elif response.is_error:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text
@@ -134,8 +131,7 @@ def _other_text(response: Response) -> str:
 def _alert_row(response: Response, case: ShownCase) -> tuple[str, str]:
     """Say in which ranges a case was flagged, and how large its predicted error is at most."""
     ranges = (
-        number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz"
-        for a, b in flagged_ranges(response, case)
+        number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz" for a, b in flagged_ranges(response, case)
     )
     own = np.flatnonzero(response.alert.case == case.index)
     if not own.size:

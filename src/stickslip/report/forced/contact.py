@@ -60,19 +60,20 @@ def _drawn(response: Response, *names: str) -> tuple[ShownCase, ...]:
     if not response.has(*names):
         return ()
     first = response.data[names[0]]
-    return tuple(
-        c for c in response.peaked if bool(np.isfinite(first.isel(case=c.index).values).any())
-    )
+    return tuple(c for c in response.peaked if bool(np.isfinite(first.isel(case=c.index).values).any()))
 
 
 def _state_keys() -> list[go.Scatter]:
     return [
         go.Scatter(
-            x=[None], y=[None], mode="markers", name=name,
+            x=[None],
+            y=[None],
+            mode="markers",
+            name=name,
             marker={"symbol": "square", "size": 11, "color": colour, "line": {"width": 1, "color": MUTED}},
         )
         for name, colour in zip(STATE_NAMES, STATE_COLOURS, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _drawn_samples(curves: int, samples: int) -> slice:
@@ -88,17 +89,17 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
     closed = np.append(np.arange(len(gap)), 0)
     colour: dict[str, object] = {"color": MUTED}
     if state is not None:
-        colour = {
-            "color": state[closed].astype(np.int8),
-            "colorscale": _STATE_SCALE,
-            "cmin": -0.5,
-            "cmax": 2.5,
-        }
+        colour = {"color": state[closed].astype(np.int8), "colorscale": _STATE_SCALE, "cmin": -0.5, "cmax": 2.5}
     return go.Scatter(
-        x=gap[closed].astype(np.float32), y=force[closed].astype(np.float32), mode="lines+markers",
-        line={"color": MUTED, "width": 1}, marker={"size": 4, **colour}, name=name, showlegend=False,
+        x=gap[closed].astype(np.float32),
+        y=force[closed].astype(np.float32),
+        mode="lines+markers",
+        line={"color": MUTED, "width": 1},
+        marker={"size": 4, **colour},
+        name=name,
+        showlegend=False,
         hovertemplate=f"{name}<br>%{{x:.4g}} µm, %{{y:.4g}} N<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _area(response: Response, case: ShownCase, direction: int) -> FloatArray:
@@ -114,10 +115,7 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
     if not area.any():
         return "No loop encloses an area: nothing is dissipated in this direction."
     widest = int(np.argmax(area))
-    stroke, span = (
-        float(np.ptp(period(response, case, n)[widest, direction]))
-        for n in ("peak_gap", "peak_force")
-    )
+    stroke, span = (float(np.ptp(period(response, case, n)[widest, direction])) for n in ("peak_gap", "peak_force"))
     return (
         f"The widest loop is that of {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke "
         f"of {quantity(stroke, 'm')} and a force range of {quantity(span, 'N')}; "
@@ -174,7 +172,9 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
         "point; axes differ between panels. The area of a loop is the energy lost in a cycle."
     )
     if drawn < len(names):
-        caption += f" {drawn} of {len(names)} points are drawn: those that carry a force along {direction} and lose most."
+        caption += (
+            f" {drawn} of {len(names)} points are drawn: those that carry a force along {direction} and lose most."
+        )
     captions = {c.index: _loop_caption(response, c, column) for c in cases}
     title = f"Hysteresis loops at the peak, direction {direction}"
     return Plot(f"loops_{direction}", title, caption, figure, captions, response.chosen)
@@ -243,10 +243,17 @@ def state_map(response: Response) -> Plot | None:
         state = states(response, case)[..., at]
         values = state.reshape(-1, state.shape[-1])[rows]
         figure.add_heatmap(
-            x=(np.arange(values.shape[1]) + 0.5) / values.shape[1], y=labels, z=values.astype(np.int8),
-            zmin=-0.5, zmax=2.5, colorscale=_STATE_SCALE, showscale=False, ygap=2 if len(rows) <= _MOST_STATES else 0,
-            meta=case.index, hovertemplate="%{y} at %{x:.3f} T: %{z} (0 stick, 1 slip, 2 open)<extra></extra>",
-        )  # fmt: skip
+            x=(np.arange(values.shape[1]) + 0.5) / values.shape[1],
+            y=labels,
+            z=values.astype(np.int8),
+            zmin=-0.5,
+            zmax=2.5,
+            colorscale=_STATE_SCALE,
+            showscale=False,
+            ygap=2 if len(rows) <= _MOST_STATES else 0,
+            meta=case.index,
+            hovertemplate="%{y} at %{x:.3f} T: %{z} (0 stick, 1 slip, 2 open)<extra></extra>",
+        )
     figure.add_traces(_state_keys())
     styled(figure, 130 + min(21 * len(rows), 900))
     legend_above(figure)

@@ -23,17 +23,22 @@ from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
 _BUTTONS = {
-    "type": "buttons", "direction": "right", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"t": 0, "b": 4},
-    "font": {"size": 11}, "showactive": True, "bordercolor": GRID,
-}  # fmt: skip
+    "type": "buttons",
+    "direction": "right",
+    "x": 0,
+    "xanchor": "left",
+    "y": 1.02,
+    "yanchor": "bottom",
+    "pad": {"t": 0, "b": 4},
+    "font": {"size": 11},
+    "showactive": True,
+    "bordercolor": GRID,
+}
 
 
 def most(response: Response, size: FloatArray) -> list[ShownCase]:
     """Return the `COMPARED` cases with the largest value of `size` (point,), those without a finite one left out."""
-    largest = {
-        c: float(np.nanmax(size[response.point_case == c.index], initial=-np.inf))
-        for c in response.cases
-    }
+    largest = {c: float(np.nanmax(size[response.point_case == c.index], initial=-np.inf)) for c in response.cases}
     known = [c for c in response.cases if np.isfinite(largest[c])]
     chosen = sorted(known, key=lambda c: largest[c])[-COMPARED:]
     return [c for c in response.cases if c in chosen]
@@ -58,20 +63,25 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     reasons = _reasons(response)[at]
     about = "predicted error" if response.is_error else "indicator"
     return go.Scatter(
-        x=x[at], y=response.accepted[at] * scale.factor, mode="markers" if response.unstable[at].any() else "lines+markers",
+        x=x[at],
+        y=response.accepted[at] * scale.factor,
+        mode="markers" if response.unstable[at].any() else "lines+markers",
         name=case.short if len(response.cases) > 1 else "response",
-        legendgroup="cases", legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
+        legendgroup="cases",
+        legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
         line={"color": case.colour, "width": 1.6},
         marker={
-            "symbol": _symbols(response)[at].tolist(), "size": np.where(high, 7.0, 5.5).tolist(),
-            "color": case.colour, "line": {"width": 1.1, "color": case.colour},
+            "symbol": _symbols(response)[at].tolist(),
+            "size": np.where(high, 7.0, 5.5).tolist(),
+            "color": case.colour,
+            "line": {"width": 1.1, "color": case.colour},
         },
         customdata=list(zip(kept, said, response.hz[at], reasons, strict=True)),
         hovertemplate=(
             f"{case.named}{response.blade_at_peak(case)}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<br>"
             f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}%{{customdata[3]}}<extra></extra>"
         ),
-    )  # fmt: skip
+    )
 
 
 def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
@@ -89,9 +99,9 @@ def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
         line = {"color": case.colour, "width": 1.6, "dash": dash}
         drawn.append(
             go.Scatter(
-                x=rows[0], y=rows[1], mode="lines", line=line, showlegend=False, hoverinfo="skip", legendgroup="cases",
+                x=rows[0], y=rows[1], mode="lines", line=line, showlegend=False, hoverinfo="skip", legendgroup="cases"
             )
-        )  # fmt: skip
+        )
     return drawn
 
 
@@ -122,10 +132,14 @@ def _failures(response: Response) -> go.Scatter:
     floor = float(good.min()) if good.size else 1.0
     x, _, unit = abscissa(response)
     return go.Scatter(
-        x=x[at], y=np.where(np.isfinite(values[at]), values[at], floor), mode="markers", name="did not converge",
-        legendgroup="key", marker={"symbol": "x", "size": 9, "color": ALARM},
+        x=x[at],
+        y=np.where(np.isfinite(values[at]), values[at], floor),
+        mode="markers",
+        name="did not converge",
+        legendgroup="key",
+        marker={"symbol": "x", "size": 9, "color": ALARM},
         hovertemplate=f"not converged<br>%{{x:.2f}} {unit}<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _scale_buttons(*, logarithmic: bool) -> list[dict[str, object]]:
@@ -248,9 +262,7 @@ def low_order(response: Response) -> Plot | None:
     figure.update_layout(updatemenus=_scale_buttons(logarithmic=False))
     figure.update_xaxes(title_text="frequency (Hz)")
     ticks = log_ticks(accepted * scale.factor)
-    figure.update_yaxes(
-        title_text=f"{response.quantity} ({scale.unit})", **{**ticks, "tickmode": "auto"}
-    )
+    figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", **{**ticks, "tickmode": "auto"})
     title = f"What H = {response.low_name} alone would have given"
     return Plot("low_order", title, _low_caption(response, cases, low), figure)
 
@@ -267,9 +279,7 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
         text += "No value beyond it was computed: the optimum may lie there. "
     if not all(within):
         ends = joined([c.label for c, inside in zip(cases, within, strict=True) if not inside])
-        text += (
-            f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
-        )
+        text += f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
     known = [k for k, inside in enumerate(within) if inside]
     if len(known) < 2:
         return text
@@ -304,29 +314,30 @@ def optimisation(response: Response) -> Plot | None:
     for name, family in families.items():
         edge = {"width": 1, "color": "white"}
         mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
-        curves = (
-            (scale.unit, [peak[c] * scale.factor for c in family]),
-            ("Hz", [response.peak_hz(c) for c in family]),
-        )
+        curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
         for column, (unit, y) in enumerate(curves, 1):
             figure.add_scatter(
-                x=[c.value for c in family], y=y, mode="lines+markers", line={"color": MUTED, "width": 1.3}, marker=mark,
-                name=name, showlegend=column == 1 and len(families) > 1, text=[c.named for c in family],
-                hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>", row=1, col=column,
-            )  # fmt: skip
+                x=[c.value for c in family],
+                y=y,
+                mode="lines+markers",
+                line={"color": MUTED, "width": 1.3},
+                marker=mark,
+                name=name,
+                showlegend=column == 1 and len(families) > 1,
+                text=[c.named for c in family],
+                hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>",
+                row=1,
+                col=column,
+            )
     styled(figure, 380)
     if measured:
         measured.draw(figure, scale)
     values = np.unique([c.value for c in cases])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
     ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
-    figure.update_xaxes(
-        title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {})
-    )
+    figure.update_xaxes(title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
     drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
-    figure.update_yaxes(
-        title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1
-    )
+    figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
     caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
     caption += next(filter(None, banded), "")

@@ -118,11 +118,7 @@ def errors(response: Response) -> Plot | None:
     if two and len(response.cases) > 1:
         titles.insert(0, "predicted, all cases")
     figure = make_subplots(
-        1,
-        max(len(titles), 1),
-        shared_yaxes=True,
-        horizontal_spacing=0.04,
-        subplot_titles=titles or None,
+        1, max(len(titles), 1), shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles or None
     )
     _error_traces(figure, response)
     styled(figure, 430)
@@ -143,18 +139,21 @@ def errors(response: Response) -> Plot | None:
     return Plot("errors", title, _caption(response), figure)
 
 
-def _scatter(
-    response: Response, x: FloatArray, y: FloatArray, known: npt.NDArray[np.bool_]
-) -> go.Figure:
+def _scatter(response: Response, x: FloatArray, y: FloatArray, known: npt.NDArray[np.bool_]) -> go.Figure:
     """Scatter the `known` points, one trace a case."""
     figure = go.Figure()
     for case in response.cases:
         at = np.flatnonzero(known & (response.point_case == case.index))
         if at.size:
             figure.add_scatter(
-                x=x[at], y=y[at], mode="markers", marker=ring(case.colour, 7), name=case.short if case.label else "points", customdata=response.hz[at],
+                x=x[at],
+                y=y[at],
+                mode="markers",
+                marker=ring(case.colour, 7),
+                name=case.short if case.label else "points",
+                customdata=response.hz[at],
                 hovertemplate="predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>",
-            )  # fmt: skip
+            )
     return figure
 
 
@@ -173,9 +172,7 @@ def error_scatter(response: Response) -> Plot | None:
     dash = {"dash": "dash", "color": ALARM, "width": 1.2}
     figure.add_hline(y=response.threshold, line=dash)
     figure.add_vline(x=response.threshold, line=dash)
-    axis = {"type": "log", "range": np.log10(ends).tolist(), "constrain": "domain"} | log_ticks(
-        values
-    )
+    axis = {"type": "log", "range": np.log10(ends).tolist(), "constrain": "domain"} | log_ticks(values)
     figure.update_xaxes(title_text="predicted error (%)", **axis)
     figure.update_yaxes(title_text="real error (%)", scaleanchor="x", **axis)
     larger = int((real[known] > predicted[known]).sum())

@@ -12,11 +12,7 @@ from stickslip.report.response import Response
 
 _SHOWN = 12  # cases that stay legible below one another
 _EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
-_ROW, _LINE, _PANEL = (
-    46,
-    13,
-    200,
-)  # height of a panel, of each of its harmonics, and of all of these at most, pixels
+_ROW, _LINE, _PANEL = (46, 13, 200)  # height of a panel, of each of its harmonics, and of all of these at most, pixels
 _TICKS = 12  # harmonics that an axis names
 
 
@@ -27,9 +23,7 @@ def kept_harmonics(response: Response) -> Plot | None:
         return None
     spacing = 0.25 / len(cases) if len(cases) > 1 else 0.0
     titles = [c.label for c in cases]
-    figure = make_subplots(
-        len(cases), 1, shared_xaxes=True, vertical_spacing=spacing, subplot_titles=titles
-    )
+    figure = make_subplots(len(cases), 1, shared_xaxes=True, vertical_spacing=spacing, subplot_titles=titles)
     highest = max((int(h) for h in np.flatnonzero(response.kept.any(axis=0))), default=1)
     for row, case in enumerate(cases, 1):
         figure.add_trace(_marks(response, case), row=row, col=1)
@@ -55,17 +49,24 @@ def _marks(response: Response, case: ShownCase) -> go.Scatter:
     at = at[response.converged[at]]
     row, harmonic = np.nonzero(response.kept[at, 1:])
     return go.Scatter(
-        x=response.hz[at][row], y=harmonic + 1, mode="markers", name=case.short,
+        x=response.hz[at][row],
+        y=harmonic + 1,
+        mode="markers",
+        name=case.short,
         marker={"symbol": "square", "size": 6 if response.kept.shape[1] <= _TICKS else 4, "color": case.colour},
         hovertemplate="%{x:.2f} Hz: harmonic %{y} is kept<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _lost(response: Response, at: IntArray, highest: int) -> go.Scatter:
     return go.Scatter(
-        x=response.hz[at], y=np.full(at.size, highest + 0.5), mode="markers", name="did not converge",
-        marker={"symbol": "x", "size": 7, "color": ALARM}, hovertemplate="not converged<br>%{x:.2f} Hz<extra></extra>",
-    )  # fmt: skip
+        x=response.hz[at],
+        y=np.full(at.size, highest + 0.5),
+        mode="markers",
+        name="did not converge",
+        marker={"symbol": "x", "size": 7, "color": ALARM},
+        hovertemplate="not converged<br>%{x:.2f} Hz<extra></extra>",
+    )
 
 
 def _caption(response: Response, cases: list[ShownCase]) -> str:

@@ -3,16 +3,7 @@
 import numpy as np
 
 from stickslip.report.cases import ShownCase
-from stickslip.report.quantities import (
-    NONE,
-    amplitude,
-    counted,
-    number,
-    percent,
-    predicted,
-    quantity,
-    scale_for,
-)
+from stickslip.report.quantities import NONE, amplitude, counted, number, percent, predicted, quantity, scale_for
 from stickslip.report.response import Response
 from stickslip.report.section import Card
 from stickslip.study.analyses.verdict import LEVELS, POINT_LEVELS
@@ -33,9 +24,7 @@ def _peak_card(response: Response) -> Card:
     if len(cases) == 1:
         more = _whole(response, cases[0]) if response.per_force else ""
         at = f"{response.peak_is(cases[0])}, at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
-        return Card(
-            size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}"
-        )
+        return Card(size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}")
     if not within:
         return Card(size, cases[best].label, f"in every case {no_resonance}")
     left_out = len(cases) - len(within)
@@ -95,10 +84,7 @@ def _blade_card(response: Response) -> Card | None:
     known = sorted((c for c in factors if np.isfinite(factors[c])), key=lambda c: factors[c])
     if not known:
         return None
-    told = [
-        f"blade {int(response.number_of('largest_blade', c))}{c.where}"
-        for c in (known[-1], known[0])
-    ]
+    told = [f"blade {int(response.number_of('largest_blade', c))}{c.where}" for c in (known[-1], known[0])]
     note = f"largest: {told[0]}"
     if len(known) > 1:
         note += f"; smallest of {len(known)} cases {number(factors[known[0]])}, {told[1]}"
@@ -113,9 +99,7 @@ def _loss_card(response: Response) -> Card | None:
     own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
     energy = float(np.nansum(own))
     lost = quantity(energy if energy > 1e-12 else 0.0, "J")
-    return Card(
-        lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together"
-    )
+    return Card(lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together")
 
 
 def _alert_cards(response: Response) -> list[Card]:

@@ -48,7 +48,7 @@ class Measured:
     @property
     def ends(self) -> FloatArray:
         """Amplitudes and the upper ends of their bars, of which an axis must take account."""
-        found = np.concatenate([self.amplitude, self.amplitude + np.nan_to_num(self.amplitude_error)])  # fmt: skip
+        found = np.concatenate([self.amplitude, self.amplitude + np.nan_to_num(self.amplitude_error)])
         return np.asarray(found[np.isfinite(found)])
 
     def draw(self, figure: go.Figure, scale: Scale) -> None:
@@ -57,7 +57,7 @@ class Measured:
         of_amplitude = (self.amplitude * scale.factor, self.amplitude_error * scale.factor)
         for k, name in enumerate(dict.fromkeys(self.others)):
             at = np.array([other == name for other in self.others])
-            for column, unit, (y, error) in ((1, scale.unit, of_amplitude), (2, "Hz", (self.hz, self.hz_error))):  # fmt: skip
+            for column, unit, (y, error) in ((1, scale.unit, of_amplitude), (2, "Hz", (self.hz, self.hz_error))):
                 barred = np.isfinite(error)
                 for own in (at & np.isfinite(y) & barred, at & np.isfinite(y) & ~barred):
                     if own.any():
@@ -72,10 +72,13 @@ class Measured:
         """Return some of the points, all with bars or all without."""
         source = self.response.text("measured_source")
         points = go.Scatter(
-            x=self.values[own], y=y[own], mode="markers", text=[source] * int(own.sum()),
+            x=self.values[own],
+            y=y[own],
+            mode="markers",
+            text=[source] * int(own.sum()),
             marker={"size": 9, "color": INK, "line": {"width": 1.6}},
             hovertemplate=f"measured, %{{x:.4g}}<br>%{{y:.4g}} {unit}<br>%{{text}}<extra></extra>",
-        )  # fmt: skip
+        )
         if np.isfinite(error[own]).any():
             down = np.minimum(error[own], _LOWEST * y[own])
             points.error_y = {"array": error[own], "arrayminus": down, "thickness": 1.4, "width": 5}
@@ -91,7 +94,7 @@ class Measured:
             f"{kind} of {what}"
             for what, name in (("amplitudes", "measured_amplitude"), ("frequencies", "measured_frequency_hz"))
             if (kind := self._bar(name))
-        ]  # fmt: skip
+        ]
         text += f"; bars: {joined(bars)}." if bars else ", without error bars."
         return text + self._agreement(cases)
 
@@ -106,8 +109,8 @@ class Measured:
         for name, what, y, error, computed in (
             ("measured_amplitude", "amplitudes", self.amplitude, self.amplitude_error, self.response.peak_response),
             ("measured_frequency_hz", "frequencies", self.hz, self.hz_error, self.response.peak_hz),
-        ):  # fmt: skip
-            both = [(y[i], error[i], computed(c)) for i, c in pairs if c is not None and np.isfinite(y[i])]  # fmt: skip
+        ):
+            both = [(y[i], error[i], computed(c)) for i, c in pairs if c is not None and np.isfinite(y[i])]
             if not both:
                 continue
             tested, bars, made = np.array(both).T
@@ -123,7 +126,7 @@ class Measured:
 
     def _case(self, point: int, cases: Sequence[ShownCase]) -> ShownCase | None:
         """Return the one case that a point was measured for."""
-        found = [c for c in cases if same(self.values[point], c.value) and _agrees(self.others[point], c)]  # fmt: skip
+        found = [c for c in cases if same(self.values[point], c.value) and _agrees(self.others[point], c)]
         return found[0] if len(found) == 1 else None
 
 

@@ -28,11 +28,15 @@ def amplitudes_in_time(response: Response) -> Plot | None:
         name = f"{label}, {hz[i]:.2f} Hz" if label else f"{hz[i]:.2f} Hz"
         figure.add_trace(
             go.Scatter(
-                x=np.arange(own.size), y=scale.factor * own, mode="lines+markers", name=name,
-                line={"color": colour(i), "width": 1.4}, marker={"size": 4},
+                x=np.arange(own.size),
+                y=scale.factor * own,
+                mode="lines+markers",
+                name=name,
+                line={"color": colour(i), "width": 1.4},
+                marker={"size": 4},
                 hovertemplate=f"%{{y:.4g}} {scale.unit}<extra>{name}</extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 380)
     figure.update_xaxes(title_text="period")
     figure.update_yaxes(title_text=f"half of peak to peak ({scale.unit})", rangemode="tozero")
@@ -49,24 +53,35 @@ def statistics_in_time(response: Response) -> Table | None:
         return None
     case, hz = response.integers("not_periodic_case"), response.floats("not_periodic_frequency_hz")
     sizes = {
-        word: response.values(f"not_periodic_{word}", "not_periodic", "output")[
-            :, _report(response)
-        ]
+        word: response.values(f"not_periodic_{word}", "not_periodic", "output")[:, _report(response)]
         for word in ("largest", "least", "rms", "mean")
     }
     spread, periods = (response.floats(f"not_periodic_{w}") for w in ("spread", "periods"))
     settled = response.integers("not_periodic_settled")
-    lines, heights = (response.values(f"not_periodic_line_{w}", "not_periodic", "line") for w in ("hz", "amplitude"))  # fmt: skip
+    lines, heights = (response.values(f"not_periodic_line_{w}", "not_periodic", "line") for w in ("hz", "amplitude"))
     rows = [
         [
-            response.cases[int(case[i])].short, fixed(float(hz[i]), 3),
+            response.cases[int(case[i])].short,
+            fixed(float(hz[i]), 3),
             *(quantity(float(sizes[w][i]), "m", 4) if np.isfinite(sizes[w][i]) else NONE for w in sizes),
-            _lines(lines[i], heights[i]), f"{int(periods[i])}",
-            f"{'yes' if settled[i] else 'no'}, {number(100 * float(spread[i]), 2)} %" if np.isfinite(spread[i]) else NONE,
+            _lines(lines[i], heights[i]),
+            f"{int(periods[i])}",
+            f"{'yes' if settled[i] else 'no'}, {number(100 * float(spread[i]), 2)} %"
+            if np.isfinite(spread[i])
+            else NONE,
         ]
         for i in range(hz.size)
-    ]  # fmt: skip
-    head = ["frequency (Hz)", "largest amplitude", "least", "root mean square", "mean", "largest lines of the spectrum", "periods", "settled, spread"]  # fmt: skip
+    ]
+    head = [
+        "frequency (Hz)",
+        "largest amplitude",
+        "least",
+        "root mean square",
+        "mean",
+        "largest lines of the spectrum",
+        "periods",
+        "settled, spread",
+    ]
     text = (
         "Amplitudes are half of peak to peak in a period, over the later half of the march. It has settled "
         "where the largest amplitudes and root mean squares of four windows of that half are alike."
@@ -81,5 +96,9 @@ def _report(response: Response) -> int:
 
 
 def _lines(hz: FloatArray, heights: FloatArray) -> str:
-    known = [f"{number(float(f), 5)} Hz: {quantity(float(a), 'm', 3)}" for f, a in zip(hz, heights, strict=True) if np.isfinite(f)]  # fmt: skip
+    known = [
+        f"{number(float(f), 5)} Hz: {quantity(float(a), 'm', 3)}"
+        for f, a in zip(hz, heights, strict=True)
+        if np.isfinite(f)
+    ]
     return "\n".join(known[:4]) or NONE

@@ -27,19 +27,25 @@ def of_each_order(response: Response) -> Plot | None:
         at = response.points(case)
         for k, m in enumerate(orders):
             figure.add_scatter(
-                x=x[at], y=size[at, k] * scale.factor, mode="lines", name=f"engine order {m}",
-                legendgroup=str(case.index), legendgrouptitle={"text": case.label or None},
+                x=x[at],
+                y=size[at, k] * scale.factor,
+                mode="lines",
+                name=f"engine order {m}",
+                legendgroup=str(case.index),
+                legendgrouptitle={"text": case.label or None},
                 line={"color": case.colour, "width": 1.8, "dash": DASHES[k % len(DASHES)]},
                 hovertemplate=f"{case.named}<br>engine order {m}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<extra></extra>",
-            )  # fmt: skip
+            )
             if np.isfinite(size[at, k]).any():
                 top = at[int(np.nanargmax(size[at, k]))]
-                said.append(f"engine order {m} {number(float(size[top, k]) * scale.factor)} {scale.unit} at {number(float(x[top]), 5)} {unit}{case.where}")  # fmt: skip
+                said.append(
+                    f"engine order {m} {number(float(size[top, k]) * scale.factor)} {scale.unit} at {number(float(x[top]), 5)} {unit}{case.where}"
+                )
     styled(figure, 440)
     figure.update_xaxes(title_text=f"{name} ({unit})")
-    figure.update_yaxes(
-        title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor)
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor))
+    text = (
+        f"Each engine order in {response.output_name}; the curve above is their norm. {orders_sentence(response.data)}"
     )
-    text = f"Each engine order in {response.output_name}; the curve above is their norm. {orders_sentence(response.data)}"
     largest = f" Largest: {'; '.join(said)}." if said else ""
     return Plot("orders", "Amplitude of each engine order", text + largest, figure)

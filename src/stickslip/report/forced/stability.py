@@ -8,14 +8,12 @@ from stickslip.report.response import Response
 from stickslip.response.stability.modulus import modulus_text
 from stickslip.study.analyses.forced.stable_words import FEW, all_lines
 
-BY_MOTION = (
-    ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
-)
+BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
 
 
 def stability(response: Response) -> list[Table | Words]:
     """One row a point that was examined: verdict and multiplier."""
-    names = [f"stability_{word}" for word in ("case", "frequency_hz", "verdict", "multiplier", "multiplier_error")]  # fmt: skip
+    names = [f"stability_{word}" for word in ("case", "frequency_hz", "verdict", "multiplier", "multiplier_error")]
     if not response.has(*names):
         return []
     case = response.integers(names[0])
@@ -25,12 +23,16 @@ def stability(response: Response) -> list[Table | Words]:
     told = response.labels_of("stability_sentence") if told_each else [""] * len(verdict)
     by = ["motion in time" if BY_MOTION in text else "multiplier" for text in told]
     rows = [
-        [response.cases[int(case[i])].short, fixed(float(hz[i]), 3), verdict[i],
-         by[i] if verdict[i] in ("stable", "unstable") else NONE,
-         modulus_text(float(size[i])) if np.isfinite(size[i]) else NONE,
-         _error(float(error[i]))]
+        [
+            response.cases[int(case[i])].short,
+            fixed(float(hz[i]), 3),
+            verdict[i],
+            by[i] if verdict[i] in ("stable", "unstable") else NONE,
+            modulus_text(float(size[i])) if np.isfinite(size[i]) else NONE,
+            _error(float(error[i])),
+        ]
         for i in range(len(verdict))
-    ]  # fmt: skip
+    ]
     text = (
         "Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
         "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does."

@@ -40,16 +40,12 @@ def surface_map(response: Response) -> Plot | None:
             filled = _patches(rims[group], slips)
             dots = _map(at, names[points], slips[points], opens[points], small=bool(filled))
             for trace in (*filled, dots):
-                figure.add_trace(
-                    trace.update(meta=case.index), row=k // width + 1, col=k % width + 1
-                )
+                figure.add_trace(trace.update(meta=case.index), row=k // width + 1, col=k % width + 1)
     styled(figure, 90 + 330 * height)
     figure.update_xaxes(title_text="along t (mm)")
     figure.update_yaxes(title_text="along w (mm)", col=1)
     bar = {"title": {"text": "slips (%)"}, "len": 0.9, "thickness": 12, "outlinewidth": 0}
-    figure.update_layout(
-        showlegend=False, coloraxis={"colorscale": _SCALE, "cmin": 0, "cmax": 100, "colorbar": bar}
-    )
+    figure.update_layout(showlegend=False, coloraxis={"colorscale": _SCALE, "cmin": 0, "cmax": 100, "colorbar": bar})
     patched = "what belongs to them, as far as their areas go, " if any(rims.values()) else ""
     caption = (
         f"Contact points at their places, {patched}seen along the normal; colours tell for which share of the cycle at the peak a "
@@ -101,31 +97,40 @@ def _patches(rims: Mapping[int, FloatArray], slips: FloatArray) -> list[go.Scatt
     for step, own in sorted(steps.items()):
         x, y = outlines([rims[k] for k in own]).astype(np.float32).T
         (fill,) = sample_colorscale(_SCALE, [step / STEPS])
-        drawn.append(go.Scatter(
-            x=x, y=y, mode="lines", fill="toself", fillcolor=fill, line={"width": 0.5, "color": MUTED},
-            hoverinfo="skip", showlegend=False,
-        ))  # fmt: skip
+        drawn.append(
+            go.Scatter(
+                x=x,
+                y=y,
+                mode="lines",
+                fill="toself",
+                fillcolor=fill,
+                line={"width": 0.5, "color": MUTED},
+                hoverinfo="skip",
+                showlegend=False,
+            )
+        )
     return drawn
 
 
-def _map(
-    at: FloatArray, names: FloatArray, slips: FloatArray, opens: FloatArray, *, small: bool
-) -> go.Scatter:
+def _map(at: FloatArray, names: FloatArray, slips: FloatArray, opens: FloatArray, *, small: bool) -> go.Scatter:
     lifted = opens > 0
     return go.Scatter(
-        x=at[:, 0].astype(np.float32), y=at[:, 1].astype(np.float32), mode="markers", showlegend=False,
+        x=at[:, 0].astype(np.float32),
+        y=at[:, 1].astype(np.float32),
+        mode="markers",
+        showlegend=False,
         marker={
-            "size": 5 if small else 7, "color": slips.astype(np.float32), "coloraxis": "coloraxis",
+            "size": 5 if small else 7,
+            "color": slips.astype(np.float32),
+            "coloraxis": "coloraxis",
             "line": {"color": MUTED, "width": np.where(lifted, 1.8, 0.4)},
         },
         customdata=np.column_stack([names, slips.round(), opens.round()]),
         hovertemplate="%{customdata[0]}<br>slips %{customdata[1]} %, open %{customdata[2]} %<extra></extra>",
-    )  # fmt: skip
+    )
 
 
-def _caption(
-    response: Response, case: ShownCase, surfaces: dict[str, tuple[IntArray, FloatArray]]
-) -> str:
+def _caption(response: Response, case: ShownCase, surfaces: dict[str, tuple[IntArray, FloatArray]]) -> str:
     slips, opens = _shares(response, case)
     said = []
     for group, (points, _) in surfaces.items():

@@ -5,17 +5,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
 from stickslip.report.content import Table
-from stickslip.report.quantities import (
-    NONE,
-    aligned,
-    amplitude,
-    column,
-    fixed,
-    number,
-    percent,
-    predicted,
-    quantity,
-)
+from stickslip.report.quantities import NONE, aligned, amplitude, column, fixed, number, percent, predicted, quantity
 from stickslip.report.response import Response
 from stickslip.study.analyses.verdict import said
 
@@ -26,21 +16,28 @@ def peaks(response: Response) -> Table:
     value = np.array([response.peak_response(c) for c in cases])
     force = np.array([c.excitation for c in cases])
     newton, forces = column(force, "N")
-    length, sizes = column(
-        value * (force if response.per_force else 1.0), response.length, millimetres=True
-    )
+    length, sizes = column(value * (force if response.per_force else 1.0), response.length, millimetres=True)
     unit, ratios = column(value if response.per_force else value * np.nan, response.unit)
     zeta = np.array([response.number_of("peak_damping", c) for c in cases])
     head = [
-        f"excitation ({newton})", f"peak ({length})", f"peak / force ({unit})", "at (Hz)", "damping ratio (%)", "quality factor", "verdict", "points", f"with H = {response.first_name}",
-        f"with {response.more_name if response.decides else 'other H'}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
-    ]  # fmt: skip
-    counts = [
+        f"excitation ({newton})",
+        f"peak ({length})",
+        f"peak / force ({unit})",
+        "at (Hz)",
+        "damping ratio (%)",
+        "quality factor",
+        "verdict",
         "points",
-        *(f"points_{k}" for k in ("low", "high", "failed")),
-        "newton_steps",
-        "unknowns_solved",
+        f"with H = {response.first_name}",
+        f"with {response.more_name if response.decides else 'other H'}",
+        "failed",
+        "Newton steps",
+        "unknowns solved",
+        "contact (s)",
+        "linear (s)",
+        "rest (s)",
     ]
+    counts = ["points", *(f"points_{k}" for k in ("low", "high", "failed")), "newton_steps", "unknowns_solved"]
     clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
     dampings, qualities = aligned(100 * zeta, 3), aligned(0.5 / zeta, 3)
     rows = [
@@ -48,7 +45,7 @@ def peaks(response: Response) -> Table:
         + [fixed(response.number_of(name, case), 0) for name in counts]
         + [fixed(response.number_of(name, case), 2) for name in clocks]
         for case, *own, damping, quality in zip(cases, forces, sizes, ratios, dampings, qualities, strict=True)
-    ]  # fmt: skip
+    ]
     told = [*_damping_sentence(zeta), *_work_sentence(response)]
     return response.table("", told, head, rows)
 
@@ -149,18 +146,22 @@ def time_integration(response: Response) -> Table | None:
         told = response.labels_of("verify_motion")
         motion = [word or known for word, known in zip(told, motion, strict=True)]
     rows = [
-        [response.cases[int(case)].short if np.isfinite(case) else NONE, fixed(float(hz), 3), amplitude(float(transient), response.length, 5),
-         amplitude(float(balance), response.length, 5), percent(float(off)),
-         word, fixed(float(n), 0)]
+        [
+            response.cases[int(case)].short if np.isfinite(case) else NONE,
+            fixed(float(hz), 3),
+            amplitude(float(transient), response.length, 5),
+            amplitude(float(balance), response.length, 5),
+            percent(float(off)),
+            word,
+            fixed(float(n), 0),
+        ]
         for case, hz, transient, balance, off, word, n in zip(*columns, motion, periods, strict=True)
-    ]  # fmt: skip
+    ]
     finite = np.abs(columns[-1][np.isfinite(columns[-1])])
     worst = percent(float(finite.max())) if finite.size else NONE
     ways = ["by time integration", "by harmonic balance"]
     head = ["frequency (Hz)", *ways, "difference", "motion in time", "periods"]
-    text = (
-        f"Amplitude of {response.output_name}: the two independent ways differ by at most {worst}."
-    )
+    text = f"Amplitude of {response.output_name}: the two independent ways differ by at most {worst}."
     items = sentences(response, "verify_sentence")
     return response.table("Time integration", (text,), head, rows, items=items)
 

@@ -11,14 +11,7 @@ from stickslip.report.response import Response
 from stickslip.report.sections.residual_tractions import has_width
 
 ANALYSIS = "residual_tractions"
-_TAKEN = (
-    "frequency_hz",
-    "least_amplitude",
-    "most_amplitude",
-    "resonance_hz",
-    "resonance_amplitude",
-    "harmonics",
-)
+_TAKEN = ("frequency_hz", "least_amplitude", "most_amplitude", "resonance_hz", "resonance_amplitude", "harmonics")
 _PREFIX = "traction_"
 _OPACITY = 0.22
 
@@ -28,7 +21,7 @@ def with_bands(data: xr.Dataset, tree: xr.DataTree) -> xr.Dataset:
     if ANALYSIS not in tree.children:
         return data
     own = tree[ANALYSIS].to_dataset()
-    alike = "case_label" in own and "case_label" in data and own["case_label"].equals(data["case_label"])  # fmt: skip
+    alike = "case_label" in own and "case_label" in data and own["case_label"].equals(data["case_label"])
     output = {str(x) for x in own["output"].values} if "output" in own else set()
     if not alike or "resonance_amplitude" not in own or len(output) != 1:
         return data
@@ -55,19 +48,23 @@ def draw_bands(figure: go.Figure, response: Response) -> str:
     drawn = False
     for case in response.cases:
         hertz, least, most = (
-            _of(response, case, name)
-            for name in ("frequency_hz", "least_amplitude", "most_amplitude")
+            _of(response, case, name) for name in ("frequency_hz", "least_amplitude", "most_amplitude")
         )
         known = np.isfinite(least) & np.isfinite(most)
         if not has_width(least, most):
             continue
         scale = response.scale.factor * _per_force(response, case)
-        shared = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": "tractions"}  # fmt: skip
+        shared = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": "tractions"}
         figure.add_scatter(x=hertz[known], y=least[known] * scale, showlegend=False, **shared)
         figure.add_scatter(
-            x=hertz[known], y=most[known] * scale, fill="tonexty", fillcolor=_faint(case.colour),
-            name="residual tractions", showlegend=not drawn, **shared,
-        )  # fmt: skip
+            x=hertz[known],
+            y=most[known] * scale,
+            fill="tonexty",
+            fillcolor=_faint(case.colour),
+            name="residual tractions",
+            showlegend=not drawn,
+            **shared,
+        )
         drawn = True
     if not drawn:
         return " Residual tractions leave it as it is: the bounds are equal."
@@ -82,7 +79,7 @@ def _harmonics(response: Response) -> int:
     return int(np.max(response.data[f"{_PREFIX}harmonics"].values))
 
 
-def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase], factor: float) -> str:  # fmt: skip
+def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase], factor: float) -> str:
     """Draw the bounds of the peaks behind an optimisation curve, its first column; return what the caption says of it.
 
     Parameters
@@ -98,9 +95,7 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
     """
     if not _has(response):
         return ""
-    bounds = np.array(
-        [_of(response, c, "resonance_amplitude") * _per_force(response, c) for c in cases]
-    )
+    bounds = np.array([_of(response, c, "resonance_amplitude") * _per_force(response, c) for c in cases])
     known = np.isfinite(bounds).all(axis=1)
     if not known.any():
         return ""
@@ -112,6 +107,6 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
     figure.add_scatter(x=x, y=least, row=1, col=1, **shared)
     figure.add_scatter(
         x=x, y=most, fill="tonexty", fillcolor="rgba(0,114,178,0.25)", name="residual tractions", row=1, col=1, **shared
-    )  # fmt: skip
+    )
     width = 100 * (bounds[known, 2] / bounds[known, 1] - 1)
     return f" Band: the peak over all residual tractions, up to {percent(float(width.max()))} wide."

@@ -39,28 +39,40 @@ def blades(response: Response) -> Plot | None:
         gaps = np.full((count, 1), np.nan)
         every = np.hstack([size[at].T, gaps]).ravel() * scale.factor
         figure.add_scatter(
-            x=np.tile(np.append(x[at], np.nan), count), y=every, mode="lines", name="each blade",
-            line={"color": BLADE, "width": 1}, hoverinfo="skip", meta=case.index,
-        )  # fmt: skip
+            x=np.tile(np.append(x[at], np.nan), count),
+            y=every,
+            mode="lines",
+            name="each blade",
+            line={"color": BLADE, "width": 1},
+            hoverinfo="skip",
+            meta=case.index,
+        )
         figure.add_scatter(
-            x=x[at], y=np.nanmax(size[at], axis=1) * scale.factor, mode="lines", name="largest blade",
-            line={"color": INK, "width": 2.2}, meta=case.index, customdata=np.nanargmax(np.nan_to_num(size[at], nan=-1.0), axis=1),
+            x=x[at],
+            y=np.nanmax(size[at], axis=1) * scale.factor,
+            mode="lines",
+            name="largest blade",
+            line={"color": INK, "width": 2.2},
+            meta=case.index,
+            customdata=np.nanargmax(np.nan_to_num(size[at], nan=-1.0), axis=1),
             hovertemplate=f"%{{x:.2f}} {unit}: blade %{{customdata}}, %{{y:.4g}} {scale.unit}<extra></extra>",
-        )  # fmt: skip
+        )
         tuned = np.flatnonzero(response.integers("tuned_case") == case.index)
         hertz, flat = (response.floats(f"tuned_{n}")[tuned] for n in ("frequency_hz", "amplitude"))
         order = np.argsort(hertz, kind="stable")
         figure.add_scatter(
-            x=hertz[order] * _per_hz(response, x), y=flat[order] * scale.factor, mode="lines", name="all sectors alike",
-            line={"color": colour(1), "width": 2, "dash": "dash"}, meta=case.index,
-        )  # fmt: skip
+            x=hertz[order] * _per_hz(response, x),
+            y=flat[order] * scale.factor,
+            mode="lines",
+            name="all sectors alike",
+            line={"color": colour(1), "width": 2, "dash": "dash"},
+            meta=case.index,
+        )
         said[case.index] = _amplified(response, case)
     styled(figure, 460)
     legend_above(figure)
     figure.update_xaxes(title_text=f"{name} ({unit})")
-    figure.update_yaxes(
-        title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor)
-    )
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor))
     text = f"Amplitude of every blade ({count} of them), the largest one at each frequency, and the wheel with all sectors alike."
     return Plot("blades", "Every blade of the wheel", text, figure, said, response.chosen)
 
@@ -88,30 +100,46 @@ def peaks_of_blades(response: Response) -> Plot | None:
     scale = scale_for(size, response.length)
     names = response.labels("mistuned") if response.has("deviation") else []
     rows = 1 + len(names)
-    figure = make_subplots(
-        rows, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[2.0, *[1.0] * len(names)]
-    )
+    figure = make_subplots(rows, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[2.0, *[1.0] * len(names)])
     numbers = np.arange(size.shape[1])
     for case in response.peaked:
         own = size[case.index] * scale.factor
         flat = response.number_of("tuned_peak_amplitude", case) * scale.factor
         hertz = response.values("blade_peak_hz", "case", "blade")[case.index]
         figure.add_bar(
-            x=numbers, y=own, name="peak of each blade", marker_color=colour(0), meta=case.index, customdata=hertz,
+            x=numbers,
+            y=own,
+            name="peak of each blade",
+            marker_color=colour(0),
+            meta=case.index,
+            customdata=hertz,
             hovertemplate=f"blade %{{x}}: %{{y:.4g}} {scale.unit} at %{{customdata:.2f}} Hz<extra></extra>",
-            row=1, col=1,
-        )  # fmt: skip
+            row=1,
+            col=1,
+        )
         figure.add_scatter(
-            x=[-0.5, numbers[-1] + 0.5], y=[flat, flat], mode="lines", name="all sectors alike",
-            line={"color": colour(1), "dash": "dash"}, meta=case.index, row=1, col=1,
-        )  # fmt: skip
+            x=[-0.5, numbers[-1] + 0.5],
+            y=[flat, flat],
+            mode="lines",
+            name="all sectors alike",
+            line={"color": colour(1), "dash": "dash"},
+            meta=case.index,
+            row=1,
+            col=1,
+        )
         for k, name in enumerate(names):
             values = response.values("deviation", "case", "blade", "mistuned")[case.index, :, k]
             factor = 1e6 if name.endswith(GAP) else 100
             figure.add_bar(
-                x=numbers, y=factor * values, name=name, marker_color=colour(2 + k), meta=case.index,
-                showlegend=False, row=2 + k, col=1
-            )  # fmt: skip
+                x=numbers,
+                y=factor * values,
+                name=name,
+                marker_color=colour(2 + k),
+                meta=case.index,
+                showlegend=False,
+                row=2 + k,
+                col=1,
+            )
     styled(figure, 340 + 130 * len(names))
     legend_above(figure)
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", row=1)
@@ -119,9 +147,7 @@ def peaks_of_blades(response: Response) -> Plot | None:
         unit = "µm" if name.endswith(GAP) else "%"
         figure.update_yaxes(title_text=f"{name.removesuffix(', ' + GAP)} ({unit})", row=2 + k)
     figure.update_xaxes(title_text="blade", row=rows)
-    text = "Largest amplitude of each blade at any frequency" + (
-        ", and what it deviates by." if names else "."
-    )
+    text = "Largest amplitude of each blade at any frequency" + (", and what it deviates by." if names else ".")
     said = {c.index: _amplified(response, c) for c in response.peaked}
     return Plot("blade_peaks", "Peak of each blade", text, figure, said, response.chosen)
 
@@ -136,7 +162,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
     scale = scale_for(np.abs(motion), response.length)
     figure = make_subplots(
         1, 2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.5, 0.5], horizontal_spacing=0.14
-    )  # fmt: skip
+    )
     said = {}
     count = motion.shape[1]
     angle = 360.0 * np.arange(count + 1) / count
@@ -144,23 +170,40 @@ def wheel_at_peak(response: Response) -> Plot | None:
         own = motion[case.index]
         closed = np.append(own, own[0])
         figure.add_scatterpolar(
-            r=np.abs(closed) * scale.factor, theta=angle, mode="lines+markers", name="amplitude", fill="toself",
-            line={"color": colour(0)}, meta=case.index, row=1, col=1,
-        )  # fmt: skip
-        top = own[int(np.argmax(np.abs(own)))]
-        instant = (
-            np.real(closed * np.conj(top) / abs(top)) * scale.factor if abs(top) else 0 * angle
+            r=np.abs(closed) * scale.factor,
+            theta=angle,
+            mode="lines+markers",
+            name="amplitude",
+            fill="toself",
+            line={"color": colour(0)},
+            meta=case.index,
+            row=1,
+            col=1,
         )
+        top = own[int(np.argmax(np.abs(own)))]
+        instant = np.real(closed * np.conj(top) / abs(top)) * scale.factor if abs(top) else 0 * angle
         figure.add_scatterpolar(
-            r=np.abs(instant), theta=angle, mode="markers", name="at the instant of the largest blade",
-            marker={"color": [colour(1) if v >= 0 else MUTED for v in instant], "size": 7}, meta=case.index, row=1, col=1,
-        )  # fmt: skip
+            r=np.abs(instant),
+            theta=angle,
+            mode="markers",
+            name="at the instant of the largest blade",
+            marker={"color": [colour(1) if v >= 0 else MUTED for v in instant], "size": 7},
+            meta=case.index,
+            row=1,
+            col=1,
+        )
         figure.add_bar(
-            x=np.arange(count), y=waves[case.index] * scale.factor, name="waves", marker_color=colour(0), meta=case.index,
-            customdata=np.minimum(np.arange(count), count - np.arange(count)), showlegend=False,
+            x=np.arange(count),
+            y=waves[case.index] * scale.factor,
+            name="waves",
+            marker_color=colour(0),
+            meta=case.index,
+            customdata=np.minimum(np.arange(count), count - np.arange(count)),
+            showlegend=False,
             hovertemplate=f"wave %{{x}} ({{%{{customdata}}}} nodal diameters): %{{y:.4g}} {scale.unit}<extra></extra>",
-            row=1, col=2,
-        )  # fmt: skip
+            row=1,
+            col=2,
+        )
         share = waves[case.index] ** 2
         main = int(np.argmax(share))
         said[case.index] = (

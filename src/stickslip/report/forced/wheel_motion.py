@@ -42,40 +42,37 @@ def wheel_in_motion(response: Response) -> Plot | None:
         for case, one in zip(cases, own, strict=True):
             x, y = leaning(one, phase)
             line = {"color": colour(0), "width": 3}
-            found.append(
-                go.Scatter(x=x, y=y, mode="lines", line=line, meta=case.index, hoverinfo="skip")
-            )
+            found.append(go.Scatter(x=x, y=y, mode="lines", line=line, meta=case.index, hoverinfo="skip"))
         return found
 
     ring = np.linspace(0, 2 * np.pi, 181)
     hub = go.Scatter(
         x=HUB * np.cos(ring), y=HUB * np.sin(ring), mode="lines", line={"color": GRID, "width": 6}, hoverinfo="skip"
-    )  # fmt: skip
+    )
     figure = go.Figure([*lines(0.0), hub])
     moving = list(range(len(cases)))
-    figure.frames = [
-        go.Frame(data=lines(2 * np.pi * k / FRAMES), traces=moving, name=str(k)) for k in range(FRAMES)
-    ]  # fmt: skip
+    figure.frames = [go.Frame(data=lines(2 * np.pi * k / FRAMES), traces=moving, name=str(k)) for k in range(FRAMES)]
     styled(figure, 520)
-    play = {
-        "frame": {"duration": MILLISECONDS, "redraw": False},
-        "transition": {"duration": 0},
-        "fromcurrent": True,
-    }
+    play = {"frame": {"duration": MILLISECONDS, "redraw": False}, "transition": {"duration": 0}, "fromcurrent": True}
     names = [str(k) for _ in range(20) for k in range(FRAMES)]
     stop = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate"}
     figure.update_layout(
         showlegend=False,
         updatemenus=[
             {
-                "type": "buttons", "direction": "left", "x": 0, "xanchor": "left", "y": 1.0, "yanchor": "bottom",
+                "type": "buttons",
+                "direction": "left",
+                "x": 0,
+                "xanchor": "left",
+                "y": 1.0,
+                "yanchor": "bottom",
                 "buttons": [
                     {"label": "play", "method": "animate", "args": [names, play]},
                     {"label": "stop", "method": "animate", "args": [[None], stop]},
                 ],
             }
         ],
-    )  # fmt: skip
+    )
     hidden = {"visible": False, "range": [-1.1, 1.1]}
     figure.update_xaxes(**hidden)
     figure.update_yaxes(**hidden, scaleanchor="x")
@@ -84,8 +81,7 @@ def wheel_in_motion(response: Response) -> Plot | None:
         "Blade 0 points to the right, numbers grow anticlockwise, in the sense of rotation. Play runs through twenty periods."
     )
     said = {
-        c.index: f"Largest amplitude {quantity(float(np.abs(motion[c.index]).max()), response.length)}."
-        for c in cases
+        c.index: f"Largest amplitude {quantity(float(np.abs(motion[c.index]).max()), response.length)}." for c in cases
     }
     return Plot("wheel_motion", "The blades in motion", text, figure, said, response.chosen)
 

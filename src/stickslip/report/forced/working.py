@@ -40,7 +40,11 @@ def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: b
     for stretch in stretches:
         at = np.searchsorted(values, sorted(p.value for p in stretch))
         figure.add_vrect(
-            x0=float(edges[at[0]]), x1=float(edges[at[-1] + 1]),
-            fillcolor=GRID, opacity=0.6, line_width=0, layer="below",
-        )  # fmt: skip
+            x0=float(edges[at[0]]),
+            x1=float(edges[at[-1] + 1]),
+            fillcolor=GRID,
+            opacity=0.6,
+            line_width=0,
+            layer="below",
+        )
     return " Shaded, to halfway to the neighbouring cases: where friction works."

@@ -12,7 +12,7 @@ from stickslip.report.plot import MUTED, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
 
-_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}  # fmt: skip
+_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _ORIGIN = {"sweep": "the sweep", "deflation": "found by deflation", "time": "found in time"}
 
 
@@ -25,8 +25,7 @@ class Motions(Node):
         """Of the branches."""
         isola = self.integers("isola")
         return [
-            f"{i + 1}: {'isola, ' * bool(isola[i])}{_ORIGIN.get(o, o)}"
-            for i, o in enumerate(self.labels_of("origin"))
+            f"{i + 1}: {'isola, ' * bool(isola[i])}{_ORIGIN.get(o, o)}" for i, o in enumerate(self.labels_of("origin"))
         ]
 
 
@@ -39,16 +38,19 @@ def branches(view: Motions) -> Plot:
         there = np.isfinite(hertz[i])
         figure.add_trace(
             go.Scatter(
-                x=hertz[i][there], y=scale.factor * height[i][there], mode="lines", name=name,
+                x=hertz[i][there],
+                y=scale.factor * height[i][there],
+                mode="lines",
+                name=name,
                 line={"color": colour(i), "width": 1},
                 hovertemplate=f"{name}: %{{y:.6g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
             )
-        )  # fmt: skip
+        )
     if view.has("motion_branch"):
         _mark(view, figure, scale.factor, scale.unit)
     styled(figure, 480)
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")
     spent = " The budget ended the search before all was tried." * bool(view.scalar("spent"))
     caption = (
         f"{_several(len(view.names), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
@@ -77,22 +79,36 @@ def _mark(view: Motions, figure: go.Figure, factor: float, unit: str) -> None:
             continue
         figure.add_trace(
             go.Scatter(
-                x=where[own], y=factor * height[own], mode="markers", name=word,
+                x=where[own],
+                y=factor * height[own],
+                mode="markers",
+                name=word,
                 marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.6, "color": MUTED}},
                 hovertemplate=f"{word}: %{{y:.6g}} {unit} at %{{x:.6g}} Hz<extra></extra>",
             )
-        )  # fmt: skip
+        )
 
 
 def branch_table(view: Motions) -> Table:
     """Return the branches."""
     rows = [
-        [name, f"{number(float(low), 6)} to {number(float(high), 6)}", quantity(float(peak), "m", 5), number(float(hertz), 6), end]
+        [
+            name,
+            f"{number(float(low), 6)} to {number(float(high), 6)}",
+            quantity(float(peak), "m", 5),
+            number(float(hertz), 6),
+            end,
+        ]
         for name, low, high, peak, hertz, end in zip(
-            view.names, view.floats("lowest_hz"), view.floats("highest_hz"), view.floats("peak_amplitude"), view.floats("peak_hz"),
-            view.labels_of("end"), strict=True,
+            view.names,
+            view.floats("lowest_hz"),
+            view.floats("highest_hz"),
+            view.floats("peak_amplitude"),
+            view.floats("peak_hz"),
+            view.labels_of("end"),
+            strict=True,
         )
-    ]  # fmt: skip
+    ]
     head = ["branch", "range (Hz)", "largest amplitude", "at (Hz)", "how it ends"]
     return Table(head, rows, "Branches")
 
@@ -119,16 +135,37 @@ def basin_table(view: Motions) -> Table | Words:
             ends = f"{number(share, 3)} % ({number(low, 2)} to {number(high, 2)} %) of {starts[i]}"
             rows.append(
                 [
-                    number(float(hertz), 6), names[number_of[i, k]], quantity(float(column["amplitude"][i, k]), "m", 5),
-                    f"**{words[i, k]}**", number(float(column["multiplier"][i, k]), 4),
-                    _changed(float(column["change"][i, k])), ends if starts[i] else NONE,
+                    number(float(hertz), 6),
+                    names[number_of[i, k]],
+                    quantity(float(column["amplitude"][i, k]), "m", 5),
+                    f"**{words[i, k]}**",
+                    number(float(column["multiplier"][i, k]), 4),
+                    _changed(float(column["change"][i, k])),
+                    ends if starts[i] else NONE,
                 ]
-            )  # fmt: skip
+            )
         rows += [
-            [number(float(hertz), 6), what, NONE, NONE, NONE, NONE, f"{number(100 * count[i] / starts[i], 3)} % of {starts[i]}"]
-            for what, count in others.items() if count[i]
-        ]  # fmt: skip
-    head = ["frequency (Hz)", "branch", "amplitude", "stability", "multiplier", "change by more harmonics", "starts that end on it (95 %)"]  # fmt: skip
+            [
+                number(float(hertz), 6),
+                what,
+                NONE,
+                NONE,
+                NONE,
+                NONE,
+                f"{number(100 * count[i] / starts[i], 3)} % of {starts[i]}",
+            ]
+            for what, count in others.items()
+            if count[i]
+        ]
+    head = [
+        "frequency (Hz)",
+        "branch",
+        "amplitude",
+        "stability",
+        "multiplier",
+        "change by more harmonics",
+        "starts that end on it (95 %)",
+    ]
     said = (
         "Starts are drawn in the lowest modes about the mean of the known motions, with sliders that never moved: shares are those of "
         "such starts, with the binomial interval of Clopper and Pearson."
@@ -151,6 +188,4 @@ def _cards(view: Motions) -> Sequence[Card]:
 
 
 _BLOCK = Block("all-motions", "All motions", (branches, branch_table, basin_table))
-SECTION: Section = Section(
-    "all_motions", ("origin",), Motions, (_BLOCK,), by_case=True, cards=_cards
-)
+SECTION: Section = Section("all_motions", ("origin",), Motions, (_BLOCK,), by_case=True, cards=_cards)

@@ -43,9 +43,15 @@ def _branches(view: Waves) -> list[go.Scatter]:
     at, side = _label_places(hz, float(np.nanmax(hz)))
     return [
         go.Scatter(
-            x=rpm, y=hz[w, :, mode], mode="lines+markers+text", name=name, legendgroup=name, showlegend=mode == 0,
+            x=rpm,
+            y=hz[w, :, mode],
+            mode="lines+markers+text",
+            name=name,
+            legendgroup=name,
+            showlegend=mode == 0,
             text=[f"{name}, {mode + 1}" if s == at[w, mode] else "" for s in range(len(rpm))],
-            textposition=f"{'top' if side[w, mode] > 0 else 'bottom'} {'center' if at[w, mode] else 'right'}", textfont={"size": 10, "color": colour},
+            textposition=f"{'top' if side[w, mode] > 0 else 'bottom'} {'center' if at[w, mode] else 'right'}",
+            textfont={"size": 10, "color": colour},
             # beyond eight waves colours come again, dashed
             line={"color": colour, "width": 1.8, "dash": _DASHES[(w // 8) % len(_DASHES)]},
             marker={"size": 6, "symbol": _SYMBOLS[w % len(_SYMBOLS)]},
@@ -53,7 +59,7 @@ def _branches(view: Waves) -> list[go.Scatter]:
         )
         for w, (name, colour) in enumerate(pairs)
         for mode in range(hz.shape[2])
-    ]  # fmt: skip
+    ]
 
 
 def _orders(view: Waves, top: float) -> list[go.Scatter]:
@@ -67,13 +73,20 @@ def _orders(view: Waves, top: float) -> list[go.Scatter]:
         x = np.array([first, end])
         traces.append(
             go.Scatter(
-                x=x, y=order * x / 60, mode="lines+text", text=["", f"EO {order}"], name="engine orders",
+                x=x,
+                y=order * x / 60,
+                mode="lines+text",
+                text=["", f"EO {order}"],
+                name="engine orders",
                 textposition="middle right" if end == last else "top center",
-                textfont={"size": 11, "color": MUTED}, legendgroup="orders", showlegend=index == 0,
-                line={"color": MUTED, "width": 1, "dash": "dash"}, cliponaxis=False,
+                textfont={"size": 11, "color": MUTED},
+                legendgroup="orders",
+                showlegend=index == 0,
+                line={"color": MUTED, "width": 1, "dash": "dash"},
+                cliponaxis=False,
                 hovertemplate=f"EO {order}: %{{y:.6g}} Hz at %{{x:.5g}} rpm<extra></extra>",
             )
-        )  # fmt: skip
+        )
     return traces
 
 
@@ -83,11 +96,14 @@ def _crossings(view: Waves) -> go.Scatter:
     found = zip(*each, strict=True)
     text = [f"EO {order} meets {names[w]}, mode {mode + 1}" for order, w, mode in found]
     return go.Scatter(
-        x=view.floats("crossing_speed_rpm"), y=view.floats("crossing_frequency_hz"), text=text,
-        mode="markers", name="crossings",
+        x=view.floats("crossing_speed_rpm"),
+        y=view.floats("crossing_frequency_hz"),
+        text=text,
+        mode="markers",
+        name="crossings",
         marker=ring(INK, 12, 2),
         hovertemplate="%{text}: %{y:.6g} Hz at %{x:.6g} rpm<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _not_shown(view: Waves, top: float) -> str:
@@ -120,9 +136,7 @@ def campbell_diagram(view: Waves) -> Plot:
         figure.add_trace(_crossings(view))
     styled(figure, 620)
     span = float(np.ptp(rpm))
-    figure.update_xaxes(
-        title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span]
-    )
+    figure.update_xaxes(title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span])
     figure.update_xaxes(exponentformat="none", separatethousands=True)
     figure.update_yaxes(title_text="frequency (Hz), rotating frame", range=[0, 1.04 * top])
     found = f"{counted(n, 'crossing')} marked" if n else "no crossing in the range"
@@ -142,9 +156,7 @@ def crossings(view: Waves) -> Table | Words:
         told = "No engine order meets a mode that it excites within the speeds."
         return Words((told,), title)
     rpm, hz = view.floats("crossing_speed_rpm"), view.floats("crossing_frequency_hz")
-    order, wave, mode = (
-        view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode")
-    )
+    order, wave, mode = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
     rows = []
     for i in np.argsort(rpm, kind="stable"):
         met = [number(float(v), 6) for v in (rpm[i], hz[i])]

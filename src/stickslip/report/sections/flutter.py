@@ -9,13 +9,7 @@ from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.waves import Waves
 
-_NEEDED = (
-    "wave_number",
-    "phase_angle_deg",
-    "damping_by_energy",
-    "damping_by_eigenvalue",
-    "damping",
-)
+_NEEDED = ("wave_number", "phase_angle_deg", "damping_by_energy", "damping_by_eigenvalue", "damping")
 _PERCENT = 100.0
 
 
@@ -29,21 +23,35 @@ def least_stable_diagram(view: Waves) -> Plot:
         said = "%{text}: %{y:.4g} %<extra></extra>"
         figure.add_trace(
             go.Scatter(
-                x=view.floats("curve_angle_deg"), y=_PERCENT * view.floats("curve_damping")[m], mode="lines", line=line,
-                name=f"{mode}, any phase angle", hovertemplate="%{x:.0f}°: %{y:.4g} %<extra></extra>",
+                x=view.floats("curve_angle_deg"),
+                y=_PERCENT * view.floats("curve_damping")[m],
+                mode="lines",
+                line=line,
+                name=f"{mode}, any phase angle",
+                hovertemplate="%{x:.0f}°: %{y:.4g} %<extra></extra>",
             )
-        )  # fmt: skip
+        )
         for values, how, mark in (
             (energy[:, m], "energy method", {"size": 8, "color": colour(m)}),
             (eigen[:, m], "eigenvalue", ring(colour(m), 12)),
-            (total[:, m], "with the structure's damping", {"size": 7, "color": colour(m), "symbol": "x-thin-open", "line": {"width": 1.6}}),
-        ):  # fmt: skip
+            (
+                total[:, m],
+                "with the structure's damping",
+                {"size": 7, "color": colour(m), "symbol": "x-thin-open", "line": {"width": 1.6}},
+            ),
+        ):
             texts = [f"{mode}, {name}, {how}" for name in names]
             figure.add_trace(
                 go.Scatter(
-                    x=angle, y=values, mode="markers", marker=mark, name=f"{mode}, {how}", text=texts, hovertemplate=said
+                    x=angle,
+                    y=values,
+                    mode="markers",
+                    marker=mark,
+                    name=f"{mode}, {how}",
+                    text=texts,
+                    hovertemplate=said,
                 )
-            )  # fmt: skip
+            )
     required = _PERCENT * view.scalar("required_damping", 0.0)
     figure.add_hline(y=required, line={"color": ALARM, "width": 1, "dash": "dash"})
     styled(figure, 540)
@@ -75,19 +83,28 @@ def margins(view: Waves) -> Table:
     for m in range(hz.shape[1]):
         for w in np.argsort(angle, kind="stable"):
             told = [number(float(share[w, m]), 4) for share in shares]
-            fate = (
-                ""
-                if shares[2][w, m] >= required
-                else "unstable"
-                if shares[2][w, m] < 0
-                else "below required"
-            )
+            fate = "" if shares[2][w, m] >= required else "unstable" if shares[2][w, m] < 0 else "below required"
             name = view.waves[w]
-            rows.append([f"{name}, mode {m + 1}", number(float(angle[w]), 5), number(float(hz[w, m]), 6), number(float(flow[w, m]), 6), *told, fate])  # fmt: skip
+            rows.append(
+                [
+                    f"{name}, mode {m + 1}",
+                    number(float(angle[w]), 5),
+                    number(float(hz[w, m]), 6),
+                    number(float(flow[w, m]), 6),
+                    *told,
+                    fate,
+                ]
+            )
     head = [
-        "wave", "phase angle (°)", "still fluid (Hz)", "in the flow (Hz)", "by energy (%)", "by eigenvalue (%)",
-        "with the structure (%)", "",
-    ]  # fmt: skip
+        "wave",
+        "phase angle (°)",
+        "still fluid (Hz)",
+        "in the flow (Hz)",
+        "by energy (%)",
+        "by eigenvalue (%)",
+        "with the structure (%)",
+        "",
+    ]
     return Table(head, rows, "Margins")
 
 
@@ -119,19 +136,13 @@ def _cards(view: Waves) -> list[Card]:
             else f"less than the {number(_PERCENT * required)} % required"
         )
         note += f"; {fate}"
-    found = [
-        Card(
-            f"{number(_PERCENT * least, 4)} %", "least damping in the flow", note, least < required
-        )
-    ]
+    found = [Card(f"{number(_PERCENT * least, 4)} %", "least damping in the flow", note, least < required)]
     if view.has("wheel_damping"):
         wheel = view.floats("wheel_damping")
         grow = int(np.count_nonzero(wheel < 0))
         note = f"{grow} of {counted(wheel.size, 'mode')} unstable"
         text = f"{number(_PERCENT * float(wheel[0]), 4)} %"
-        found.append(
-            Card(text, "least damping with the sectors as they differ", note, wheel[0] < required)
-        )
+        found.append(Card(text, "least damping with the sectors as they differ", note, wheel[0] < required))
     return found
 
 

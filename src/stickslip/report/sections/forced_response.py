@@ -25,16 +25,8 @@ SECTION: Section = Section(
     Response,
     (
         Block("response", "Forced response", (frequency_response, of_each_order)),
-        Block(
-            "optimisation",
-            "Optimisation curves",
-            (optimisation, where_friction_works, what_is_needed),
-        ),
-        Block(
-            "wheel",
-            "Blades of the wheel",
-            (blades, peaks_of_blades, wheel_at_peak, wheel_in_motion, statistics),
-        ),
+        Block("optimisation", "Optimisation curves", (optimisation, where_friction_works, what_is_needed)),
+        Block("wheel", "Blades of the wheel", (blades, peaks_of_blades, wheel_at_peak, wheel_in_motion, statistics)),
         Block(
             "contact",
             "Contacts at the peak",
@@ -56,15 +48,7 @@ SECTION: Section = Section(
         Block(
             "harmonics",
             "Harmonics: where more were needed, and what they cost",
-            (
-                choice,
-                kept_harmonics,
-                errors,
-                error_scatter,
-                low_order,
-                tables.more_harmonics,
-                tables.attempts,
-            ),
+            (choice, kept_harmonics, errors, error_scatter, low_order, tables.more_harmonics, tables.attempts),
             folded=True,
         ),
     ),

@@ -13,7 +13,7 @@ from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
 
-_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}  # fmt: skip
+_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _READING = (
     "Damping ratio of the motion of each amplitude: below zero it grows, above it decays, and where the curve crosses the line it "
     "goes on by itself. Crossings upward attract motions of the same wave, crossings downward repel them: beyond these friction "
@@ -33,10 +33,7 @@ class Cycles(Node):
     def names(self) -> list[str]:
         """Of the modes that were followed."""
         waves, modes = self.integers("wave_number"), self.integers("mode")
-        return [
-            f"mode {m}" if k < 0 else f"wave {k}, mode {m}"
-            for k, m in zip(waves, modes, strict=True)
-        ]
+        return [f"mode {m}" if k < 0 else f"wave {k}, mode {m}" for k, m in zip(waves, modes, strict=True)]
 
     @property
     def cycles(self) -> int:
@@ -107,11 +104,14 @@ def waves_in_time(view: Cycles) -> Plot | None:
     for i, k in enumerate(shown):
         figure.add_trace(
             go.Scatter(
-                x=time, y=scale.factor * amplitude[:, k], mode="lines", name=f"wave {k}",
+                x=time,
+                y=scale.factor * amplitude[:, k],
+                mode="lines",
+                name=f"wave {k}",
                 line={"color": colour(i), "width": 1.8},
                 hovertemplate=f"wave {k}: %{{y:.4g}} {scale.unit} at %{{x:.4g}} s<extra></extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 420)
     figure.update_xaxes(title_text="time (s)")
     figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
@@ -131,7 +131,7 @@ def cycle_table(view: Cycles) -> Table | Words:
         return Words((told,))
     names = view.names
     rows = [_row(view, names, c) for c in range(view.cycles)]
-    head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]  # fmt: skip
+    head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]
     return Table(head, rows, "Limit cycles", items=_without(view, names))
 
 
@@ -152,10 +152,14 @@ def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
         in_time = f"{quantity(value('time_amplitude'), 'm', 5)} ({told})"
     few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
     return [
-        names[int(view.integers("cycle_branch")[c])], quantity(value("amplitude"), "m", 5), number(value("frequency_hz"), 7),
-        f"{int(view.integers('cycle_harmonics')[c])}{few}", f"**{word}**{grows}",
-        multiplier if np.isfinite(value("multiplier")) else NONE, in_time,
-    ]  # fmt: skip
+        names[int(view.integers("cycle_branch")[c])],
+        quantity(value("amplitude"), "m", 5),
+        number(value("frequency_hz"), 7),
+        f"{int(view.integers('cycle_harmonics')[c])}{few}",
+        f"**{word}**{grows}",
+        multiplier if np.isfinite(value("multiplier")) else NONE,
+        in_time,
+    ]
 
 
 def _without(view: Cycles, names: Sequence[str]) -> list[str]:
@@ -164,9 +168,7 @@ def _without(view: Cycles, names: Sequence[str]) -> list[str]:
     if not lost:
         return []
     said = [f"{names[i]} (at most {number(100 * most[i])} %)" for i in lost]
-    return [
-        f"**Friction cannot bound** {joined(said)}: the damping is negative at every amplitude."
-    ]
+    return [f"**Friction cannot bound** {joined(said)}: the damping is negative at every amplitude."]
 
 
 def _unbounded(view: Cycles) -> list[int]:
@@ -183,11 +185,14 @@ def _over_amplitude(view: Cycles, name: str, factor: float, at_cycles: FloatArra
         amplitude, own = view.of_branch(i, name, at_cycles)
         figure.add_trace(
             go.Scatter(
-                x=scale.factor * amplitude, y=factor * own, mode="lines", name=label,
+                x=scale.factor * amplitude,
+                y=factor * own,
+                mode="lines",
+                name=label,
                 line={"color": colour(i), "width": 2},
                 hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 460)
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
     output = view.text("output")
@@ -211,11 +216,14 @@ def _mark(view: Cycles, figure: go.Figure, heights: FloatArray) -> None:
         lines = [colour(int(i)) for i in which[own]]
         figure.add_trace(
             go.Scatter(
-                x=factor * amplitude[own], y=heights[own], mode="markers", name=word,
+                x=factor * amplitude[own],
+                y=heights[own],
+                mode="markers",
+                name=word,
                 marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
                 hovertemplate=f"{word} limit cycle: %{{x:.5g}} {unit}<extra></extra>",
             )
-        )  # fmt: skip
+        )
 
 
 def _caption(view: Cycles) -> str:
@@ -223,9 +231,9 @@ def _caption(view: Cycles) -> str:
     parts = [_READING]
     if view.cycles:
         words = view.labels_of("cycle_stability")
-        counts = [counted(words.count(word), f"{word} limit cycle") for word in _SYMBOLS if word in words]  # fmt: skip
+        counts = [counted(words.count(word), f"{word} limit cycle") for word in _SYMBOLS if word in words]
         parts.append(f"There are {joined(counts)} (marked).")
-    bounded = [f"{name} {number(100 * float(t))} %" for name, t in zip(view.names, top, strict=True) if np.isfinite(t)]  # fmt: skip
+    bounded = [f"{name} {number(100 * float(t))} %" for name, t in zip(view.names, top, strict=True) if np.isfinite(t)]
     if bounded:
         parts.append(f"Most damping: {joined(bounded)}.")
     return " ".join(parts)
@@ -236,13 +244,10 @@ def linear_table(view: Cycles) -> Table | None:
     if not view.has("linear_damping_ratio"):
         return None
     waves = view.integers("linear_wave")
-    hertz, ratio = (view.values(f"linear_{n}", "linear", "mode") for n in ("frequency_hz", "damping_ratio"))  # fmt: skip
+    hertz, ratio = (view.values(f"linear_{n}", "linear", "mode") for n in ("frequency_hz", "damping_ratio"))
     head = ["wave", *(f"mode {m + 1}: Hz, damping %" for m in range(hertz.shape[1]))]
     rows = [
-        [
-            "–" if k < 0 else str(k),
-            *(_small(float(f), float(z)) for f, z in zip(own, damped, strict=True)),
-        ]
+        ["–" if k < 0 else str(k), *(_small(float(f), float(z)) for f, z in zip(own, damped, strict=True))]
         for k, own, damped in zip(waves, hertz, ratio, strict=True)
     ]
     return Table(head, rows, "Modes with contacts stuck")
@@ -267,10 +272,6 @@ def _cards(view: Cycles) -> list[Card]:
 
 
 _BLOCK = Block(
-    "limit-cycles",
-    "Vibration that nothing drives",
-    (damping, frequencies, cycle_table, waves_in_time, linear_table),
+    "limit-cycles", "Vibration that nothing drives", (damping, frequencies, cycle_table, waves_in_time, linear_table)
 )
-SECTION: Section = Section(
-    "limit_cycle", ("linear_damping_ratio",), Cycles, (_BLOCK,), by_case=True, cards=_cards
-)
+SECTION: Section = Section("limit_cycle", ("linear_damping_ratio",), Cycles, (_BLOCK,), by_case=True, cards=_cards)

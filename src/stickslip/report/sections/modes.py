@@ -21,11 +21,14 @@ def diameter_map(view: Waves) -> Plot:
         known, mode = np.nonzero(np.isfinite(view.floats("reference_hz")))
         figure.add_trace(
             go.Scatter(
-                x=view.integers("nodal_diameter")[known], y=view.floats("reference_hz")[known, mode],
-                mode="markers", name="reference", hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
+                x=view.integers("nodal_diameter")[known],
+                y=view.floats("reference_hz")[known, mode],
+                mode="markers",
+                name="reference",
+                hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
                 marker=ring(INK, 12, 1.2),
             )
-        )  # fmt: skip
+        )
         reference = " Open circles are the frequencies to compare with."
     styled(figure, 520)
     diameter_axes(figure, view)
@@ -47,10 +50,7 @@ def frequencies(view: Waves) -> list[Table]:
     # where nothing parts the directions, both have the frequencies
     parted = len(set(view.integers("nodal_diameter"))) < len(hz)
     kinds = [kind if parted or kind == "standing" else "both ways" for kind in view.kinds]
-    names = [
-        f"{name}, {kind}" if view.sectors > 1 else name
-        for name, kind in zip(view.waves, kinds, strict=True)
-    ]
+    names = [f"{name}, {kind}" if view.sectors > 1 else name for name, kind in zip(view.waves, kinds, strict=True)]
     rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]
     found = [Table(head, rows, "Natural frequencies")]
     if not view.has("stiffest_hz"):
@@ -71,7 +71,7 @@ def in_flow(view: Waves) -> Table | None:
     rows = [
         [f"{name}, {kind}", *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
         for name, kind, own in zip(view.waves, view.kinds, zip(hz, damping, strict=True), strict=True)
-    ]  # fmt: skip
+    ]
     text = "Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio."
     return Table(head, rows, "In the flow", (text,))
 
@@ -90,19 +90,20 @@ def stage_shares(view: Waves) -> Plot | None:
     ]
     bars = [
         go.Bar(
-            x=places, y=100 * share[:, :, i].ravel(), name=f"{name} ({count} sectors)", marker={"color": colour(i)},
-            customdata=hz.ravel(), hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + name + "</extra>",
+            x=places,
+            y=100 * share[:, :, i].ravel(),
+            name=f"{name} ({count} sectors)",
+            marker={"color": colour(i)},
+            customdata=hz.ravel(),
+            hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + name + "</extra>",
         )
         for i, (name, count) in enumerate(zip(stages, counts, strict=True))
-    ]  # fmt: skip
+    ]
     figure = styled(go.Figure(bars), 420)
     figure.update_layout(barmode="stack", bargap=0.15)
     figure.update_xaxes(title_text="mode", tickangle=0)
     figure.update_yaxes(title_text="share of the kinetic energy (%)", range=[0, 100])
-    waves = "; ".join(
-        f"{name}: {text}"
-        for name, text in zip(view.waves, view.data["stage_waves"].values, strict=True)
-    )
+    waves = "; ".join(f"{name}: {text}" for name, text in zip(view.waves, view.data["stage_waves"].values, strict=True))
     caption = (
         "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
         f"exist in the assembly only. Waves that the flanges let vibrate together: {waves}. All else of the flanges moves freely."
@@ -154,16 +155,6 @@ def _cards(view: Waves) -> list[Card]:
 
 _TITLE = "Natural frequencies and mode shapes"
 _BLOCK = Block(
-    "modes",
-    _TITLE,
-    (
-        diameter_map,
-        stage_shares,
-        mode_shapes,
-        frequencies,
-        modes_of_wheel,
-        in_flow,
-        comparison,
-    ),
+    "modes", _TITLE, (diameter_map, stage_shares, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
 )
 SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

@@ -32,7 +32,7 @@ class Modes(Node):
     def names(self) -> list[str]:
         """Of the modes."""
         waves, modes = self.integers("wave_number"), self.integers("mode")
-        return [f"mode {m}" if k < 0 else f"wave {k}, mode {m}" for k, m in zip(waves, modes, strict=True)]  # fmt: skip
+        return [f"mode {m}" if k < 0 else f"wave {k}, mode {m}" for k, m in zip(waves, modes, strict=True)]
 
     def along(self, i: int, *names: str) -> list[FloatArray]:
         """Return variables along a mode; NaN where it was lost."""
@@ -47,7 +47,7 @@ def frequencies(view: Modes) -> Plot | None:
         return None
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction."
-    return Plot(f"nonlinear_mode_frequency{view.key}", "Frequency over the amplitude", caption, figure)  # fmt: skip
+    return Plot(f"nonlinear_mode_frequency{view.key}", "Frequency over the amplitude", caption, figure)
 
 
 def damping(view: Modes) -> Plot | None:
@@ -67,7 +67,7 @@ def energies(view: Modes) -> list[Plot]:
     for name, factor, title, key, caption in (
         ("frequency_hz", 1.0, "frequency (Hz)", "energy", _ENERGY),
         ("damping_ratio", 100.0, "damping ratio (%)", "energy_damping", "The same of the damping ratio."),
-    ):  # fmt: skip
+    ):
         figure = _over(view, "energy", name, factor, "J")
         if figure is not None:
             figure.update_yaxes(title_text=title)
@@ -78,20 +78,37 @@ def energies(view: Modes) -> list[Plot]:
 
 def table(view: Modes) -> Table:
     """Return the modes: where they begin, how much they damp, how they end."""
-    head = ["mode", "Hz, stuck", "damping %, stuck", "most damping %", "at", "all contacts slip from", "harmonics", "end"]  # fmt: skip
+    head = [
+        "mode",
+        "Hz, stuck",
+        "damping %, stuck",
+        "most damping %",
+        "at",
+        "all contacts slip from",
+        "harmonics",
+        "end",
+    ]
     rows = []
     for i, name in enumerate(view.names):
-        most, at, gross = (float(view.floats(n)[i]) for n in ("largest_damping_ratio", "largest_damping_amplitude", "gross_slip_amplitude"))  # fmt: skip
+        most, at, gross = (
+            float(view.floats(n)[i])
+            for n in ("largest_damping_ratio", "largest_damping_amplitude", "gross_slip_amplitude")
+        )
         own = view.values("harmonics", "branch", "point")[i]
         orders = own[own > 0]
         kept = f"{int(orders.min())} to {int(orders.max())}" if orders.size else NONE
         rows.append(
             [
-                name, number(float(view.floats("mode_frequency_hz")[i]), 6), number(100 * float(view.floats("mode_damping_ratio")[i]), 4),
-                number(100 * most, 4) if np.isfinite(most) else NONE, quantity(at, "m", 4), quantity(gross, "m", 4), kept,
+                name,
+                number(float(view.floats("mode_frequency_hz")[i]), 6),
+                number(100 * float(view.floats("mode_damping_ratio")[i]), 4),
+                number(100 * most, 4) if np.isfinite(most) else NONE,
+                quantity(at, "m", 4),
+                quantity(gross, "m", 4),
+                kept,
                 view.labels_of("problem")[i] or view.labels_of("end")[i],
             ]
-        )  # fmt: skip
+        )
     return Table(head, rows)
 
 
@@ -113,10 +130,13 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
     for case in response.cases:
         at = response.points(case)
         figure.add_scatter(
-            x=x[at], y=scale.factor * amplitude[at], mode="lines", line={"color": case.colour, "width": 1.6},
+            x=x[at],
+            y=scale.factor * amplitude[at],
+            mode="lines",
+            line={"color": case.colour, "width": 1.6},
             name=case.short if len(response.cases) > 1 else "response",
             hovertemplate=f"{case.named}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<extra></extra>",
-        )  # fmt: skip
+        )
     drawn = []
     low, high = np.nanmin(amplitude), np.nanmax(amplitude)
     for i, label in enumerate(modes.names):
@@ -127,10 +147,13 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
             continue
         drawn.append(label)
         figure.add_scatter(
-            x=np.where(shown, hertz, np.nan), y=scale.factor * np.where(shown, own, np.nan), mode="lines", name=label,
+            x=np.where(shown, hertz, np.nan),
+            y=scale.factor * np.where(shown, own, np.nan),
+            mode="lines",
+            name=label,
             line={"color": INK, "width": 2.2, "dash": ("dash", "dot", "dashdot")[i % 3]},
             hovertemplate=f"{label}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
-        )  # fmt: skip
+        )
     if not drawn:
         return None
     styled(figure, 520)
@@ -152,9 +175,13 @@ def _over(view: Modes, over: str, name: str, factor: float, unit: str) -> go.Fig
     for i, label in enumerate(view.names):
         along, own = view.along(i, over, name)
         figure.add_scatter(
-            x=scale.factor * along, y=factor * own, mode="lines", name=label, line={"color": colour(i), "width": 2},
+            x=scale.factor * along,
+            y=factor * own,
+            mode="lines",
+            name=label,
+            line={"color": colour(i), "width": 2},
             hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
-        )  # fmt: skip
+        )
     styled(figure, 440)
     title = "energy" if over == "energy" else f"amplitude of {view.text('output')}"
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
@@ -168,10 +195,8 @@ def _cards(view: Modes) -> list[Card]:
         return []
     i = int(np.nanargmax(most))
     at = quantity(float(view.floats("largest_damping_amplitude")[i]), "m")
-    return [Card(f"{number(100 * float(most[i]))} %", "most damping of a mode", f"{view.names[i]} at {at}")]  # fmt: skip
+    return [Card(f"{number(100 * float(most[i]))} %", "most damping of a mode", f"{view.names[i]} at {at}")]
 
 
 _BLOCK = Block("nonlinear-modes", "Nonlinear modes", (frequencies, damping, energies, table))
-SECTION: Section = Section(
-    NAME, ("mode", "frequency_hz"), Modes, (_BLOCK,), by_case=True, cards=_cards
-)
+SECTION: Section = Section(NAME, ("mode", "frequency_hz"), Modes, (_BLOCK,), by_case=True, cards=_cards)

@@ -53,10 +53,14 @@ def envelopes(view: TwoTonesView) -> Plot | None:
     for i, (word, own) in enumerate(sizes.items()):
         figure.add_trace(
             go.Scatter(
-                x=hz, y=scale.factor * own, mode="lines+markers", name={"rms": "root mean square"}.get(word, f"{word} amplitude"),
-                line={"color": colour(i), "width": 2}, hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra>{word}</extra>",
+                x=hz,
+                y=scale.factor * own,
+                mode="lines+markers",
+                name={"rms": "root mean square"}.get(word, f"{word} amplitude"),
+                line={"color": colour(i), "width": 2},
+                hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra>{word}</extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 440)
     figure.update_xaxes(title_text="first frequency (Hz)")
     figure.update_yaxes(title_text=f"{view.name} ({scale.unit})", rangemode="tozero")
@@ -78,13 +82,17 @@ def over_phase(view: TwoTonesView) -> Plot | None:
     for place, i in enumerate(view.drawn):
         figure.add_trace(
             go.Scatter(
-                x=degrees, y=scale.factor * own[i], mode="lines", name=view.label(i), line={"color": colour(place), "width": 2},
+                x=degrees,
+                y=scale.factor * own[i],
+                mode="lines",
+                name=view.label(i),
+                line={"color": colour(place), "width": 2},
                 hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.0f}}°<extra>{view.label(i)}</extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 420)
     figure.update_xaxes(title_text="phase of the second frequency where a period begins (degrees)")
-    figure.update_yaxes(title_text=f"amplitude of {view.name} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.name} ({scale.unit})", rangemode="tozero")
     caption = "Half of peak to peak over one period of the first frequency, for each phase of the second one at which that may begin."
     return Plot(f"two_frequencies_phase{view.key}", "Slow change of the amplitude", caption, figure)
 
@@ -104,13 +112,18 @@ def combined(view: TwoTonesView) -> Plot | None:
         names = [f"{j} f1 {k:+d} f2" for j, k in index[i][known]]
         figure.add_trace(
             go.Scatter(
-                x=np.abs(hz[known]), y=scale.factor * sizes[i][known], mode="markers", name=view.label(i), text=names,
-                marker={"color": colour(place), "size": 8}, hovertemplate=f"%{{text}}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
+                x=np.abs(hz[known]),
+                y=scale.factor * sizes[i][known],
+                mode="markers",
+                name=view.label(i),
+                text=names,
+                marker={"color": colour(place), "size": 8},
+                hovertemplate=f"%{{text}}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
             )
-        )  # fmt: skip
+        )
     styled(figure, 420)
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(type="log", title_text=f"amplitude of {view.name} ({scale.unit})", exponentformat="power")  # fmt: skip
+    figure.update_yaxes(type="log", title_text=f"amplitude of {view.name} ({scale.unit})", exponentformat="power")
     caption = "Amplitudes of the combined frequencies j f1 + k f2 that were kept; below zero they are shown at their absolute value."
     return Plot(f"two_frequencies_lines{view.key}", "Combined frequencies", caption, figure)
 
@@ -118,21 +131,40 @@ def combined(view: TwoTonesView) -> Plot | None:
 def motions(view: TwoTonesView) -> Table:
     """Return a row a motion."""
     kinds, reasons = view.labels_of("kind"), view.labels_of("why")
-    largest, least, rms, extreme = (view.values(w, "point", "output")[:, 0] for w in ("largest", "least", "rms", "extreme"))  # fmt: skip
+    largest, least, rms, extreme = (
+        view.values(w, "point", "output")[:, 0] for w in ("largest", "least", "rms", "extreme")
+    )
     timed = view.has("time_largest")
-    head = ["first (Hz)", "second (Hz)", "", "least", "largest", "root mean square", "farthest from the mean", "combined", "left out (%)", *(["in time"] if timed else []), "why"]  # fmt: skip
+    head = [
+        "first (Hz)",
+        "second (Hz)",
+        "",
+        "least",
+        "largest",
+        "root mean square",
+        "farthest from the mean",
+        "combined",
+        "left out (%)",
+        *(["in time"] if timed else []),
+        "why",
+    ]
     rows = []
     for i, kind in enumerate(kinds):
         second = float(view.floats("second_hz")[i])
-        lengths = [quantity(float(v[i]), "m", 4) if np.isfinite(v[i]) else NONE for v in (least, largest, rms, extreme)]  # fmt: skip
+        lengths = [quantity(float(v[i]), "m", 4) if np.isfinite(v[i]) else NONE for v in (least, largest, rms, extreme)]
         left = float(view.floats("left_out")[i])
         rows.append(
             [
-                fixed(float(view.floats("first_hz")[i]), 3), fixed(second, 3) if np.isfinite(second) else NONE, kind, *lengths,
-                str(int(view.integers("combined")[i])), number(100 * left, 2) if np.isfinite(left) else NONE,
-                *([_in_time(view, i)] if timed else []), reasons[i],
+                fixed(float(view.floats("first_hz")[i]), 3),
+                fixed(second, 3) if np.isfinite(second) else NONE,
+                kind,
+                *lengths,
+                str(int(view.integers("combined")[i])),
+                number(100 * left, 2) if np.isfinite(left) else NONE,
+                *([_in_time(view, i)] if timed else []),
+                reasons[i],
             ]
-        )  # fmt: skip
+        )
     return Table(head, rows, "Motions")
 
 
@@ -151,8 +183,15 @@ def _cards(view: TwoTonesView) -> list[Card]:
         return [Card("0", "motions with two frequencies", "none was found")]
     largest = view.values("largest", "point", "output")[:, 0]
     top = max(there, key=lambda i: largest[i])
-    return [Card(quantity(float(largest[top]), "m", 4), "largest amplitude with two frequencies", f"{view.label(top)}; {counted(len(there), 'motion')}", False)]  # fmt: skip
+    return [
+        Card(
+            quantity(float(largest[top]), "m", 4),
+            "largest amplitude with two frequencies",
+            f"{view.label(top)}; {counted(len(there), 'motion')}",
+            False,
+        )
+    ]
 
 
-_BLOCK = Block("two-frequencies", "Motions with two frequencies", (envelopes, over_phase, combined, motions))  # fmt: skip
-SECTION: Section = Section("quasi_periodic", ("first_hz",), TwoTonesView, (_BLOCK,), by_case=True, cards=_cards)  # fmt: skip
+_BLOCK = Block("two-frequencies", "Motions with two frequencies", (envelopes, over_phase, combined, motions))
+SECTION: Section = Section("quasi_periodic", ("first_hz",), TwoTonesView, (_BLOCK,), by_case=True, cards=_cards)

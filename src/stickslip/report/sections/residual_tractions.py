@@ -39,25 +39,39 @@ def band(view: Tractions) -> Plot | None:
     hover = f"%{{y:.4g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>"
     wide = has_width(least, most)
     if wide:
-        figure.add_scatter(x=hertz, y=scale.factor * least, name="smallest", hovertemplate=hover, **edge)  # fmt: skip
+        figure.add_scatter(x=hertz, y=scale.factor * least, name="smallest", hovertemplate=hover, **edge)
         figure.add_scatter(
-            x=hertz, y=scale.factor * most, name="largest", fill="tonexty", fillcolor="rgba(0,114,178,0.25)",
-            hovertemplate=hover, **edge,
-        )  # fmt: skip
+            x=hertz,
+            y=scale.factor * most,
+            name="largest",
+            fill="tonexty",
+            fillcolor="rgba(0,114,178,0.25)",
+            hovertemplate=hover,
+            **edge,
+        )
     figure.add_scatter(
-        x=hertz, y=scale.factor * own, name="own start" if wide else "amplitude", mode="lines+markers", marker={"size": 5},
-        line={"color": INK, "width": 1.4}, hovertemplate=hover,
-    )  # fmt: skip
+        x=hertz,
+        y=scale.factor * own,
+        name="own start" if wide else "amplitude",
+        mode="lines+markers",
+        marker={"size": 5},
+        line={"color": INK, "width": 1.4},
+        hovertemplate=hover,
+    )
     if _open_resonance(view):
         figure.add_scatter(
-            x=view.floats("resonance_hz")[1:], y=scale.factor * view.floats("resonance_amplitude")[1:], name="bounds of the resonance",
-            mode="markers", marker={"symbol": "diamond", "size": 10, "color": COLOURS[1]}, hovertemplate=hover,
-        )  # fmt: skip
+            x=view.floats("resonance_hz")[1:],
+            y=scale.factor * view.floats("resonance_amplitude")[1:],
+            name="bounds of the resonance",
+            mode="markers",
+            marker={"symbol": "diamond", "size": 10, "color": COLOURS[1]},
+            hovertemplate=hover,
+        )
     styled(figure, 480)
     figure.update_xaxes(title_text="frequency (Hz)")
     ticks = log_ticks(scale.factor * np.concatenate([least, most]))
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **ticks)
-    return Plot(f"residual_tractions{view.key}", "What residual tractions leave open", _caption(view), figure)  # fmt: skip
+    return Plot(f"residual_tractions{view.key}", "What residual tractions leave open", _caption(view), figure)
 
 
 def _caption(view: Tractions) -> str:
@@ -73,7 +87,10 @@ def _caption(view: Tractions) -> str:
     width = most / least - 1
     at = int(np.nanargmax(width))
     hertz = number(float(view.floats("frequency_hz")[at]), 5)
-    return text + f"The band is widest at {hertz} Hz, {percent(100 * float(width[at]))}. Bounds are found motions; the true band is at least as wide."  # fmt: skip
+    return (
+        text
+        + f"The band is widest at {hertz} Hz, {percent(100 * float(width[at]))}. Bounds are found motions; the true band is at least as wide."
+    )
 
 
 def _open_resonance(view: Tractions) -> bool:
@@ -96,14 +113,13 @@ def resonances(view: Tractions) -> Table | None:
         told = ""
         if k and view.has("confirmed"):
             again, time = (
-                quantity(float(view.floats(f"{what}_amplitude")[k - 1]), "m")
-                for what in ("resolved", "time")
+                quantity(float(view.floats(f"{what}_amplitude")[k - 1]), "m") for what in ("resolved", "time")
             )
             followed = view.labels_of("time_status")[k - 1]
-            ends = ("left in time", "confirmed") if followed else ("not found again", "confirmed, not in time")  # fmt: skip
+            ends = ("left in time", "confirmed") if followed else ("not found again", "confirmed, not in time")
             told = ends[view.integers("confirmed")[k - 1]]
         off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
-        rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])  # fmt: skip
+        rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])
     head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]
     return Table(head, rows, "Bounds of the resonance", equal)
 
@@ -117,6 +133,4 @@ def _cards(view: Tractions) -> list[Card]:
 
 
 _BLOCK = Block("residual_tractions", "Residual tractions", (band, resonances))
-SECTION: Section = Section(
-    "residual_tractions", ("frequency_hz",), Tractions, (_BLOCK,), by_case=True, cards=_cards
-)
+SECTION: Section = Section("residual_tractions", ("frequency_hz",), Tractions, (_BLOCK,), by_case=True, cards=_cards)

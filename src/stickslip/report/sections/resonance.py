@@ -39,28 +39,25 @@ def amplitudes(view: Peaks) -> Plot:
     """Show the amplitude of the peaks over the parameter, the lowest place of the highest, and where one overtakes another."""
     scale = scale_for(view.floats("amplitude"), "m")
     figure = _over_parameter(view, "amplitude", scale.factor, scale.unit)
-    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")
     parts = [
         f"{counted(view.count, 'peak')} followed over {view.text('parameter')}: {_BY[view.text('by')]}.",
-        "Dashed: the curve has met a minimum of the response, and is no peak any more."
-        * _any_minimum(view),
+        "Dashed: the curve has met a minimum of the response, and is no peak any more." * _any_minimum(view),
     ]
     if np.isfinite(view.scalar("smallest_value")):
         x, y, hertz = (view.scalar(f"smallest_{k}") for k in ("value", "amplitude", "frequency_hz"))
         _mark(figure, np.array([x]), scale.factor * np.array([y]), "lowest", INK)
         where = f"at {number(hertz, 6)} Hz" if np.isfinite(hertz) else "where two are equally high"
-        parts.append(
-            f"The highest peak is lowest at **{number(x, 5)}**: {quantity(y, 'm', 5)} {where}."
-        )
+        parts.append(f"The highest peak is lowest at **{number(x, 5)}**: {quantity(y, 'm', 5)} {where}.")
     if view.has("overtaking_value"):
         met, height = view.floats("overtaking_value"), view.floats("overtaking_amplitude")
         _mark(figure, met, scale.factor * height, "overtaken", MUTED)
         told = [
             f"peak {a + 1} by peak {b + 1} at {number(float(v), 4)}"
             for v, a, b in zip(met, view.integers("overtaking_before"), view.integers("overtaking_after"), strict=True)
-        ]  # fmt: skip
+        ]
         parts.append(f"Overtaken: {joined(told)}.")
-    return Plot(f"resonances{view.key}", "Amplitude of the peaks", " ".join(p for p in parts if p), figure)  # fmt: skip
+    return Plot(f"resonances{view.key}", "Amplitude of the peaks", " ".join(p for p in parts if p), figure)
 
 
 def frequencies(view: Peaks) -> Plot:
@@ -90,11 +87,14 @@ def energies(view: Peaks) -> Plot:
         own = scale.factor * view.curve("friction_energy", i)
         figure.add_trace(
             go.Scatter(
-                x=view.curve("value", i), y=own, mode="lines", name=f"peak {i + 1}, contacts",
+                x=view.curve("value", i),
+                y=own,
+                mode="lines",
+                name=f"peak {i + 1}, contacts",
                 line={"color": colour(i), "width": 1.4, "dash": "dot"},
                 hovertemplate=f"contacts take %{{y:.4g}} {scale.unit} at %{{x:.5g}}<extra></extra>",
             )
-        )  # fmt: skip
+        )
     figure.update_yaxes(title_text=f"energy of a period ({scale.unit})", rangemode="tozero")
     caption = "Work of the loads over a period of the first harmonic, which is what is dissipated; dotted, the part that the contacts take."
     return Plot(f"resonance_energy{view.key}", "Dissipated energy", caption, figure)
@@ -104,17 +104,25 @@ def peak_table(view: Peaks) -> Table:
     """Return the peaks."""
     rows = []
     for i in range(view.count):
-        columns = [view.curve(k, i) for k in ("value", "frequency_hz", "amplitude", "phase_deg", "energy", "friction_energy", "maximum")]  # fmt: skip
+        columns = [
+            view.curve(k, i)
+            for k in ("value", "frequency_hz", "amplitude", "phase_deg", "energy", "friction_energy", "maximum")
+        ]
         for value, hertz, height, phase, energy, friction, kind in zip(*columns, strict=True):
             share = 100 * friction / energy if energy > 0.0 else np.nan
             word = {1: "", 0: " (no maximum)", -1: " (not found)"}[int(kind)]
             rows.append(
                 [
-                    f"{i + 1}{word}", number(float(value), 6), number(float(hertz), 6), quantity(float(height), "m", 5),
-                    number(float(phase), 4), quantity(float(energy), "J", 4), f"{number(float(share), 3)} %" if np.isfinite(share) else NONE,
+                    f"{i + 1}{word}",
+                    number(float(value), 6),
+                    number(float(hertz), 6),
+                    quantity(float(height), "m", 5),
+                    number(float(phase), 4),
+                    quantity(float(energy), "J", 4),
+                    f"{number(float(share), 3)} %" if np.isfinite(share) else NONE,
                 ]
-            )  # fmt: skip
-    head = ["peak", view.text("parameter"), "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]  # fmt: skip
+            )
+    head = ["peak", view.text("parameter"), "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]
     return Table(head, rows, "Peaks")
 
 
@@ -128,11 +136,15 @@ def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figu
                 continue
             figure.add_trace(
                 go.Scatter(
-                    x=value, y=shown, mode="lines+markers", name=f"peak {i + 1}{', no maximum' * low}",
-                    line={"color": colour(i), "width": 2, "dash": "dash" if low else "solid"}, marker={"size": 5},
+                    x=value,
+                    y=shown,
+                    mode="lines+markers",
+                    name=f"peak {i + 1}{', no maximum' * low}",
+                    line={"color": colour(i), "width": 2, "dash": "dash" if low else "solid"},
+                    marker={"size": 5},
                     hovertemplate=f"peak {i + 1}: %{{y:.6g}} {unit} at %{{x:.6g}}<extra></extra>",
                 )
-            )  # fmt: skip
+            )
     styled(figure, 440)
     figure.update_xaxes(title_text=view.text("parameter"))
     return figure
@@ -141,10 +153,14 @@ def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figu
 def _mark(figure: go.Figure, x: FloatArray, y: FloatArray, name: str, shade: str) -> None:
     figure.add_trace(
         go.Scatter(
-            x=x, y=y, mode="markers", name=name, marker=ring(shade, 13, 2),
+            x=x,
+            y=y,
+            mode="markers",
+            name=name,
+            marker=ring(shade, 13, 2),
             hovertemplate=f"{name}: %{{y:.6g}} at %{{x:.6g}}<extra></extra>",
         )
-    )  # fmt: skip
+    )
 
 
 def _any_minimum(view: Peaks) -> bool:
@@ -155,16 +171,12 @@ def _cards(view: Peaks) -> Sequence[Card]:
     known = view.floats("amplitude")
     if np.isfinite(view.scalar("smallest_value")):
         note = f"lowest, at {view.text('parameter')} = {number(view.scalar('smallest_value'), 4)}"
-        return [Card(quantity(view.scalar("smallest_amplitude"), "m", 4), "highest resonance", note)]  # fmt: skip
+        return [Card(quantity(view.scalar("smallest_amplitude"), "m", 4), "highest resonance", note)]
     if not np.any(np.isfinite(known)):
         return []
     span = f"{counted(view.count, 'peak')} over {view.text('parameter')}"
     return [Card(quantity(float(np.nanmax(known)), "m", 4), "highest resonance", span)]
 
 
-_BLOCK = Block(
-    "resonances",
-    "Resonances over a parameter",
-    (amplitudes, frequencies, phases, energies, peak_table),
-)
+_BLOCK = Block("resonances", "Resonances over a parameter", (amplitudes, frequencies, phases, energies, peak_table))
 SECTION: Section = Section("resonance", ("maximum",), Peaks, (_BLOCK,), by_case=True, cards=_cards)

@@ -47,10 +47,14 @@ def safe_diagram(view: Waves) -> Plot:
     x, y = zigzag(top, sectors, hertz)
     figure.add_trace(
         go.Scatter(
-            x=x, y=y, mode="lines", name="engine orders", hoverinfo="skip",
+            x=x,
+            y=y,
+            mode="lines",
+            name="engine orders",
+            hoverinfo="skip",
             line={"color": MUTED, "width": 1.2, "dash": "dash"},
         )
-    )  # fmt: skip
+    )
     unjudged = _not_judged(view)
     figure.add_trace(_orders(orders, unjudged, sectors, hertz))
     near = view.integers("pair_near") == 1
@@ -95,15 +99,20 @@ def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) ->
     places[folded == 0] = "middle left"
     few = len(orders) <= _MOST_LABELS
     return go.Scatter(
-        x=folded, y=orders * hertz, mode="markers+text" if few else "markers",
-        name="engine orders asked", text=[f" EO {m} " for m in orders], textposition=list(places),
+        x=folded,
+        y=orders * hertz,
+        mode="markers+text" if few else "markers",
+        name="engine orders asked",
+        text=[f" EO {m} " for m in orders],
+        textposition=list(places),
         textfont={"size": 11, "color": MUTED},
         marker={
             "symbol": ["square-x-open" if int(m) in unjudged else "square-open" for m in orders],
-            "size": 8, "color": INK,
+            "size": 8,
+            "color": INK,
         },
         hovertemplate="%{text}: %{y:.6g} Hz at nodal diameter %{x}<extra></extra>",
-    )  # fmt: skip
+    )
 
 
 def _near(view: Waves, near: np.ndarray) -> go.Scatter:
@@ -115,10 +124,14 @@ def _near(view: Waves, near: np.ndarray) -> go.Scatter:
         for w, m, o, d in zip(wave, mode, orders, margins, strict=True)
     ]
     return go.Scatter(
-        x=view.integers("nodal_diameter")[wave], y=view.floats("pair_frequency_hz")[near], text=text,
-        mode="markers", name="near resonance", hovertemplate="%{text}<extra></extra>",
+        x=view.integers("nodal_diameter")[wave],
+        y=view.floats("pair_frequency_hz")[near],
+        text=text,
+        mode="markers",
+        name="near resonance",
+        hovertemplate="%{text}<extra></extra>",
         marker=ring(ALARM, 17, 2.4),
-    )  # fmt: skip
+    )
 
 
 def interference(view: Waves) -> Table:
@@ -134,13 +147,28 @@ def interference(view: Waves) -> Table:
         verdict = "clear" if judged[i] else "order not judged"
         verdict = "**near resonance**" if near[i] else verdict
         rows.append(
-            [f"{order[i]}", view.waves[wave[i]], str(mode[i] + 1), number(float(own[i]), 6), number(float(excitation[i]), 6),
-             _rpm(float(meeting[i]), float(margin[i])), percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE, verdict]
-        )  # fmt: skip
+            [
+                f"{order[i]}",
+                view.waves[wave[i]],
+                str(mode[i] + 1),
+                number(float(own[i]), 6),
+                number(float(excitation[i]), 6),
+                _rpm(float(meeting[i]), float(margin[i])),
+                percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE,
+                verdict,
+            ]
+        )
     at = f"at {number(view.scalar('speed_rpm'), 5)} rpm"
     head = [
-        "engine order", "wave", "mode", f"mode {at} (Hz)", f"excitation {at} (Hz)", "resonance at (rpm)", "margin in speed", "",
-    ]  # fmt: skip
+        "engine order",
+        "wave",
+        "mode",
+        f"mode {at} (Hz)",
+        f"excitation {at} (Hz)",
+        "resonance at (rpm)",
+        "margin in speed",
+        "",
+    ]
     return Table(head, rows, "Engine orders and the modes that they can excite")
 
 

@@ -92,9 +92,7 @@ class StartSampler:
         laws = self.problem.system.interface.laws
         begun = rest(self.mean.size, laws)
         moved = self.mean + self.shapes @ (size * np.cos(turn))
-        return TransientStart(
-            moved, self.shapes @ (self.omegas * size * np.sin(turn)), begun.states
-        )
+        return TransientStart(moved, self.shapes @ (self.omegas * size * np.sin(turn)), begun.states)
 
 
 def not_marched(system: System) -> str:
@@ -105,7 +103,11 @@ def not_marched(system: System) -> str:
     structure = side.of_harmonic(0)
     if side.feedback_of(1) is not None or structure.is_complex:
         return "what vibrates has no real matrices that are the same for all harmonics"
-    return "structural damping is defined for vibration at one frequency, not in time" if structure.loss is not None else ""  # fmt: skip
+    return (
+        "structural damping is defined for vibration at one frequency, not in time"
+        if structure.loss is not None
+        else ""
+    )
 
 
 def sampler(

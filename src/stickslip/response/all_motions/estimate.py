@@ -33,7 +33,7 @@ def search_seconds(problem: ForcedProblem, search: MotionSearch) -> float:
         return solves
     motion = problem.low.linear.recover(omega, balance.coefficients(x))
     own = sampler(problem, omega, [motion], search.modes, search.spread)
-    stepping = TimeStepping(steps_per_period=search.steps, max_periods=TIMED, harmonics=order, tolerance=1e-4)  # fmt: skip
+    stepping = TimeStepping(steps_per_period=search.steps, max_periods=TIMED, harmonics=order, tolerance=1e-4)
     for number in range(2):
         begun = perf_counter()
         in_time(own, own.draw((search.seed, 0, number)), stepping)

@@ -115,10 +115,8 @@ class MotionBranch:
         elif around[0] < 0 or around[2] >= values.size:
             return float(values[around[1]]), float(self.omega[around[1]])
         q = self.coefficients[around].reshape(3, -1)
-        spans = float(np.ptp(self.omega)) or 1.0, float(np.max(np.abs(self.coefficients), initial=0.0)) or 1.0  # fmt: skip
-        path = np.column_stack(
-            [self.omega[around] / spans[0], q.real / spans[1], q.imag / spans[1]]
-        )
+        spans = float(np.ptp(self.omega)) or 1.0, float(np.max(np.abs(self.coefficients), initial=0.0)) or 1.0
+        path = np.column_stack([self.omega[around] / spans[0], q.real / spans[1], q.imag / spans[1]])
         before, after = np.linalg.norm(np.diff(path, axis=0), axis=1)
         if before == 0.0 or after == 0.0:
             return float(values[around[1]]), float(self.omega[around[1]])
@@ -225,9 +223,7 @@ def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) 
     """Return what the stages of a search tell together; frequencies are those of the load."""
     periods = search.periods
     branches = [
-        MotionBranch(
-            s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients
-        )
+        MotionBranch(s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients)
         for s in stages
         if s.kind == "branch"
     ]
@@ -237,15 +233,23 @@ def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) 
         amplitude = _amplitudes(problem, stage, periods)
         words = stage.words.split(";")
         motions = tuple(
-            MotionAt(int(stage.branch[i]), float(amplitude[i]), stage.coefficients[i], words[i], float(stage.multiplier[i]), float(stage.error[i]), float(stage.change[i]))
+            MotionAt(
+                int(stage.branch[i]),
+                float(amplitude[i]),
+                stage.coefficients[i],
+                words[i],
+                float(stage.multiplier[i]),
+                float(stage.error[i]),
+                float(stage.change[i]),
+            )
             for i in range(amplitude.size)
-        )  # fmt: skip
+        )
         own = starts.get(stage.place)
         ends = () if own is None else tuple(int(e) for e in own.branch)
         omega = search.places[stage.place]
         here = [s for s in stages if s.place == stage.place and s.kind in ("searched", "starts")]
         tries = sum(s.tries for s in stages if s.place == stage.place and s.kind != "starts")
-        at.append(AtFrequency(omega, motions, Basins(omega, ends), tries, any(s.end == SPENT for s in here)))  # fmt: skip
+        at.append(AtFrequency(omega, motions, Basins(omega, ends), tries, any(s.end == SPENT for s in here)))
     return AllMotions(
         tuple(branches),
         tuple(at),

@@ -14,9 +14,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedProblem
 from stickslip.response.homotopies import GrowingLoad, growing_load
 
-PHASES = (
-    8  # of a free motion against the load; a shift by a period of the load gives the same motion
-)
+PHASES = 8  # of a free motion against the load; a shift by a period of the load gives the same motion
 SPAN = (1e-2, 1e2)  # amplitudes that are looked at, in units of the largest known motion
 AMPLITUDES = 40
 HIGHEST = 3  # multiple of the load's frequency that is looked at
@@ -96,9 +94,7 @@ def _shapes(problem: ForcedProblem, balance: HarmonicBalance, modes: int) -> Ite
                 yield shape / largest
 
 
-def _free_amplitudes(
-    free: GrowingLoad, base: ComplexArray, harmonic: int, shape: FloatArray
-) -> Iterator[float]:
+def _free_amplitudes(free: GrowingLoad, base: ComplexArray, harmonic: int, shape: FloatArray) -> Iterator[float]:
     """Yield the amplitudes of a shape, m, at which it vibrates freely in a harmonic about the static part of a motion."""
     still = np.zeros_like(base)
     still[0] = base[0]

@@ -75,27 +75,20 @@ class MotionSearch:
     newton: Newton = field(default_factory=Newton)
 
     def __post_init__(self) -> None:
-        for name in (
-            "frequencies",
-            "periods",
-            "harmonics",
-            "points",
-            "modes",
-            "steps",
-            "most_periods",
-            "solves",
-        ):
+        for name in ("frequencies", "periods", "harmonics", "points", "modes", "steps", "most_periods", "solves"):
             if getattr(self, name) < 1:
-                raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
+                raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")
         if 2 * self.periods * self.harmonics >= self.steps:
-            raise input_error("MotionSearch.steps", f"is {self.steps}, too few for {self.harmonics} harmonics over periods = {self.periods}", f"Give more than {2 * self.periods * self.harmonics}.")  # fmt: skip
-        if not self.spread > 0.0:
             raise input_error(
-                "MotionSearch.spread", f"is {self.spread}", "Give a factor above zero."
+                "MotionSearch.steps",
+                f"is {self.steps}, too few for {self.harmonics} harmonics over periods = {self.periods}",
+                f"Give more than {2 * self.periods * self.harmonics}.",
             )
+        if not self.spread > 0.0:
+            raise input_error("MotionSearch.spread", f"is {self.spread}", "Give a factor above zero.")
         low, high = self.omega_range
         if not all(low <= omega <= high for omega in self.at):
-            raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")  # fmt: skip
+            raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -115,8 +108,14 @@ def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> 
         )
     order = search.harmonics
     sweep = Sweep(
-        omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
-        samples=max(search.samples, 8 * order), evaluator=search.evaluator, newton=search.newton,
-    )  # fmt: skip
+        omega_range=search.omega_range,
+        low=order,
+        high=order,
+        selection="always_low",
+        points=search.points,
+        samples=max(search.samples, 8 * order),
+        evaluator=search.evaluator,
+        newton=search.newton,
+    )
     problem = forced_problem(system, load, sweep)
     return problem if search.periods == 1 else over_periods(problem, search.periods, order)

@@ -25,26 +25,13 @@ from stickslip.response.all_motions.basins import (
     sampler,
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
-from stickslip.response.all_motions.found import (
-    SPENT,
-    AllMotions,
-    Kind,
-    Origin,
-    Stage,
-    gathered,
-    work_of,
-)
+from stickslip.response.all_motions.found import SPENT, AllMotions, Kind, Origin, Stage, gathered, work_of
 from stickslip.response.all_motions.from_modes import mode_starts
 from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
 from stickslip.response.equilibrium import bonded_start
-from stickslip.response.forced.problem import (
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-    with_stiffness,
-)
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.settled import stability
@@ -85,9 +72,7 @@ def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> All
     return gathered(problem, list(search_stages(problem, search)), search)
 
 
-def search_stages(
-    problem: ForcedProblem, search: MotionSearch, done: Sequence[Stage] = ()
-) -> Iterator[Stage]:
+def search_stages(problem: ForcedProblem, search: MotionSearch, done: Sequence[Stage] = ()) -> Iterator[Stage]:
     """Yield the stages of a search that are not in `done`, in their order; the budget counts the work of `done`."""
     yield from _Search(problem, search, list(done)).run()
 
@@ -153,7 +138,7 @@ class _Search:
             if but >= 0 and (stage.origin, stage.place) == ("time", but):
                 continue
             for guess in self._crossings(stage, omega):
-                solved = newton(lambda v: self.balance.linearise(v, omega), guess, self.search.newton)  # fmt: skip
+                solved = newton(lambda v: self.balance.linearise(v, omega), guess, self.search.newton)
                 if solved.status.converged and not self._known(solved.x, [z for _, z in found]):
                     found.append((number, solved.x))
         return found
@@ -176,7 +161,7 @@ class _Search:
         if count == 1:
             return list(known)
         shifts = [np.exp(2j * np.pi * k / count * turns)[:, None] for k in range(count)]
-        every = [self.balance.unknowns(self.balance.coefficients(x) * s) for x in known for s in shifts]  # fmt: skip
+        every = [self.balance.unknowns(self.balance.coefficients(x) * s) for x in known for s in shifts]
         apart: list[FloatArray] = []
         distance = self._distance(known) if known else None
         for x in every:
@@ -192,8 +177,15 @@ class _Search:
 
     def _swept(self) -> Stage:
         search = self.search
-        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton, self._counted)  # fmt: skip
-        points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]  # fmt: skip
+        made = plain_sweep(
+            self.problem.system,
+            self.balance,
+            self.problem.sweep.omega_range,
+            search.points,
+            search.newton,
+            self._counted,
+        )
+        points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]
         lost = len(made) - len(points)
         end = f"{lost} points were not found" if lost else WHOLE
         if not made or made[-1].p != self.problem.sweep.omega_range[1]:
@@ -204,22 +196,15 @@ class _Search:
         """Follow a motion as a branch."""
         search = self.search
         low, high = self.problem.sweep.omega_range
-        following = following_vibration(self.balance, steps_through(high - low, search.points), search.newton)  # fmt: skip
+        following = following_vibration(self.balance, steps_through(high - low, search.points), search.newton)
         first = start_point(self.balance, x, omega, following)
         most = LONGEST * search.points
         points, end = both_ways(
-            self.problem,
-            self.balance,
-            following,
-            first,
-            most,
-            lambda: SPENT if self._counted() else "",
+            self.problem, self.balance, following, first, most, lambda: SPENT if self._counted() else ""
         )
         return self._stage("branch", place, origin, points, end)
 
-    def _stage(
-        self, kind: Kind, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str
-    ) -> Stage:
+    def _stage(self, kind: Kind, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str) -> Stage:
         rows = np.array([p.coefficients for p in points])
         none = np.zeros((0, self.order + 1, self.balance.linear.n), dtype=complex)
         omega = np.array([p.omega for p in points])
@@ -243,15 +228,11 @@ class _Search:
         yield self._kept(replace(self._stage("searched", place, "deflation", (), end), tries=tries))
 
     def _another(
-        self,
-        omega: float,
-        known: Sequence[FloatArray],
-        starts: Iterator[FloatArray],
-        options: Newton,
+        self, omega: float, known: Sequence[FloatArray], starts: Iterator[FloatArray], options: Newton
     ) -> tuple[FloatArray | None, int]:
         """Return a solution that is none of the known ones, None where as many starts as asked for find nothing, and the starts taken."""
         apart = self._shifted(known)
-        chosen = mode_starts(self.problem, self.balance, omega, self.search.periods, known, self.search.modes)  # fmt: skip
+        chosen = mode_starts(self.problem, self.balance, omega, self.search.periods, known, self.search.modes)
         most = len(chosen) + self.search.tries
         for tries, start in enumerate(islice(chain(chosen, starts), most)):
             self.now = tries
@@ -259,14 +240,12 @@ class _Search:
                 return None, tries
             found = deflated_newton(
                 lambda x: self.balance.linearise(x, omega), start, apart, self._distance(known or [start]), options
-            )  # fmt: skip
+            )
             if found.status.converged and not self._known(found.x, known):
                 return found.x, tries + 1
         return None, most
 
-    def _guesses(
-        self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator
-    ) -> Iterator[FloatArray]:
+    def _guesses(self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator) -> Iterator[FloatArray]:
         """Yield starts without end: the stuck vibration, known motions scaled, then scaled and shifted in phase at random."""
         stuck = bonded_start(self.balance, omega, self.problem.system)
         yield stuck
@@ -281,9 +260,7 @@ class _Search:
             q = self.balance.coefficients(every[int(rng.integers(len(every)))])
             scale = np.exp(rng.uniform(low, high))
             turned = np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
-            other = (
-                rng.uniform() < OTHER
-            )  # harmonics that no known motion has are found from none of them
+            other = rng.uniform() < OTHER  # harmonics that no known motion has are found from none of them
             moved = q * turned * (1.0 if other else scale)
             moved[0] = q[0]
             if other:
@@ -302,10 +279,16 @@ class _Search:
         if why or not solutions or not search.starts:
             yield self._kept(self._stage("starts", place, "time", (), why))
             return
-        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.most_periods, harmonics=self.order, tolerance=1e-4, every_harmonic=True)  # fmt: skip
+        stepping = TimeStepping(
+            steps_per_period=search.steps,
+            max_periods=search.most_periods,
+            harmonics=self.order,
+            tolerance=1e-4,
+            every_harmonic=True,
+        )
         linear = self.problem.low.linear
         # as they were known when the starts began: an interrupted search draws the same states again
-        motions = [linear.recover(omega, self.balance.coefficients(x)) for _, x in self._at(omega, place)]  # fmt: skip
+        motions = [linear.recover(omega, self.balance.coefficients(x)) for _, x in self._at(omega, place)]
         own = sampler(self.problem, omega, motions, search.modes, search.spread)
         ends: list[tuple[int, ComplexArray]] = []
         states = drawn(own, search.seed, place)
@@ -313,9 +296,9 @@ class _Search:
             self.now = len(ends) + 1  # those before a branch was found count once
             found = in_time(own, next(states), stepping)
             rows = found.harmonics[:, : self.balance.linear.n]
-            ends.append(({"settled": PERIODIC, "unsettled": APERIODIC, "diverged": DIVERGED}[found.status], rows))  # fmt: skip
+            ends.append(({"settled": PERIODIC, "unsettled": APERIODIC, "diverged": DIVERGED}[found.status], rows))
             if found.settled and self._nearest(rows, solutions) < 0:
-                solved = newton(lambda v: self.balance.linearise(v, omega), self.balance.unknowns(rows), search.newton)  # fmt: skip
+                solved = newton(lambda v: self.balance.linearise(v, omega), self.balance.unknowns(rows), search.newton)
                 new = solved.status.converged and not self._known(solved.x, solutions)
                 if new and self._apart(rows, solved.x) <= ALIKE:
                     yield self._kept(self._branch(place, "time", solved.x, omega))
@@ -341,8 +324,8 @@ class _Search:
     def _motions(self, place: int, omega: float) -> Stage:
         """Return the motions at a frequency with their stability, in the order in which starts are counted."""
         found = self._at(omega)
-        solved = [newton(lambda v: self.balance.linearise(v, omega), x, self.search.newton) for _, x in found]  # fmt: skip
-        points = [forced_point(self.balance, s, "point", i, omega, 0.0) for i, s in enumerate(solved)]  # fmt: skip
+        solved = [newton(lambda v: self.balance.linearise(v, omega), x, self.search.newton) for _, x in found]
+        points = [forced_point(self.balance, s, "point", i, omega, 0.0) for i, s in enumerate(solved)]
         unknown = not_marched(self.problem.system)
         judged = [None if unknown else stability(self.problem, p) for p in points]
         return replace(

@@ -9,9 +9,7 @@ from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability.found import Stability
 from stickslip.units import HZ, millimetres
 
-BifurcationKind = Literal[
-    "fold", "period doubling", "Neimark-Sacker", "branch point", "jump of multipliers"
-]
+BifurcationKind = Literal["fold", "period doubling", "Neimark-Sacker", "branch point", "jump of multipliers"]
 LEADS_TO: dict[BifurcationKind, str] = {
     "fold": "the branch turns back",
     "period doubling": "a motion of twice the period leaves",
@@ -84,7 +82,7 @@ class Bifurcation:
         m = self.multiplier
         off = f" ± {self.multiplier_error:.2g}" if np.isfinite(self.multiplier_error) else ""
         value = f"{m.real:.5g}" if abs(m.imag) < 1e-6 else f"{m.real:.5g} ± {abs(m.imag):.5g}i"
-        known = f", multiplier {value}{' (modulus' + off + ')' if off else ''}" if np.isfinite(m) else ""  # fmt: skip
+        known = f", multiplier {value}{' (modulus' + off + ')' if off else ''}" if np.isfinite(m) else ""
         beat = f", second frequency {self.beat / HZ:.5g} Hz" if self.beat else ""
         head, doubt = "", ""
         if not self.certain:
@@ -140,8 +138,7 @@ class Bifurcations:
     def limits(self) -> tuple[str, ...]:
         """Where nobody looked, and what looking took."""
         told = [
-            f"between {a / HZ:.6g} and {b / HZ:.6g} Hz bifurcations are not seen: {why}"
-            for a, b, why in self.unseen
+            f"between {a / HZ:.6g} and {b / HZ:.6g} Hz bifurcations are not seen: {why}" for a, b, why in self.unseen
         ]
         if self.examined:
             told.append(f"multipliers of {self.examined} motions were asked for")

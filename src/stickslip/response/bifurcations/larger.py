@@ -37,9 +37,7 @@ def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProb
         If there are fewer than two periods, or what vibrates is not one structure.
     """
     if periods < 2:
-        raise input_error(
-            "over_periods: periods", f"must be at least 2, got {periods}", "2 doubles the period."
-        )
+        raise input_error("over_periods: periods", f"must be at least 2, got {periods}", "2 doubles the period.")
     system, sweep = problem.system, problem.sweep
     if isinstance(system.structure, SpeedLine):
         raise input_error(

@@ -22,9 +22,7 @@ ROUNDS = 6  # of inverse iteration: singular values are far apart where one is n
 BESIDE = 1e-12  # of the largest entry: what keeps a singular matrix from being divided by
 
 
-def open_directions(
-    balance: HarmonicBalance, point: Point, following: Following, count: int
-) -> FloatArray:  # fmt: skip
+def open_directions(balance: HarmonicBalance, point: Point, following: Following, count: int) -> FloatArray:
     """Return the (count, n + 1) directions across the branch along which equations change least, those of its crossing branches.
 
     They are singular vectors of the Jacobian with the tangent of the branch as a further row, those of the smallest singular values, by
@@ -35,7 +33,7 @@ def open_directions(
     measure = measure_at(point.x, following)
     scale = np.append(np.full(point.x.size, np.max(measure.weights[:-1])), measure.p)
     row = measure.row(point.tangent / measure.of(point.tangent)) / scale
-    matrix = np.vstack([np.column_stack([jac, at.jac_p]) / scale, row * np.max(np.abs(jac)) / scale[0]])  # fmt: skip
+    matrix = np.vstack([np.column_stack([jac, at.jac_p]) / scale, row * np.max(np.abs(jac)) / scale[0]])
     matrix += BESIDE * np.max(np.abs(matrix)) * np.eye(len(matrix))
     factors = scipy.linalg.lu_factor(matrix)
     block = np.random.default_rng(0).standard_normal((len(matrix), count + 1))
@@ -48,9 +46,7 @@ def open_directions(
     return np.asarray(smallest.T / scale)
 
 
-def candidates(
-    directions: FloatArray, balance: HarmonicBalance, group: IntArray | None
-) -> list[FloatArray]:
+def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray | None) -> list[FloatArray]:
     """Return the directions in which branches are looked for: each both ways, and combinations of several.
 
     Where a wheel loses its symmetry by waves of both directions at once, two directions are open and every combination solves the linear

@@ -9,14 +9,7 @@ import numpy as np
 from stickslip.errors import StickslipError, input_error
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.bifurcations.found import Bifurcation, BifurcationKind, Bifurcations
-from stickslip.response.bifurcations.spectra import (
-    ON_AXIS,
-    Examine,
-    Spectrum,
-    nearest_to_one,
-    neutral_of,
-    spectrum,
-)
+from stickslip.response.bifurcations.spectra import ON_AXIS, Examine, Spectrum, nearest_to_one, neutral_of, spectrum
 from stickslip.response.bifurcations.stretch import Stretch, stretch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.found import Stability
@@ -25,12 +18,8 @@ from stickslip.solve.branch import Point
 
 TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located
 MOST = 300  # motions whose multipliers are asked for
-LOOKING = (
-    2 / 3
-)  # share of these that the points of the branch may take; locating what they show has the others
-JUMP = (
-    5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
-)
+LOOKING = 2 / 3  # share of these that the points of the branch may take; locating what they show has the others
+JUMP = 5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
 BESIDE = (
     0.5,
     0.2,
@@ -42,9 +31,7 @@ NO_CORNER = "no solution with the harmonics of both ends is found at one of them
 GAP = "the branch has a gap there, and goes on elsewhere"
 NO_MOTION = "no motion was found there"
 UNKNOWN = "no multipliers are known at one of its ends"
-ROUGH = (
-    0.1  # error of a multiplier beyond which a crossing that it may not make at all tells nothing
-)
+ROUGH = 0.1  # error of a multiplier beyond which a crossing that it may not make at all tells nothing
 ROUGHLY = "multipliers seem to cross the unit circle, and more harmonics change them by more than 0.1: solve with more of these"
 SPENT = "the multipliers of as many motions were asked for as was allowed"
 
@@ -85,12 +72,10 @@ def bifurcations(
         If the tolerance is not positive, or fewer than 20 motions are allowed; and what `examine` refuses.
     """
     if not 0.0 < tolerance < 1.0:
-        raise input_error("bifurcations: tolerance", f"must be between 0 and 1, got {tolerance:g}", "1e-6 is usual.")  # fmt: skip
+        raise input_error("bifurcations: tolerance", f"must be between 0 and 1, got {tolerance:g}", "1e-6 is usual.")
     if most < 20:
         raise input_error(
-            "bifurcations: most",
-            f"must be at least 20, got {most}",
-            "One bifurcation takes about ten motions.",
+            "bifurcations: most", f"must be at least 20, got {most}", "One bifurcation takes about ten motions."
         )
     walk = _Walk(problem, examine, tolerance, most)
     branch = list(points)
@@ -102,7 +87,7 @@ def bifurcations(
     last = len(branch) - 1
     for before, after in pairwise([range(0), *runs, range(last + 1, last + 1)]):
         if before.stop < after.start:
-            walk.lost(branch[max(before.stop - 1, 0)].omega, branch[min(after.start, last)].omega, NO_MOTION)  # fmt: skip
+            walk.lost(branch[max(before.stop - 1, 0)].omega, branch[min(after.start, last)].omega, NO_MOTION)
     known = [walk.seen.get(id(point), (point, None))[1] for point in points]
     found = tuple(walk.ordered())
     return Bifurcations(found, tuple(walk.unseen), walk.examined, tuple(known), walk.stride)
@@ -216,9 +201,16 @@ class _Walk:
             self.examine = None if self.examined <= 1 else self.examine
         value, error = (complex(np.nan), np.inf) if found is None else nearest_to_one(found)
         made = Bifurcation(
-            "fold", point, self.problem.amplitude(point), value, error, self._fold_error(step, at),
-            0, 0, (place, place + 1),
-        )  # fmt: skip
+            "fold",
+            point,
+            self.problem.amplitude(point),
+            value,
+            error,
+            self._fold_error(step, at),
+            0,
+            0,
+            (place, place + 1),
+        )
         self.crossings.append(_Crossing(step.along(at), made))
 
     def _fold_error(self, step: Stretch, at: Point) -> float:
@@ -233,9 +225,7 @@ class _Walk:
         found = again.fold()
         return abs(found.p - at.p) if found.solution.status.converged else np.inf
 
-    def _compare(
-        self, branch: Sequence[ForcedPoint], steps: dict[int, Stretch | None], a: int, b: int
-    ) -> None:
+    def _compare(self, branch: Sequence[ForcedPoint], steps: dict[int, Stretch | None], a: int, b: int) -> None:
         """Look for the steps between two points in which numbers differ."""
         first, last = self._look(branch[a]), self._look(branch[b])
         if first is None or last is None:
@@ -288,9 +278,7 @@ class _Walk:
                 return pair
         return []
 
-    def _within(
-        self, whole: Stretch, step: Stretch, place: int, first: Spectrum, last: Spectrum, neutral: int
-    ) -> None:  # fmt: skip
+    def _within(self, whole: Stretch, step: Stretch, place: int, first: Spectrum, last: Spectrum, neutral: int) -> None:
         if first.outside == last.outside or step.length <= 10.0 * self.tolerance:
             return
         k = min(first.outside, last.outside)
@@ -335,19 +323,13 @@ class _Walk:
         if not at.solution.status.converged:
             return GAP
         here, side = step.along(at), np.sign(first.excess(k))
-        ways = [(step.along(point), np.sign(own.excess(k)) == side, (point, own)) for point, own in known]  # fmt: skip
+        ways = [(step.along(point), np.sign(own.excess(k)) == side, (point, own)) for point, own in known]
         low = max((w for w in ways if w[1] and w[0] <= here), key=lambda w: w[0])
         high = min((w for w in ways if not w[1] and w[0] >= here), key=lambda w: w[0])
         return at, low[2], high[2]
 
     def _described(
-        self,
-        step: Stretch,
-        place: int,
-        k: int,
-        ends: tuple[Spectrum, Spectrum],
-        sides: tuple[_Seen, _Seen],
-        at: Point,
+        self, step: Stretch, place: int, k: int, ends: tuple[Spectrum, Spectrum], sides: tuple[_Seen, _Seen], at: Point
     ) -> Bifurcation:
         """Return what crosses between two neighbours of a located point."""
         (low, before), (high, after) = sides
@@ -367,9 +349,17 @@ class _Walk:
         off = bracket if jumps or error == 0.0 else bracket + slope * error
         point = step.forced(at)
         return Bifurcation(
-            kind, point, self.problem.amplitude(point), value, error, off,
-            before.outside, after.outside, (place, place + 1), all(own.known(k) for own in ends),
-        )  # fmt: skip
+            kind,
+            point,
+            self.problem.amplitude(point),
+            value,
+            error,
+            off,
+            before.outside,
+            after.outside,
+            (place, place + 1),
+            all(own.known(k) for own in ends),
+        )
 
 
 def _at_one_beside(fold: Bifurcation, other: Bifurcation) -> bool:

@@ -12,22 +12,14 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation
 from stickslip.response.bifurcations.larger import every_sector, in_periods, over_periods
 from stickslip.response.bifurcations.leave import candidates, first_point, open_directions
-from stickslip.response.forced.problem import (
-    Balance,
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-    with_stiffness,
-)
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.continuation import advance, start_point, step_to
 from stickslip.units import HZ, millimetres
 
 POINTS = 80  # of a branch, at most
 ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
-CLOSED = (
-    0.5  # steps by which the line between two points may miss the first one where a branch closes
-)
+CLOSED = 0.5  # steps by which the line between two points may miss the first one where a branch closes
 FEWEST = 6  # points before which it does not
 TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
 SHORT = 0.02  # that share
@@ -76,7 +68,7 @@ class SideBranch:
 
     def amplitude(self, point: ForcedPoint, output: int) -> float:
         """Return the amplitude of an output over the harmonics that the load drives, m; of a wheel that of the sector where it is largest."""
-        where = [self.problem.amplitude_of(point.omega, point.coefficients, o) for o in self._of_all(output)]  # fmt: skip
+        where = [self.problem.amplitude_of(point.omega, point.coefficients, o) for o in self._of_all(output)]
         return float(max(where))
 
     def subharmonic(self, point: ForcedPoint, output: int = 0) -> float:
@@ -103,7 +95,7 @@ class SideBranch:
     @property
     def sentence(self) -> str:
         """What it is, in words."""
-        kind = f"with a period of {self.periods} periods of the load" if self.periods > 1 else "of less symmetry"  # fmt: skip
+        kind = f"with a period of {self.periods} periods of the load" if self.periods > 1 else "of less symmetry"
         if not self.points:
             return f"no branch {kind} was found: {self.end}"
         ends = self.omegas / HZ
@@ -114,9 +106,7 @@ class SideBranch:
 
 
 @by_one_thread
-def side_branches(
-    problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS
-) -> list[SideBranch]:
+def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS) -> list[SideBranch]:
     """Follow the branches that leave a forced response at a bifurcation.
 
     At a period doubling the motion is taken over two periods; at a branch point harmonics stay, and on a tuned wheel every sector may
@@ -162,20 +152,13 @@ def side_branches(
         begun.append(first)
         found, end = way.followed(first, _Apart(balance, following, main, first))
         made.append(SideBranch(own, periods, tuple(map(way.point, found)), end, group))
-    nothing = (
-        "no solution lies beside the bifurcation in the directions that its equations leave open"
-    )
+    nothing = "no solution lies beside the bifurcation in the directions that its equations leave open"
     return made or [SideBranch(own, periods, (), nothing, group)]
 
 
 @by_one_thread
 def subharmonic_branch(
-    problem: ForcedProblem,
-    omega: float,
-    periods: int,
-    start: ComplexArray,
-    *,
-    points: int = POINTS,
+    problem: ForcedProblem, omega: float, periods: int, start: ComplexArray, *, points: int = POINTS
 ) -> SideBranch:
     """Follow subharmonic motions from a given one, in both directions; no branch need lead to them from the forced response.
 
@@ -197,7 +180,11 @@ def subharmonic_branch(
     InputError
         If `start` is not of the retained coordinates.
     """
-    order = problem.sweep.high_harmonics[-1] if not problem.sweep.auto else problem.sweep.supports[min(1, len(problem.sweep.supports) - 1)][-1]  # fmt: skip
+    order = (
+        problem.sweep.high_harmonics[-1]
+        if not problem.sweep.auto
+        else problem.sweep.supports[min(1, len(problem.sweep.supports) - 1)][-1]
+    )
     own = over_periods(problem, periods, order)
     balance = own.low
     given = np.asarray(start, dtype=complex)
@@ -215,9 +202,7 @@ def subharmonic_branch(
         return SideBranch(own, periods, (), said)
     made = SideBranch(own, periods, (_point(balance, first),), "")
     if made.subharmonic(made.points[0]) <= ALIKE * own.amplitude(made.points[0]):
-        return replace(
-            made, points=(), end="the start leads to the motion of the load's own period"
-        )
+        return replace(made, points=(), end="the start leads to the motion of the load's own period")
     along, end = both_ways(own, balance, following, first, points)
     return replace(made, points=tuple(along), end=end)
 
@@ -280,7 +265,7 @@ class _Way:
                 return found, why
             after = advance(self.balance, here, end, self.following)
             if not after.solution.status.converged:
-                return found, f"lost at {here.p * self._load / HZ:.6g} Hz ({after.solution.status.advice})"  # fmt: skip
+                return found, f"lost at {here.p * self._load / HZ:.6g} Hz ({after.solution.status.advice})"
             why = stops(here, after) if stops else ""
             if why:
                 return found, why
@@ -368,8 +353,7 @@ def _same(balance: Balance, first: Point, others: list[Point], group: IntArray |
     """Whether a branch begins as another one does with its sectors renumbered."""
     own = _sizes(balance, first, group)
     return any(
-        np.allclose(own, _sizes(balance, other, group), rtol=1e-6)
-        and np.isclose(first.p, other.p, rtol=1e-9)
+        np.allclose(own, _sizes(balance, other, group), rtol=1e-6) and np.isclose(first.p, other.p, rtol=1e-9)
         for other in others
     )
 

@@ -11,9 +11,7 @@ from stickslip.response.stability.found import Stability
 from stickslip.response.time.floquet import UNIT_TOLERANCE
 
 Examine = Callable[[ForcedProblem, ForcedPoint], Stability]
-ON_AXIS = (
-    1e-6  # imaginary part below which a multiplier is real: pairs of real matrices have none at all
-)
+ON_AXIS = 1e-6  # imaginary part below which a multiplier is real: pairs of real matrices have none at all
 CIRCLE = 1.0 + UNIT_TOLERANCE
 
 

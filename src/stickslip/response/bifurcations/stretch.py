@@ -6,12 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from stickslip.response.forced.problem import (
-    Balance,
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-)
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.continuation import start_point
 from stickslip.solve.marks import FOLD, Mark, located
@@ -94,7 +89,7 @@ def stretch(problem: ForcedProblem, before: ForcedPoint, after: ForcedPoint) -> 
     measure, chord = measure_at(first.x, following), last.y - first.y
     if measure.of(chord) == 0.0:
         return None
-    towards = [p if measure.row(chord) @ p.tangent >= 0.0 else reversed_point(p) for p in (first, last)]  # fmt: skip
+    towards = [p if measure.row(chord) @ p.tangent >= 0.0 else reversed_point(p) for p in (first, last)]
     return Stretch(problem, balance, following, towards[0], towards[1])
 
 

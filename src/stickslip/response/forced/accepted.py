@@ -26,24 +26,16 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
         pairs = _of_passages(points)
     best: dict[float, ForcedPoint] = {}
     for p in points:
-        if p.stage == "peak" and not (p.omega in best and best[p.omega].converged and _fewer(p, best[p.omega])):  # fmt: skip
+        if p.stage == "peak" and not (p.omega in best and best[p.omega].converged and _fewer(p, best[p.omega])):
             best[p.omega] = p
     # a peak that was solved again with more harmonics takes the place of what it was
     again = {omega: p for omega, p in best.items() if p.converged}
-    pairs = [
-        (again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low)
-        for p, low in pairs
-    ]
+    pairs = [(again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low) for p, low in pairs]
     in_time = {p.omega: p for p in points if p.stage == "in_time"}
     pairs = [(p if p.converged else in_time.get(p.omega, p), low) for p, low in pairs]
     settled = {p.omega: p for p in points if p.stage == "settled" and p.converged}
-    pairs = [
-        (settled[p.omega] if p.omega in settled and _fewer(p, settled[p.omega]) else p, low)
-        for p, low in pairs
-    ]
-    return pairs + [
-        (p, None) for omega, p in best.items() if again.get(omega) is p or not p.converged
-    ]
+    pairs = [(settled[p.omega] if p.omega in settled and _fewer(p, settled[p.omega]) else p, low) for p, low in pairs]
+    return pairs + [(p, None) for omega, p in best.items() if again.get(omega) is p or not p.converged]
 
 
 def audits_by_frequency(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:

@@ -16,13 +16,7 @@ from stickslip.operators import Jacobian
 from stickslip.response.branch import Followed, Judged, Kind, Route
 from stickslip.response.follow import follow
 from stickslip.response.forced.choices import Stage
-from stickslip.response.forced.problem import (
-    Balance,
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-    with_stiffness,
-)
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
@@ -61,9 +55,7 @@ class ForcedCurve:
     forced: ForcedProblem
     supports: tuple[Harmonics, ...]
     raises: bool = True
-    references: dict[int, HarmonicBalance] = field(
-        default_factory=dict, repr=False
-    )  # made when first needed
+    references: dict[int, HarmonicBalance] = field(default_factory=dict, repr=False)  # made when first needed
 
     @property
     def levels(self) -> int:
@@ -95,9 +87,13 @@ class ForcedCurve:
         """Solve at a frequency to which no branch leads."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
-            forced.system, self.problem(level), forced.sweep.newton, p, known,
+            forced.system,
+            self.problem(level),
+            forced.sweep.newton,
+            p,
+            known,
             effort if forced.sweep.rescue == "all" else 0,
-        )  # fmt: skip
+        )
 
     def cost(self, level: int) -> float:
         """Return the work of a Newton step, which grows with the unknowns: few are factorised, many solved by products."""
@@ -136,9 +132,7 @@ class ForcedCurve:
             kept.append((inverse, float(np.linalg.norm(right))))
             return None if inverse is None else inverse(right)
 
-        alert = jacobian_alert(
-            step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
-        )
+        alert = jacobian_alert(step.balance, more, step.x, step.omega, step.measure, solve, events=step.events)
         bound = SAFETY[1] * alert.error
         if kept and bound <= self.forced.strategy.threshold:
             bound += self._doubt(step, more, alert.start, *kept[0])
@@ -153,21 +147,12 @@ class ForcedCurve:
         if level not in self.references:
             own = with_stiffness(self.problem(level))
             wide = set(self.supports[level + 1]) >= set(judging_set_of(own))
-            more = (
-                with_stiffness(self.problem(level + 1))
-                if wide
-                else judging_balance(own, self.supports[level + 1])
-            )
+            more = with_stiffness(self.problem(level + 1)) if wide else judging_balance(own, self.supports[level + 1])
             self.references[level] = more
         return self.references[level]
 
     def _doubt(
-        self,
-        step: Step,
-        more: HarmonicBalance,
-        x: FloatArray,
-        inverse: _Inverse | None,
-        residual: float,
+        self, step: Step, more: HarmonicBalance, x: FloatArray, inverse: _Inverse | None, residual: float
     ) -> float:
         """Return how far a prediction may be off: contacts that change their states on the way make the next step as large, or larger."""
         rest = more.linearise(x, step.omega).residual
@@ -209,9 +194,7 @@ class ForcedCurve:
         """Return the largest relative difference between two motions, a fraction."""
         return self._difference(fewer.p, (fewer.level, fewer.point.x), (more.level, more.point.x))
 
-    def _difference(
-        self, omega: float, fewer: tuple[int, FloatArray], more: tuple[int, FloatArray]
-    ) -> float:
+    def _difference(self, omega: float, fewer: tuple[int, FloatArray], more: tuple[int, FloatArray]) -> float:
         a, b = (self.problem(level).coefficients(x) for level, x in (fewer, more))
         return self.forced.difference(omega, a, b)[0]
 
@@ -263,9 +246,7 @@ def route_of(problem: ForcedProblem) -> Route:
     return Route(first=first, last=last, points=sweep.points, listed=tuple(sweep.grid.tolist()))
 
 
-def followed(
-    curve: ForcedCurve, route: Route, done: Sequence[ForcedPoint]
-) -> Iterator[ForcedPoint]:
+def followed(curve: ForcedCurve, route: Route, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
     """Follow a curve; points of the response in, points of the response out."""
     known = [of_forced(curve, p) for p in done]
     for found in follow(curve, route, known):
@@ -282,14 +263,7 @@ def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint
     """Return the same; kept, because the follower goes on from what is written down."""
     point, judged = found.point, found.judged
     return forced_point(
-        curve.problem(found.level),
-        point.solution,
-        stage,
-        found.index,
-        point.p,
-        found.seconds,
-        point,
-        judged,
+        curve.problem(found.level), point.solution, stage, found.index, point.p, found.seconds, point, judged
     )
 
 

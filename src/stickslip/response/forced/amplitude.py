@@ -10,9 +10,7 @@ from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 
-SAMPLES_A_HARMONIC = (
-    16  # of a period, from the highest of which Newton's method goes on to the extreme
-)
+SAMPLES_A_HARMONIC = 16  # of a period, from the highest of which Newton's method goes on to the extreme
 REFINED = 4  # of its steps
 
 

@@ -6,12 +6,7 @@ from time import perf_counter
 
 from stickslip.arrays import FloatArray
 from stickslip.response.follow import follow
-from stickslip.response.forced.accepted import (
-    branch_end,
-    points_of_branch,
-    replaced,
-    runs_of_repeats,
-)
+from stickslip.response.forced.accepted import branch_end, points_of_branch, replaced, runs_of_repeats
 from stickslip.response.forced.along import ForcedCurve, of_forced, route_of, to_forced
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.repeats import repeat
@@ -23,9 +18,7 @@ BACKWARD = 0.1  # share of the range by which it may leave the range
 
 
 def double_passage(
-    problem: ForcedProblem,
-    done: Sequence[ForcedPoint],
-    static: Callable[[], FloatArray],
+    problem: ForcedProblem, done: Sequence[ForcedPoint], static: Callable[[], FloatArray]
 ) -> Iterator[ForcedPoint]:
     """Finish the response with few harmonics, then solve again what needs more.
 
@@ -52,7 +45,7 @@ def double_passage(
     for found in follow(curve, route_of(problem), known):
         passage.append(to_forced(curve, found))
         yield passage[-1]
-    low = [p if p.stage == "low" else replace(p, stage="low") for p in points_of_branch(passage, "low")]  # fmt: skip
+    low = [p if p.stage == "low" else replace(p, stage="low") for p in points_of_branch(passage, "low")]
     stored = iter([p for p in done if p.stage in ("high", "branch")])
     yield from _Second(problem, low, static, stored).run()
 
@@ -80,9 +73,7 @@ class _Second:
             if self.problem.sweep.rescue != "all":
                 continue
             if self._left(run):
-                yield from _followed(
-                    self.problem, first, last, self.low, branch, self.high, self.stored
-                )
+                yield from _followed(self.problem, first, last, self.low, branch, self.high, self.stored)
                 passed = max(passed, replaced(branch, self.low, last))
             if passed < last:
                 for way in (None, self.static):
@@ -93,18 +84,13 @@ class _Second:
         return [p for p in run if p.index not in self.high or not self.high[p.index].converged]
 
     def _again(
-        self,
-        run: Sequence[ForcedPoint],
-        way: Callable[[], FloatArray] | None,
-        branch: Sequence[ForcedPoint],
+        self, run: Sequence[ForcedPoint], way: Callable[[], FloatArray] | None, branch: Sequence[ForcedPoint]
     ) -> Iterator[ForcedPoint]:
         """Repeat what of a run has not been found."""
         for point in self._left(run):
             made = next(self.stored, None)
             if made is None:
-                quiet = {
-                    p.index: p for p in self.low if p.converged and not self.problem.alerted(p)
-                }
+                quiet = {p.index: p for p in self.low if p.converged and not self.problem.alerted(p)}
                 known = quiet | {i: p for i, p in self.high.items() if p.converged}
                 made = repeat(self.problem, point, known, way, branch)
                 yield made
@@ -151,12 +137,7 @@ def _followed(
         branch.append(made)
 
 
-def _begun(
-    problem: ForcedProblem,
-    low: list[ForcedPoint],
-    high: Mapping[int, ForcedPoint],
-    first: int,
-) -> Point | None:
+def _begun(problem: ForcedProblem, low: list[ForcedPoint], high: Mapping[int, ForcedPoint], first: int) -> Point | None:
     """Solve with many harmonics at an accepted point before index `first`, so that the whole run is passed."""
     balance = problem.high
     following = replace(problem.following(balance), newton=problem.sweep.newton)

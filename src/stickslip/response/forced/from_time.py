@@ -100,7 +100,7 @@ def found_in_time(
     """
     first, last = problem.sweep.omega_range
     system = problem.system
-    if problem.sweep.rescue == "off" or system.interface.rigid or system.structure.n > MOST_COORDINATES:  # fmt: skip
+    if problem.sweep.rescue == "off" or system.interface.rigid or system.structure.n > MOST_COORDINATES:
         return
     known = {p.omega for p in done}
     for lost in accepted:
@@ -124,13 +124,20 @@ def _from_time(problem: ForcedProblem, lost: ForcedPoint) -> ForcedPoint:
     if seen.verdict == "periodic" or (found and found[-1][1].status.converged):
         solution = charged(found[-1][1], [s for _, s in found])
         seconds = perf_counter() - began
-        point = forced_point(found[-1][0], solution, "in_time", lost.index, omega, seconds, judged=Judged(np.nan))  # fmt: skip
+        point = forced_point(found[-1][0], solution, "in_time", lost.index, omega, seconds, judged=Judged(np.nan))
         return replace(point, rescue=Rung.IN_TIME, marched=told)
     status = Status.NOT_PERIODIC if seen.verdict == "not periodic" else lost.status
     return replace(
-        lost, stage="in_time", status=status, iterations=sum(s.iterations for _, s in found), rescue=Rung.IN_TIME, marched=told, seconds_contact=0.0, seconds_linear=0.0,
+        lost,
+        stage="in_time",
+        status=status,
+        iterations=sum(s.iterations for _, s in found),
+        rescue=Rung.IN_TIME,
+        marched=told,
+        seconds_contact=0.0,
+        seconds_linear=0.0,
         seconds_total=perf_counter() - began,
-    )  # fmt: skip
+    )
 
 
 def _told(seen: Repetition) -> Marched:
@@ -157,9 +164,7 @@ def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
     return [lost.order, *more] if is_full(lost.support) else [lost.order]
 
 
-def _solved(
-    problem: ForcedProblem, lost: ForcedPoint, seen: Repetition
-) -> list[tuple[Balance, Solution]]:
+def _solved(problem: ForcedProblem, lost: ForcedPoint, seen: Repetition) -> list[tuple[Balance, Solution]]:
     """Return attempts from the motion in time, the last of which counts: as near as it begins, the natural level goes on where the residual stalls.
 
     What settles too slowly to be told begins there, too, with the harmonics asked for.

@@ -28,9 +28,7 @@ SAME = 1e-3  # relative difference of two motions with few harmonics that are on
 STEPS = 256  # of a period in time: Newton's method makes the motion exact
 PERIODS = 60  # marched from rest, at most
 FEWEST_PERIODS = 12  # fewer lead nowhere
-REPEATS = (
-    1e-4  # change of the gaps' harmonics from period to period, of their size, that ends the march
-)
+REPEATS = 1e-4  # change of the gaps' harmonics from period to period, of their size, that ends the march
 MARCHED = 0.4  # work of all marches over that of the solutions of the response
 # of a Newton step, and more for each of its unknowns: with contacts, as measured from 200 to 2200 unknowns
 NEWTON_FLOPS, FLOPS_AN_UNKNOWN = 3e6, 2e5
@@ -59,10 +57,7 @@ class OtherMotion:
 
 
 def other_motions(
-    problem: ForcedProblem,
-    points: Sequence[ForcedPoint],
-    solved_points: Sequence[ForcedPoint],
-    output: int,
+    problem: ForcedProblem, points: Sequence[ForcedPoint], solved_points: Sequence[ForcedPoint], output: int
 ) -> Iterator[OtherMotion]:
     """Yield motions of another amplitude than that of the response.
 
@@ -101,9 +96,7 @@ def other_motions(
                 yield OtherMotion(start, made, size, seen[0])
 
 
-def _linear_starts(
-    problem: ForcedProblem, point: ForcedPoint, options: Newton
-) -> Iterator[tuple[str, FloatArray]]:
+def _linear_starts(problem: ForcedProblem, point: ForcedPoint, options: Newton) -> Iterator[tuple[str, FloatArray]]:
     """Yield the starts from linear vibrations that may lead to another motion, as scaled unknowns of the point's harmonics.
 
     Each is solved with few harmonics first. What leads nowhere then, or to the motion of the point with as few, is left out.
@@ -147,9 +140,7 @@ def _open(problem: ForcedProblem, balance: AnyBalance, omega: float) -> FloatArr
     motion[:1] = at_rest(problem.system, balance, omega)
     for place, h in enumerate(balance.harmonics):
         if h and np.any(load[place]):
-            motion[h] = solved(
-                with_contacts(balance.linear_block(omega, h), none, rows), load[place]
-            )
+            motion[h] = solved(with_contacts(balance.linear_block(omega, h), none, rows), load[place])
     return balance.unknowns(motion)
 
 
@@ -172,9 +163,8 @@ def _from_rest(
         return None, 0
     start = start_from_harmonics(still, omega, interface.gap_operator, interface.laws)
     marcher = prepared(
-        system.structure, interface.gap_operator, interface.laws, linear.load_at(omega), omega,
-        STEPS, interface.weights,
-    )  # fmt: skip
+        system.structure, interface.gap_operator, interface.laws, linear.load_at(omega), omega, STEPS, interface.weights
+    )
     state, record = marcher.begun(start), marcher.record()
     before, taken = None, 0
     for taken in range(1, periods + 1):
@@ -197,8 +187,7 @@ def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> fl
     if isinstance(structure, TunedWheel) or structure.of_harmonic(1).loss is not None:
         return 0.0
     return MARCHED * sum(
-        (p.iterations + JUDGED) * (NEWTON_FLOPS + FLOPS_AN_UNKNOWN * p.unknowns)
-        for p in solved_points
+        (p.iterations + JUDGED) * (NEWTON_FLOPS + FLOPS_AN_UNKNOWN * p.unknowns) for p in solved_points
     )
 
 

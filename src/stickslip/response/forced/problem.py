@@ -14,13 +14,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.local import AnyBalance, LocalBalance
-from stickslip.harmonic.selection.strategy import (
-    ErrorMeasure,
-    Solve,
-    Step,
-    Strategy,
-    always_kept,
-)
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept
 from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, supports_of
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
@@ -225,9 +219,7 @@ class ForcedProblem:
             self.ways[balance] = way
         return way
 
-    def along_branch(
-        self, point: ForcedPoint, omega: float, balance: AnyBalance, steps: int = STEPS_BETWEEN
-    ) -> Point:
+    def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance, steps: int = STEPS_BETWEEN) -> Point:
         """Go from a solution to another frequency on the branch with the harmonics of `balance`, within so many Newton `steps`."""
         following = self.following(balance)
         most = min(DETOUR, following.control.max_points)
@@ -255,9 +247,7 @@ class ForcedProblem:
         """Return a point of a branch as one that it goes on from; `balance` has its harmonics."""
         x = (balance or self.balance(point.support)).unknowns(point.coefficients)
         contact, linear = point.seconds_contact, point.seconds_linear
-        solution = Solution(
-            x, point.status, point.iterations, 0.0, contact, linear, rung=point.rescue
-        )
+        solution = Solution(x, point.status, point.iterations, 0.0, contact, linear, rung=point.rescue)
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
@@ -287,9 +277,7 @@ class ForcedProblem:
         """Return the amplitude of output number `output` at a point, m; see `amplitude_of`."""
         return self.amplitude_of(point.omega, point.coefficients, output)
 
-    def amplitude_of(
-        self, omega: float, coefficients: ComplexArray, output: int | None = None
-    ) -> float:
+    def amplitude_of(self, omega: float, coefficients: ComplexArray, output: int | None = None) -> float:
         """Return the amplitude of output number `output`, m, as the sweep measures it.
 
         None: the largest one of those that the system's peak is of.
@@ -304,11 +292,7 @@ class ForcedProblem:
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
     refuse_ill_posed(system)
-    if (
-        sweep.auto
-        and isinstance(system.structure, TunedWheel | SpeedLine)
-        and system.structure.harmonics
-    ):
+    if sweep.auto and isinstance(system.structure, TunedWheel | SpeedLine) and system.structure.harmonics:
         sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
     first, reference = sweep.first_harmonics, sweep.high_harmonics
     for h, force in load.harmonics.items():
@@ -365,9 +349,7 @@ def _periodic(system: System, linear: DynamicStiffness, sweep: Sweep) -> Balance
             "Give selection='always_high'.",
         )
     if not (is_full(first) and is_full(sweep.high_harmonics)):
-        raise input_error(
-            "Sweep", "leaves out harmonics, and a contact is rigid", "Keep all up to the highest."
-        )
+        raise input_error("Sweep", "leaves out harmonics, and a contact is rigid", "Keep all up to the highest.")
     order = first[-1]
     return dynamic_lagrangian(linear, interface, order, sweep.samples, None, sweep.evaluator)
 
@@ -388,11 +370,24 @@ def forced_point(
     if there is not None:
         tangent, step, sign = there.tangent, there.step, there.orientation
     point = ForcedPoint(
-        stage, index, omega, balance.coefficients(solution.x), tangent, step, solution.status, solution.iterations,
-        judged.bound, solution.seconds_contact, solution.seconds_linear, seconds, sign, solution.rung,
-        np.array(balance.harmonics), np.array(judged.asked, dtype=np.int64),
+        stage,
+        index,
+        omega,
+        balance.coefficients(solution.x),
+        tangent,
+        step,
+        solution.status,
+        solution.iterations,
+        judged.bound,
+        solution.seconds_contact,
+        solution.seconds_linear,
+        seconds,
+        sign,
+        solution.rung,
+        np.array(balance.harmonics),
+        np.array(judged.asked, dtype=np.int64),
         np.zeros((0, 0), dtype=complex) if judged.start is None else judged.start,
-    )  # fmt: skip
+    )
     if not isinstance(balance, LocalBalance):
         return point
     return replace(point, kept=kept_by_dof(balance.by_dof, balance.harmonics).astype(np.int64))

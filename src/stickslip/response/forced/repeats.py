@@ -20,9 +20,7 @@ from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start
 ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
-CLOSE = (
-    1.0  # relative distance from a repeat beside a frequency within which it leads there at once
-)
+CLOSE = 1.0  # relative distance from a repeat beside a frequency within which it leads there at once
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -88,12 +86,7 @@ def repeat(
     detours(beside)
     if not found():
         spent += _by_all(
-            problem,
-            balance,
-            omega,
-            nearest[1],
-            static,
-            max(most - charged(spent[-1], spent).iterations, 1),
+            problem, balance, omega, nearest[1], static, max(most - charged(spent[-1], spent).iterations, 1)
         )
     solution = charged(spent[-1], spent)
     return forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
@@ -121,9 +114,7 @@ def _by_all(
     return [solution]
 
 
-def _leading(
-    balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]
-) -> FloatArray | None:
+def _leading(balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]) -> FloatArray | None:
     """Return the repeat of a frequency beside this one, if it is near: comparing it with other starts costs more than it saves."""
     low = point.coefficients
     for known in beside:
@@ -136,11 +127,7 @@ def _leading(
 
 
 def _nearest_first(
-    balance: Balance,
-    omega: float,
-    q: FloatArray,
-    others: Sequence[FloatArray],
-    options: Newton,
+    balance: Balance, omega: float, q: FloatArray, others: Sequence[FloatArray], options: Newton
 ) -> list[tuple[ParameterEvaluation, FloatArray]]:
     """Sort starts by the Newton correction that the Jacobian at the padded low-order solution `q` foretells from each.
 
@@ -161,10 +148,7 @@ def _nearest_first(
 
 
 def _from_start(
-    balance: Balance,
-    omega: float,
-    start: tuple[ParameterEvaluation, FloatArray],
-    options: Newton,
+    balance: Balance, omega: float, start: tuple[ParameterEvaluation, FloatArray], options: Newton
 ) -> Solution:
     """Solve from a start that is evaluated already."""
     first, begin = start
@@ -183,9 +167,7 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
         asked = tuple(int(h) for h in point.asked)
         return [problem.balance(asked).unknowns(point.start)]
     few = problem.balance(point.support)
-    verdict = judged(
-        problem.strategy, problem.step(few, few.unknowns(point.coefficients), point.omega)
-    )
+    verdict = judged(problem.strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
     if verdict.start is None:
         return []
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]

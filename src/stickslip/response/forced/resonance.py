@@ -28,9 +28,7 @@ PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its freq
 
 
 def resolve_peak(
-    problem: ForcedProblem,
-    accepted: Sequence[ForcedPoint],
-    done: Iterable[ForcedPoint] = (),
+    problem: ForcedProblem, accepted: Sequence[ForcedPoint], done: Iterable[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:
     """Add points around the highest one until its bracket is narrow; each gets the harmonics that it needs.
 
@@ -67,9 +65,7 @@ def resolve_peak(
     yield from _refined(problem, search, known, problem.sweep.peak_points)
 
 
-def _refined(
-    problem: ForcedProblem, search: "_Search", known: list[ForcedPoint], most: int
-) -> Iterator[ForcedPoint]:
+def _refined(problem: ForcedProblem, search: "_Search", known: list[ForcedPoint], most: int) -> Iterator[ForcedPoint]:
     """Add points around the highest of `known` until its bracket is narrow, at most so many."""
     heights = [problem.amplitude(p) for p in known] if most else []
     for _ in range(most):
@@ -109,13 +105,10 @@ def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     middle = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
     if not middle.solution.status.converged:
         return None
-    sides = [
-        step_to(balance, middle, (1.0 + side) * point.omega, following)
-        for side in (-NEARBY, NEARBY)
-    ]
+    sides = [step_to(balance, middle, (1.0 + side) * point.omega, following) for side in (-NEARBY, NEARBY)]
     walked = [sides[0], middle, sides[1]]
     for _ in range(WALK):
-        heights = [problem.amplitude(_at_peak(balance, p)) for p in walked if p.solution.status.converged]  # fmt: skip
+        heights = [problem.amplitude(_at_peak(balance, p)) for p in walked if p.solution.status.converged]
         top = int(np.argmax(heights))
         if len(heights) < len(walked) or 0 < top < len(walked) - 1:
             break
@@ -167,9 +160,7 @@ class _Search:
             made = yield from self._take(lambda: self._accepted(curve, more))  # noqa: B023
         return made
 
-    def _enough(
-        self, curve: ForcedCurve, made: ForcedPoint, more: ForcedPoint, *, audit: bool
-    ) -> bool:
+    def _enough(self, curve: ForcedCurve, made: ForcedPoint, more: ForcedPoint, *, audit: bool) -> bool:
         """Whether more harmonics change a point by little; a peak by very little."""
         change = self.problem.amplitude(more) / self.problem.amplitude(made) - 1.0
         if audit and abs(change) > PEAK_CHANGE:
@@ -229,8 +220,7 @@ class _Search:
         """Solve with more harmonics, from what the strategy foretells and from the padded solution."""
         balance, options = curve.problem(level), self.problem.sweep.newton
         solution = first_converged(
-            newton(lambda x: balance.linearise(x, now.p), start, options)
-            for start in curve.starts(now, level)
+            newton(lambda x: balance.linearise(x, now.p), start, options) for start in curve.starts(now, level)
         )
         return self._point(curve, level, now.p, solution, stage)
 
@@ -238,9 +228,7 @@ class _Search:
         found = of_forced(curve, check)
         return self._point(curve, found.level, found.p, found.point.solution, "peak")
 
-    def _point(
-        self, curve: ForcedCurve, level: int, omega: float, solution: Solution, stage: Stage
-    ) -> ForcedPoint:
+    def _point(self, curve: ForcedCurve, level: int, omega: float, solution: Solution, stage: Stage) -> ForcedPoint:
         latest = Latest(curve.problem(level))
         point = Point(solution.x, omega, np.zeros(0), 0.0, solution, 0.0)
         judged = Judged()

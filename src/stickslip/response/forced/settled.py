@@ -14,19 +14,15 @@ from stickslip.harmonic.support import Harmonics, multiples
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.along import AGREE, NEAR, SAFETY, SMALL
 from stickslip.response.forced.choices import RUNGS, Stage
-from stickslip.response.forced.problem import (
-    Balance,
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-    with_stiffness,
-)
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.verification import own_error, with_waves
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most
-WORK = 2000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
+WORK = (
+    2000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
+)
 # share of the threshold above which a prediction that nothing has confirmed is not believed
 BELIEVED = 0.5
 CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
@@ -134,7 +130,9 @@ def _balance(problem: ForcedProblem, support: Harmonics) -> Balance | None:
         wide = with_waves(problem, with_stiffness(problem.low), support[-1])
         if wide.linear.most is not None and wide.linear.most < support[-1]:
             return None
-        problem.others[support] = replace(wide, samples=max(wide.samples, SAMPLES_A_HARMONIC * support[-1])).with_harmonics(support)  # fmt: skip
+        problem.others[support] = replace(
+            wide, samples=max(wide.samples, SAMPLES_A_HARMONIC * support[-1])
+        ).with_harmonics(support)
     return problem.balance(support)
 
 
@@ -227,16 +225,14 @@ class _Settling:
 
     def _solved(self, balance: Balance, start: ForcedPoint, here: ForcedPoint) -> ForcedPoint:
         x, options = balance.unknowns(start.coefficients), self.problem.sweep.newton
-        found: Solution = newton(
-            lambda v: balance.linearise(v, here.omega), x, options, NaturalLevel()
-        )
+        found: Solution = newton(lambda v: balance.linearise(v, here.omega), x, options, NaturalLevel())
         return forced_point(balance, found, self.stages[1], here.index, here.omega, 0.0)
 
     def _raised(self, more: ForcedPoint, bound: float) -> ForcedPoint:
         """Return a solution that was to compare as one that stands for its frequency; with the most harmonics the change from fewer bounds its error."""
         return replace(
             more, stage=self.stages[0], predicted_error=bound, iterations=0, seconds_contact=0.0, seconds_linear=0.0
-        )  # fmt: skip
+        )
 
     def _take(self, make: Callable[[], ForcedPoint]) -> Taken:
         known = next(self.stored, None)

@@ -11,12 +11,7 @@ from stickslip.harmonic.local import AnyBalance
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
 from stickslip.response.forced.choices import Stage
-from stickslip.response.forced.problem import (
-    BRANCH_ITERATIONS,
-    ForcedPoint,
-    ForcedProblem,
-    forced_point,
-)
+from stickslip.response.forced.problem import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.ladder import without_branch
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.rescue import steps_at_most
@@ -98,11 +93,7 @@ def _from_behind(
 
 
 def _solution(
-    problem: ForcedProblem,
-    balance: AnyBalance,
-    tried: Sequence[ForcedPoint],
-    omega: float,
-    start: ComplexArray | None,
+    problem: ForcedProblem, balance: AnyBalance, tried: Sequence[ForcedPoint], omega: float, start: ComplexArray | None
 ) -> Solution:
     """Solve from a given start, or what was found so far; then along the branch from there; then as without one."""
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
@@ -128,9 +119,7 @@ def _solution(
         found = [balance.unknowns(p.coefficients) for p in tried if p.converged][-1:]
         left = 1.0 - taken() / steps_at_most(balance.size)
         effort = max(left, 0.0) if problem.sweep.rescue == "all" else 0.0
-        spent.append(
-            without_branch(problem.system, balance, problem.sweep.newton, omega, found, effort)
-        )
+        spent.append(without_branch(problem.system, balance, problem.sweep.newton, omega, found, effort))
     return charged(spent[-1], spent)
 
 

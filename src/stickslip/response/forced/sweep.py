@@ -14,15 +14,7 @@ from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_s
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import Harmonics, harmonics_of, multiples
 from stickslip.response.branch import steps_through
-from stickslip.response.forced.choices import (
-    PUBLISHED,
-    RUNGS,
-    SELECTION,
-    AmplitudeOf,
-    Passages,
-    RelativeTo,
-    Rescue,
-)
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, AmplitudeOf, Passages, RelativeTo, Rescue
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
@@ -109,9 +101,7 @@ class Sweep:
             raise input_error(
                 "Sweep.omega_range",
                 f"must be positive and growing, got {first:g} to {last:g} rad/s",
-                "Widen the range; `at` solves at single frequencies in it."
-                if first == last
-                else "Swap the two ends.",
+                "Widen the range; `at` solves at single frequencies in it." if first == last else "Swap the two ends.",
             )
         check_evaluator(self.evaluator)
         if isinstance(self.selection, str):
@@ -135,9 +125,7 @@ class Sweep:
             value, least = getattr(self, name), 0 if name in {"frequencies", "peak_points"} else 1
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise input_error(
-                    f"Sweep.{name}",
-                    f"must be an integer of at least {least}, got {value!r}",
-                    "Give a count.",
+                    f"Sweep.{name}", f"must be an integer of at least {least}, got {value!r}", "Give a count."
                 )
         low, high = self.low_harmonics, self.high_harmonics
         if len(low) < 2 or not set(low) <= set(high):  # the static term and another
@@ -251,6 +239,4 @@ def _check_steps(sweep: Sweep) -> None:
             "Sort them, leave out what is twice, and widen omega_range to hold them.",
         )
     if steps.size and steps[0] < 0.0 and sweep.direction == "up":
-        raise input_error(
-            "Sweep.at", "falls, and the direction is up", "Give direction='down', or sort it."
-        )
+        raise input_error("Sweep.at", "falls, and the direction is up", "Give direction='down', or sort it.")

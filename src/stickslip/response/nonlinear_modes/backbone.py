@@ -33,10 +33,7 @@ MEETS, OVER = "internal resonance", "stepped over an internal resonance"
 ROUNDED = 1e-9
 Concept = Literal["periodic", "decaying"]
 BEGINS = 0.5  # of the amplitude at which slip begins
-ENDS, GROSS = (
-    300.0,
-    1e5,
-)  # times that amplitude: where a curve ends, and where at the latest one to gross slip does
+ENDS, GROSS = (300.0, 1e5)  # times that amplitude: where a curve ends, and where at the latest one to gross slip does
 TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
 CLOSER = 30  # points at least that may be put between those of a curve
 LOST = 3  # points in a row that are not found, after which a curve is at its end
@@ -213,9 +210,7 @@ class ModeWay:
         made = tuple(mode_point(self.curve, f) for f in found)
         end = _end(made, found[-1], self.route.last, stops=self.to_gross_slip)
         anew = _begun_anew(found, self.route, self.curve.control.first)
-        end += (
-            f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
-        )
+        end += f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
         end += self._resonances(found, made)
         return Backbone(own.system, own.load, own.mode, own.dof, made, end)
 
@@ -291,12 +286,7 @@ def mode_way(
         slips = slip_amplitude(problem)
         span = (BEGINS * slips, (GROSS if along.to_gross_slip else ENDS) * slips)
     curve = ModeCurve.of(
-        problem,
-        span,
-        along.points,
-        along.most_harmonics,
-        along.tolerance,
-        decaying=along.concept == "decaying",
+        problem, span, along.points, along.most_harmonics, along.tolerance, decaying=along.concept == "decaying"
     )
     first, last = (float(np.log(a)) for a in span)
     route = Route(first=first, last=last, points=along.points)
@@ -312,9 +302,7 @@ def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
     full = curve.linear(found.level, y).recover(problem.omega(y), scale * problem.relative(y))
     energies = [_product(problem.system, h, full[h]) for h in range(1, order + 1)]
     squares = (omega * np.arange(1, order + 1)) ** 2
-    contacts = (
-        contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan, np.nan)
-    )
+    contacts = contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan, np.nan)
     return ModePoint(
         float(abs(full[1, problem.dof])),
         omega,

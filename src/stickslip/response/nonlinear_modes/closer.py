@@ -137,7 +137,7 @@ class Closer:
             yield off / KNEE, i
 
     def _of_extremes(self) -> Iterator[tuple[float, int]]:
-        values = np.array([self._place(f).numbers if f.converged else [np.nan] * 2 for f in self.branch])  # fmt: skip
+        values = np.array([self._place(f).numbers if f.converged else [np.nan] * 2 for f in self.branch])
         for column, tests in ((1, (1.0,)), (0, (1.0, -1.0))):
             for sign in tests:
                 own = sign * values[:, column]
@@ -206,7 +206,7 @@ class Closer:
         problem = self.curve.problems[level]
         latest = Latest(self.curve.problem(level))
         ends = [self.curve.lifted(f.point.x, f.level, level) for f in (one, other)]
-        solution = newton(lambda y: latest.linearise(y, p), 0.5 * (ends[0] + ends[1]), problem.how.newton)  # fmt: skip
+        solution = newton(lambda y: latest.linearise(y, p), 0.5 * (ends[0] + ends[1]), problem.how.newton)
         if not solution.status.converged:
             return None
         point = Point(solution.x, p, np.zeros(solution.x.size + 1), 0.0, solution, 0.0)

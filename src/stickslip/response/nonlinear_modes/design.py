@@ -65,7 +65,7 @@ def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = Non
     at in the motion of the largest amplitude.
     """
     backbone = oscillator.backbone
-    balance = (how or Discretisation()).balance(backbone.system, oscillator.load, np.array([backbone.dof]))  # fmt: skip
+    balance = (how or Discretisation()).balance(backbone.system, oscillator.load, np.array([backbone.dof]))
     last = max(backbone.solutions, key=lambda p: p.modal_amplitude)
     motion = last.coefficients[: balance.order + 1, balance.linear.retained]
     one, two = (_forces(balance, factor * motion, last.omega) for factor in (1.0, TWICE))

@@ -64,7 +64,10 @@ def along(others: OtherModes, found: Synthesised, dof: int) -> Along:
     moves = (own.first(found.place) * np.exp(1j * found.phase)[:, None]) @ rows.T
     beside = others.answer(found.omega, left_over(own, found), rows)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = [np.linalg.norm(beside[:, k], axis=1) / np.linalg.norm(moves[:, k], axis=1) for k in (slice(1), slice(1, None))]  # fmt: skip
+        share = [
+            np.linalg.norm(beside[:, k], axis=1) / np.linalg.norm(moves[:, k], axis=1)
+            for k in (slice(1), slice(1, None))
+        ]
     # gaps of the mode and the others together, as amplitudes of the mode alone
     size = np.sum(np.abs(moves[:, 1:]) ** 2, axis=1)
     both = np.abs(1.0 + np.sum(moves[:, 1:].conj() * beside[:, 1:], axis=1) / size)
@@ -72,10 +75,7 @@ def along(others: OtherModes, found: Synthesised, dof: int) -> Along:
     turned = np.log(felt / _needs(own, found.place, found.omega))
     linear = found.place + np.log1p(share[1]) < slips_from(own)
     return Along(
-        np.abs(moves[:, 0] + beside[:, 0]),
-        np.fmax(*share),
-        np.abs(_steepness(own, found) * turned),
-        np.asarray(linear),
+        np.abs(moves[:, 0] + beside[:, 0]), np.fmax(*share), np.abs(_steepness(own, found) * turned), np.asarray(linear)
     )
 
 

@@ -118,7 +118,7 @@ def other_modes(oscillator: ModalOscillator) -> OtherModes:
     way = own_motions(bound, system.structure.multipliers)
     free = in_coordinates(bound, way, bound.dofs.take(np.arange(way.shape[1])), {})
     basis = _basis(free, way.conj().T @ oscillator.load.harmonics[1])
-    mass, damping, stiffness = (in_basis(m, basis) for m in (free.mass, free.damping, free.stiffness))  # fmt: skip
+    mass, damping, stiffness = (in_basis(m, basis) for m in (free.mass, free.damping, free.stiffness))
     if free.loss is not None:
         stiffness = stiffness + 1j * in_basis(free.loss, basis)
     n, spread = len(mass), way @ basis
@@ -141,7 +141,7 @@ def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
     inertia, dashpots = ((m @ motion.T).T for m in (structure.mass, structure.damping))
     off = (found.omega - here.omega)[:, None]
     plain = (here.omega**2 - found.omega**2 + 2j * here.ratio * here.omega**2)[:, None]
-    return np.asarray(found.level * oscillator.load.harmonics[1] - plain * inertia - 1j * off * dashpots)  # fmt: skip
+    return np.asarray(found.level * oscillator.load.harmonics[1] - plain * inertia - 1j * off * dashpots)
 
 
 @by_one_thread
@@ -208,9 +208,7 @@ def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> Compl
 
 
 @by_one_thread
-def peak_with_others(
-    others: OtherModes, curve: Synthesised, found: Resonance, dof: int
-) -> tuple[float, float]:
+def peak_with_others(others: OtherModes, curve: Synthesised, found: Resonance, dof: int) -> tuple[float, float]:
     """Return the largest amplitude of a dof, m, with the share of the other modes, and its frequency, rad/s.
 
     Parameters

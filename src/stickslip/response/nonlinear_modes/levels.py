@@ -71,9 +71,7 @@ class ModeCurve(Curve):
         while every[-1].balance.order < most:
             every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
         length = abs(float(np.log(span[1] / span[0])))
-        control = StepControl(
-            scale=length / (points * LARGEST), first=0.05, largest=LARGEST, growth=GROWTH
-        )
+        control = StepControl(scale=length / (points * LARGEST), first=0.05, largest=LARGEST, growth=GROWTH)
         return cls(tuple(every), control, tolerance, decaying)
 
     @property
@@ -128,11 +126,7 @@ class ModeCurve(Curve):
         weights[: own.balance.linear.n] = 0.0
         few = replace(own.how.newton, max_iterations=CORRECTIONS)
         return Following(
-            newton=few,
-            control=self.control,
-            weights=weights,
-            predictor="parabola",
-            corrector="kept_factors",
+            newton=few, control=self.control, weights=weights, predictor="parabola", corrector="kept_factors"
         )
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
@@ -160,11 +154,7 @@ class ModeCurve(Curve):
         """Foretell by a Newton step with the harmonics towards which motions are judged what these change of frequency and damping ratio; with the most harmonics the difference from fewer counts, too."""
         if level + 1 == self.levels > 1:
             last = self.at_the_cap(level, point)
-            return (
-                last
-                if last.bound > self.tolerance
-                else Judged(np.fmax(last.bound, self._foretold(level, point)))
-            )
+            return last if last.bound > self.tolerance else Judged(np.fmax(last.bound, self._foretold(level, point)))
         return Judged(self._foretold(level, point))
 
     def _foretold(self, level: int, point: Point) -> float:
@@ -183,9 +173,7 @@ class ModeCurve(Curve):
         """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
         fewer = self.problem(level - 1)
         start = self.lifted(point.x, level, level - 1)
-        found = newton(
-            lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton
-        )
+        found = newton(lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton)
         if not found.status.converged:
             return Judged(np.inf)
         return Judged(self._change(level, self.lifted(found.x, level - 1, level), point.x))

@@ -25,11 +25,7 @@ SHORTEST = 1e-3  # of ln a: points are not set closer
 
 @by_one_thread
 def refined(
-    backbone: Backbone,
-    load: HarmonicLoad,
-    how: Discretisation | None = None,
-    tolerance: float = 5e-3,
-    most: int = 80,
+    backbone: Backbone, load: HarmonicLoad, how: Discretisation | None = None, tolerance: float = 5e-3, most: int = 80
 ) -> Backbone:
     """Return a backbone with points added until interpolation between them predicts damping and modal force.
 
@@ -76,9 +72,9 @@ class _Solver:
 
     @classmethod
     def of(cls, backbone: Backbone, how: Discretisation) -> "_Solver":
-        own = self_excited_motions(
-            backbone.system, backbone.load, backbone.mode, backbone.dof, how
-        ).with_order(max(p.order for p in backbone.points))
+        own = self_excited_motions(backbone.system, backbone.load, backbone.mode, backbone.dof, how).with_order(
+            max(p.order for p in backbone.points)
+        )
         return cls(ModeCurve.of(own, (1.0, np.e), 1), by_energy(own)[0])
 
     def between(self, before: ModePoint, after: ModePoint) -> ModePoint | None:

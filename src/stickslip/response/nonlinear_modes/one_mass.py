@@ -71,13 +71,7 @@ class Oscillation:
         rest = 2.0 * self.ratio * self.omega**2 - self.omega * damp
         one = np.ones_like(real)
         return np.stack(
-            [
-                one,
-                2.0 * turn,
-                turn**2 - 2.0 * real + damp**2,
-                2.0 * (rest * damp - turn * real),
-                real**2 + rest**2,
-            ],
+            [one, 2.0 * turn, turn**2 - 2.0 * real + damp**2, 2.0 * (rest * damp - turn * real), real**2 + rest**2],
             axis=-1,
         )
 
@@ -131,7 +125,7 @@ class ModalOscillator:
         v = self.numbers(place)
         return Oscillation(
             np.exp(v[..., 0]), np.exp(v[..., 1]), v[..., 2], v[..., 3] + 1j * v[..., 4], v[..., 5] + 1j * v[..., 6]
-        )  # fmt: skip
+        )
 
     def needed(self, place: FloatArray) -> FloatArray:
         """Return the least level that keeps the amplitudes at places."""
@@ -221,18 +215,15 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
             "Follow it over more amplitudes, or with more points.",
         )
     force = _driving(backbone, load)
-    mass, damping = (getattr(backbone.system.structure.of_harmonic(1), m) for m in ("mass", "damping"))  # fmt: skip
+    mass, damping = (getattr(backbone.system.structure.of_harmonic(1), m) for m in ("mass", "damping"))
     motion = _transported([p.coefficients for p in points], mass)
     begins_linear = _is_linear(backbone, points[0])
     logs = np.log([p.modal_amplitude for p in points])
     rows = [
-        [
-            logs[i], np.log(p.omega), p.ratio, *_parts(np.vdot(shape, force)),
-            *_parts(np.vdot(shape, damping @ shape)),
-        ]
+        [logs[i], np.log(p.omega), p.ratio, *_parts(np.vdot(shape, force)), *_parts(np.vdot(shape, damping @ shape))]
         for i, p in enumerate(points)
         for shape in [motion[i, 1] / p.modal_amplitude]
-    ]  # fmt: skip
+    ]
     place = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(logs)))])
     begins, change = 0.0, np.array([p.change for p in points])
     if begins_linear:  # below the first point the mode is linear, and its motion in proportion
@@ -245,9 +236,7 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
         begins, change = -less, np.append(0.0, change)
     kept = np.append(True, np.diff(place) > 0.0)
     numbers = PchipInterpolator(place[kept], np.array(rows)[kept])
-    return ModalOscillator(
-        backbone, load, place[kept], motion[kept], float(begins), numbers, change[kept]
-    )
+    return ModalOscillator(backbone, load, place[kept], motion[kept], float(begins), numbers, change[kept])
 
 
 def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:
@@ -273,10 +262,9 @@ def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:
 
 def _is_linear(backbone: Backbone, first: ModePoint) -> bool:
     mode = backbone.mode
-    return (
-        abs(first.omega / mode.omega - 1.0) < LINEAR
-        and abs(first.ratio - mode.ratio) < LINEAR * max(abs(mode.ratio), LINEAR)
-    )  # fmt: skip
+    return abs(first.omega / mode.omega - 1.0) < LINEAR and abs(first.ratio - mode.ratio) < LINEAR * max(
+        abs(mode.ratio), LINEAR
+    )
 
 
 def _transported(motions: Sequence[ComplexArray], mass: Matrix) -> ComplexArray:

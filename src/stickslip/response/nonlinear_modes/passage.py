@@ -142,9 +142,15 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
 
     beyond.terminal = True  # type: ignore[attr-defined]  # as solve_ivp asks
     solved = scipy.integrate.solve_ivp(
-        slope, (0.0, sweep.seconds), [start.real, start.imag], method="DOP853", dense_output=True,
-        events=beyond, rtol=sweep.tolerance, atol=sweep.tolerance * abs(start),
-    )  # fmt: skip
+        slope,
+        (0.0, sweep.seconds),
+        [start.real, start.imag],
+        method="DOP853",
+        dense_output=True,
+        events=beyond,
+        rtol=sweep.tolerance,
+        atol=sweep.tolerance * abs(start),
+    )
     last = float(solved.t[-1])
     beats = abs(sweep.ends[1] - sweep.ends[0]) * sweep.seconds / (4 * np.pi)
     time = np.linspace(0.0, last, int(np.clip(PER_BEAT * beats, FEWEST, MOST)))
@@ -152,13 +158,9 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
     amplitude, along = y[0] + 1j * y[1], first + rate * time
     size = np.abs(amplitude)
     near = size > NEAR * size.max()
-    moves = [
-        abs(table.slope(w, a, level)) / (w * abs(a)) for w, a in zip(along[near], amplitude[near], strict=True)
-    ]  # fmt: skip
+    moves = [abs(table.slope(w, a, level)) / (w * abs(a)) for w, a in zip(along[near], amplitude[near], strict=True)]
     place = np.clip(np.log(size) - table.first, *oscillator.ends)
-    return Passage(
-        time, along, place, size, np.angle(amplitude), solved.status == 0, float(max(moves))
-    )
+    return Passage(time, along, place, size, np.angle(amplitude), solved.status == 0, float(max(moves)))
 
 
 @dataclass(frozen=True, eq=False)

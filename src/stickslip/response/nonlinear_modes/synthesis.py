@@ -65,8 +65,14 @@ class Synthesised:
         """Return one of the curves."""
         own = self.curve == curve
         return replace(
-            self, place=self.place[own], omega=self.omega[own], amplitude=self.amplitude[own], phase=self.phase[own], curve=self.curve[own], stable=self.stable[own]
-        )  # fmt: skip
+            self,
+            place=self.place[own],
+            omega=self.omega[own],
+            amplitude=self.amplitude[own],
+            phase=self.phase[own],
+            curve=self.curve[own],
+            stable=self.stable[own],
+        )
 
 
 @dataclass(frozen=True)
@@ -118,7 +124,7 @@ def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
         place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=CLOSE))
         here = oscillator.at(np.array([place]))
         omega = float(here.resonance()[0])
-        found.append(Resonance(level, place, omega, float(here.amplitude[0]), bool(excess[i] < 0.0)))  # fmt: skip
+        found.append(Resonance(level, place, omega, float(here.amplitude[0]), bool(excess[i] < 0.0)))
     return found
 
 
@@ -149,9 +155,7 @@ def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) 
     here = oscillator.at(place)
     phase = np.angle(here.force / here.stiffness(omega)) if parts else np.zeros(0)
     stable = _stable(oscillator, place, omega)
-    return Synthesised(
-        level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable, tuple(found)
-    )
+    return Synthesised(level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable, tuple(found))
 
 
 def at_resonance(oscillator: ModalOscillator, found: Resonance) -> Synthesised:
@@ -175,10 +179,7 @@ def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> Float
 
     excess = more(table)
     at = np.flatnonzero(np.sign(excess[:-1]) * np.sign(excess[1:]) < 0.0)
-    found = [
-        scipy.optimize.brentq(lambda s: float(more(np.array([s]))[0]), table[i], table[i + 1])
-        for i in at
-    ]
+    found = [scipy.optimize.brentq(lambda s: float(more(np.array([s]))[0]), table[i], table[i + 1]) for i in at]
     return np.array(found)
 
 
@@ -189,9 +190,7 @@ def free_motions(oscillator: ModalOscillator) -> FloatArray:
     ratio = oscillator.at(table).ratio
     at = np.flatnonzero(ratio[:-1] * ratio[1:] < 0.0)
     found = [
-        scipy.optimize.brentq(
-            lambda s: float(oscillator.at(np.array([s])).ratio[0]), table[i], table[i + 1]
-        )
+        scipy.optimize.brentq(lambda s: float(oscillator.at(np.array([s])).ratio[0]), table[i], table[i + 1])
         for i in at
     ]
     return np.array(found)
@@ -226,15 +225,10 @@ def _curve(
     low, high = np.isfinite(below), np.isfinite(above)
     upward, downward = (place[low], below[low]), (place[high][::-1], above[high][::-1])
     twice = 1 if closes_above and low[-1] and high[-1] else 0
-    return (
-        np.concatenate([upward[0], downward[0][twice:]]),
-        np.concatenate([upward[1], downward[1][twice:]]),
-    )
+    return (np.concatenate([upward[0], downward[0][twice:]]), np.concatenate([upward[1], downward[1][twice:]]))
 
 
-def _sides(
-    oscillator: ModalOscillator, level: float, place: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _sides(oscillator: ModalOscillator, level: float, place: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the frequencies below and above the resonance at which the level keeps the amplitudes; NaN where there is none."""
     here = oscillator.at(place)
     q = here.polynomial()

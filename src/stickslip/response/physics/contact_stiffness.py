@@ -116,9 +116,7 @@ class _Slopes:
     by_stiffness: float
 
 
-def _slopes(
-    problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint, output: int
-) -> _Slopes | None:
+def _slopes(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint, output: int) -> _Slopes | None:
     x, omega = balance.unknowns(point.coefficients), point.omega
     rates = np.asarray(balance.linearise(x, omega).jac_p), _by_stiffness(balance, x, omega)
     found = []
@@ -143,9 +141,7 @@ def _by_stiffness(balance: HarmonicBalance, x: FloatArray, omega: float) -> Floa
     return balance.scaled_forces((forces[0] - forces[1]) / (2.0 * STEP))
 
 
-def _beside(
-    problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint
-) -> ForcedPoint | None:
+def _beside(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint) -> ForcedPoint | None:
     """Return the solution at a frequency beside a point; None where none is found."""
     omega = point.omega * (1.0 + APART)
     start = balance.unknowns(point.coefficients)

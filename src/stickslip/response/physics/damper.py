@@ -26,9 +26,7 @@ def complex_stiffness(ratio: float) -> complex:
     if ratio <= 1.0:
         return 1.0 + 0.0j
     angle = np.arccos(1.0 - 2.0 / ratio)
-    return complex(
-        (angle - 0.5 * np.sin(2.0 * angle)) / np.pi, 4.0 / np.pi * (ratio - 1.0) / ratio**2
-    )
+    return complex((angle - 0.5 * np.sin(2.0 * angle)) / np.pi, 4.0 / np.pi * (ratio - 1.0) / ratio**2)
 
 
 @dataclass(frozen=True)
@@ -89,9 +87,7 @@ def damped_modes(
         return []
     highest = BEYOND * harmonic * within.highest
     shapes = [
-        m.shape
-        for own in (springs, np.where(slips, 0.0, springs))
-        for m in modes_up_to(here, highest, own, harmonic)
+        m.shape for own in (springs, np.where(slips, 0.0, springs)) for m in modes_up_to(here, highest, own, harmonic)
     ]
     if not shapes:
         return []
@@ -100,8 +96,7 @@ def damped_modes(
     moved = gaps @ way
     stiffness = way.conj().T @ (structure.stiffness @ way)
     rest, slider = (
-        (moved.conj().T * own) @ moved
-        for own in (np.where(slips, 0.0, springs), np.where(slips, springs, 0.0))
+        (moved.conj().T * own) @ moved for own in (np.where(slips, 0.0, springs), np.where(slips, springs, 0.0))
     )
     squares = _followed(0.5 * (stiffness + stiffness.conj().T) + rest, slider)
     roots = np.sqrt(squares) / harmonic
@@ -111,9 +106,7 @@ def damped_modes(
         top = int(np.argmax(ratio))
         inside = [within.holds(omega[k]) for k in (0, top)]
         if any(inside) and ratio[top] > SMALLEST_DAMPING:
-            found.append(
-                DampedMode(float(omega[0]), float(omega[top]), float(ratio[top]), float(omega[-1]))
-            )
+            found.append(DampedMode(float(omega[0]), float(omega[top]), float(ratio[top]), float(omega[-1])))
     return found
 
 

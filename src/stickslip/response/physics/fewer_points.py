@@ -13,9 +13,7 @@ from stickslip.response.system import System
 FEWEST_HALVED = 8  # points of a contact below which half of them would hold it otherwise
 
 
-def halved(
-    system: System, groups: Sequence[str], position: FloatArray, area: FloatArray
-) -> tuple[System, int] | None:
+def halved(system: System, groups: Sequence[str], position: FloatArray, area: FloatArray) -> tuple[System, int] | None:
     """Return a system with half the points of its meshed contacts, and how many points are left out; None where none is meshed finely enough.
 
     Parameters

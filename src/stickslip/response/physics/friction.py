@@ -54,15 +54,11 @@ def friction_of(interface: Interface, static_gap: FloatArray, static_force: Floa
         cycle = np.zeros((3, n, 3))
         cycle[0] = static_gap
         cycle[1, :, axis] = TRAVEL_M
-        force = contact_forces(cycle.reshape(3, -1), compiled, SAMPLES).coefficients.reshape(
-            3, n, 3
-        )
+        force = contact_forces(cycle.reshape(3, -1), compiled, SAMPLES).coefficients.reshape(3, n, 3)
         work = np.pi * TRAVEL_M * force[2, :, axis]
         size = np.linalg.norm(force[1:, :, axis], axis=0)
         limit = np.abs(work) / (4.0 * TRAVEL_M)
         limits[:, axis] = np.where(limit > ROUNDING * size, limit, 0.0)
-    follows = np.array(
-        [hasattr(law, "mu") and law.stuck_stiffness()[2] > 0 for law in interface.laws]
-    )
+    follows = np.array([hasattr(law, "mu") and law.stuck_stiffness()[2] > 0 for law in interface.laws])
     pressed = static_force[:, 2] < 0.0
     return Friction(limits, np.asarray(follows & pressed, dtype=bool))

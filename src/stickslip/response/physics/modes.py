@@ -14,9 +14,7 @@ from stickslip.units import HZ
 
 UNDAMPED_RATIO = 1e-5  # damping ratio below which nothing damps a mode
 SPANNED = 60  # coordinates up to which eigenvalues are those of all motions
-UNDRIVEN = (
-    1e-9  # force on a mode over the norms of force and shape: below, the load stands at a node
-)
+UNDRIVEN = 1e-9  # force on a mode over the norms of force and shape: below, the load stands at a node
 FIRST_MODES = 4  # asked for at first; twice as many until they pass the range
 ALONE = 0.99  # share of the strain energy in contact springs, and of the kinetic energy in one part
 
@@ -80,7 +78,7 @@ class RangeMode:
     @property
     def resonance(self) -> float:
         """Modal amplitude at its resonance, m √kg, with at least the damping ratio `UNDAMPED_RATIO`."""
-        return self.force / (2.0 * (self.harmonic * self.omega) ** 2 * max(self.ratio, UNDAMPED_RATIO))  # fmt: skip
+        return self.force / (2.0 * (self.harmonic * self.omega) ** 2 * max(self.ratio, UNDAMPED_RATIO))
 
     @property
     def hz(self) -> float:
@@ -111,9 +109,7 @@ def springs_of(system: System, holds: BoolArray, sliding: BoolArray | None = Non
     return springs if sliding is None else np.where(sliding, 0.0, springs)
 
 
-def range_modes(
-    system: System, load: HarmonicLoad, within: Range, springs: FloatArray
-) -> list[RangeMode]:
+def range_modes(system: System, load: HarmonicLoad, within: Range, springs: FloatArray) -> list[RangeMode]:
     """Return the modes that harmonics of a load pass in a range, with linear springs in place of the contacts.
 
     Parameters
@@ -155,9 +151,7 @@ def range_modes(
     return found
 
 
-def modes_up_to(
-    system: System, highest: float, springs: FloatArray, harmonic: int
-) -> list[StuckMode]:
+def modes_up_to(system: System, highest: float, springs: FloatArray, harmonic: int) -> list[StuckMode]:
     """Return all modes of a harmonic up to a frequency in rad/s, and the next one."""
     most = int(np.count_nonzero(system.structure.of_harmonic(harmonic).mass.diagonal()))
     count = min(FIRST_MODES, most)

@@ -17,21 +17,13 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.quasi_periodic.motion import TorusMotion
 from stickslip.response.quasi_periodic.problem import TwoTones
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
-from stickslip.response.quasi_periodic.tone import (
-    beginnings,
-    forced_motion,
-    over_amplitude,
-    second_tone,
-)
+from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone
 from stickslip.response.stability import stability
 
 ORDER = 7  # harmonics of the motion whose multipliers are looked at
 HIGHEST = 3  # harmonic beside which a frequency is looked for
 TRIED = 3  # frequencies
-WIDE, NEAR = (
-    0.3,
-    1e-3,
-)  # of a frequency: from how far a branch is followed to it, and how near its points may be
+WIDE, NEAR = (0.3, 1e-3)  # of a frequency: from how far a branch is followed to it, and how near its points may be
 NARROW = 1e-6  # half width of the range about a frequency that is solved alone
 
 
@@ -59,10 +51,7 @@ class Found:
 
 @by_one_thread
 def tone_beside(
-    problem: TwoTones,
-    omega: float,
-    guesses: Sequence[float],
-    starts: Iterable[ComplexArray] = (),
+    problem: TwoTones, omega: float, guesses: Sequence[float], starts: Iterable[ComplexArray] = ()
 ) -> Found:
     """Return the motion whose second tone grows out of the forced motion at a frequency.
 
@@ -107,9 +96,14 @@ def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[Compl
     for far, direction in ways:
         ends = sorted((far * omega, omega))
         sweep = Sweep(
-            omega_range=(ends[0], ends[1]), low=ORDER, high=ORDER, selection="always_low", points=10, peak_points=0,
+            omega_range=(ends[0], ends[1]),
+            low=ORDER,
+            high=ORDER,
+            selection="always_low",
+            points=10,
+            peak_points=0,
             direction=direction,
-        )  # fmt: skip
+        )
         try:
             forced = forced_problem(problem.system, load, sweep)
             points = accepted_points(list(forced_response(problem.system, load, sweep)))
@@ -129,9 +123,13 @@ def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[
         The frequencies, and why the multipliers do not show that all disturbances die; empty where they do.
     """
     sweep = Sweep(
-        omega_range=((1.0 - NARROW) * omega, (1.0 + NARROW) * omega), at=(omega,), low=ORDER, high=ORDER,
-        selection="always_low", peak_points=0,
-    )  # fmt: skip
+        omega_range=((1.0 - NARROW) * omega, (1.0 + NARROW) * omega),
+        at=(omega,),
+        low=ORDER,
+        high=ORDER,
+        selection="always_low",
+        peak_points=0,
+    )
     try:
         forced = forced_problem(problem.system, load, sweep)
         points = accepted_points(list(forced_response(problem.system, load, sweep)))

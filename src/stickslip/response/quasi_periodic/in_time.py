@@ -152,8 +152,9 @@ def course(  # noqa: PLR0913
     steps = -(-steps // KEPT) * KEPT
     marcher = with_enough_steps(
         lambda n: prepared(structure, contacts.gap_operator, contacts.laws, load, omega, n, contacts.weights),
-        start, steps,
-    )  # fmt: skip
+        start,
+        steps,
+    )
     steps, state, record = marcher.steps, marcher.begun(start), marcher.record()
     rows = marcher.modes.basis[outputs].T
     found: list[tuple[FloatArray, ...]] = []
@@ -163,7 +164,15 @@ def course(  # noqa: PLR0913
         if lost:
             break
         motion, angle = record.motion @ rows, max(angle, marcher.turn(record))
-        found.append((motion[steps // KEPT - 1 :: steps // KEPT], motion.max(axis=0), motion.min(axis=0), motion.mean(axis=0), np.mean(motion**2, axis=0)))  # fmt: skip
+        found.append(
+            (
+                motion[steps // KEPT - 1 :: steps // KEPT],
+                motion.max(axis=0),
+                motion.min(axis=0),
+                motion.mean(axis=0),
+                np.mean(motion**2, axis=0),
+            )
+        )
         if len(found) == until:
             if statistics(_course(omega, found, marcher.end(state), False, 0.0)).settled:
                 break
@@ -174,16 +183,11 @@ def course(  # noqa: PLR0913
 
 
 def _course(
-    omega: float,
-    found: list[tuple[FloatArray, ...]],
-    final: TransientStart,
-    lost: bool,
-    seconds: float,
-    width: int = 0,
+    omega: float, found: list[tuple[FloatArray, ...]], final: TransientStart, lost: bool, seconds: float, width: int = 0
 ) -> Course:
     if not found:
         none = np.zeros((0, width))
-        return Course(omega, np.zeros((0, KEPT, width)), none, none, none, none, final, lost, seconds)  # fmt: skip
+        return Course(omega, np.zeros((0, KEPT, width)), none, none, none, none, final, lost, seconds)
     samples, largest, least, mean, square = (np.array(own) for own in zip(*found, strict=True))
     return Course(omega, samples, largest, least, mean, square, final, lost, seconds)
 
@@ -197,7 +201,7 @@ def statistics(motion: Course) -> Statistics:
         nothing = np.full(outputs, np.nan)
         none = np.full((outputs, PEAKS), np.nan)
         return Statistics(nothing, nothing, nothing, nothing, nothing, np.inf, none, none, half)
-    amplitude, largest, least = (a[-half:] for a in (motion.amplitude, motion.largest, motion.least))  # fmt: skip
+    amplitude, largest, least = (a[-half:] for a in (motion.amplitude, motion.largest, motion.least))
     mean = motion.mean[-half:].mean(axis=0)
     square = motion.square[-half:].mean(axis=0)
     rms = np.sqrt(np.maximum(square - mean**2, 0.0))
@@ -207,9 +211,16 @@ def statistics(motion: Course) -> Statistics:
     spread = max(_spread(windows), _spread(sizes))
     hertz, peaks = _spectrum(motion.samples[-half:].reshape(-1, outputs) - mean, motion.omega)
     return Statistics(
-        amplitude.max(axis=0), amplitude.min(axis=0), mean, rms,
-        np.maximum(largest.max(axis=0) - mean, mean - least.min(axis=0)), spread, hertz, peaks, half,
-    )  # fmt: skip
+        amplitude.max(axis=0),
+        amplitude.min(axis=0),
+        mean,
+        rms,
+        np.maximum(largest.max(axis=0) - mean, mean - least.min(axis=0)),
+        spread,
+        hertz,
+        peaks,
+        half,
+    )
 
 
 def _spread(windows: FloatArray) -> float:

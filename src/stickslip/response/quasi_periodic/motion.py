@@ -104,11 +104,6 @@ def envelope(motion: TorusMotion, dofs: IntArray, phases: int = 96) -> Envelope:
     a_turn = max(256, int(32 * motion.order * max(1.0, ratio)))
     along = 2.0 * np.pi * np.arange(a_turn + 1) / a_turn
     begins = 2.0 * np.pi * np.arange(phases) / phases
-    amplitude = np.array(
-        [
-            0.5 * np.ptp(motion.values(dofs, along, begin + ratio * along), axis=0)
-            for begin in begins
-        ]
-    )
+    amplitude = np.array([0.5 * np.ptp(motion.values(dofs, along, begin + ratio * along), axis=0) for begin in begins])
     size = np.sum(np.abs(motion.coefficients[1:, dofs]) ** 2, axis=0)
     return Envelope(begins, amplitude, np.sqrt(0.5 * size))

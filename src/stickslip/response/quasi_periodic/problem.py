@@ -10,12 +10,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import driven_by, judging_indices
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.torus import (
-    MOST_UNKNOWNS,
-    TorusBalance,
-    TorusLinearisation,
-    torus_balance,
-)
+from stickslip.harmonic.torus import MOST_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
 from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.harmonic.torus_side import TorusSide
 from stickslip.harmonic.travelling import condense_side
@@ -31,9 +26,7 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 
 LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
 MOST_RAISES = 6
-FAINT = (
-    0.01  # of the coordinate that moves most: the change of one that moves less counts against that
-)
+FAINT = 0.01  # of the coordinate that moves most: the change of one that moves less counts against that
 STEP_LEAVES = 1e-4  # of that step's right side, where a Krylov method solves for it
 STEP_MORE = 40  # combined frequencies more in the Newton step that says how far off a motion is
 BEYOND = 4  # sums of harmonics above the largest, that are looked at but not taken
@@ -73,17 +66,21 @@ class TwoTones:
         """Return how the torus is sampled."""
         return closed_path(ratio, self.balance.order, refine)
 
-    def motion(
-        self, x: FloatArray, omegas: tuple[float, float], solution: Solution, path: TorusPath
-    ) -> TorusMotion:
+    def motion(self, x: FloatArray, omegas: tuple[float, float], solution: Solution, path: TorusPath) -> TorusMotion:
         """Return what unknowns are."""
         balance = self.balance
         full = balance.side.recover(balance.indices, omegas, balance.coefficients(x))
         return TorusMotion(
-            balance.indices, omegas, full, x, solution.status, solution.iterations,
-            solution.residual_norm, path.slip(omegas[1] / omegas[0]),
+            balance.indices,
+            omegas,
+            full,
+            x,
+            solution.status,
+            solution.iterations,
+            solution.residual_norm,
+            path.slip(omegas[1] / omegas[0]),
             balance.forces(x, omegas, path).unsettled,
-        )  # fmt: skip
+        )
 
     def stuck(self, omegas: tuple[float, float]) -> FloatArray:
         """Return the unknowns of the motion with all contacts stuck about the static state."""
@@ -94,19 +91,14 @@ class TwoTones:
         stiffness, _ = side.stiffness(balance.indices, omegas)
         load, _, _ = side.load(balance.indices, omegas)
         q = np.zeros((len(balance.indices), side.n), dtype=complex)
-        q[0, np.searchsorted(side.first.retained, self.system.retained)] = preload(
-            self.system, side.first.load.static
-        )
+        q[0, np.searchsorted(side.first.retained, self.system.retained)] = preload(self.system, side.first.load.static)
         for place in range(1, len(q)):
             if np.any(load[place]):
                 q[place] = np.linalg.solve(stiffness[place] + springs, load[place])
         return balance.unknowns(q)
 
     def solve(
-        self,
-        omegas: tuple[float, float],
-        start: FloatArray | None = None,
-        path: TorusPath | None = None,
+        self, omegas: tuple[float, float], start: FloatArray | None = None, path: TorusPath | None = None
     ) -> TorusMotion:
         """Return the motion at two frequencies, rad/s.
 
@@ -227,12 +219,7 @@ def torus_side(
 
     still = {k: travelling(k, zero) for k in range(structure.sectors)}
     own = waves[0] % structure.sectors, waves[1] % structure.sectors
-    return TorusSide(
-        travelling(own[0], first),
-        travelling(own[1], second),
-        still,
-        (own[0], own[1], structure.sectors),
-    )
+    return TorusSide(travelling(own[0], first), travelling(own[1], second), still, (own[0], own[1], structure.sectors))
 
 
 def check_frequencies(omegas: tuple[float, float]) -> None:
@@ -249,11 +236,7 @@ Solving = Callable[[TwoTones, FloatArray, TorusPath], TorusMotion]
 
 
 def with_enough(
-    problem: TwoTones,
-    motion: TorusMotion,
-    most: int,
-    tolerance: float,
-    solve: Solving,
+    problem: TwoTones, motion: TorusMotion, most: int, tolerance: float, solve: Solving
 ) -> tuple[TwoTones, TorusMotion]:
     """Add combined frequencies until those left out would change the motion by less than `tolerance`.
 
@@ -315,9 +298,7 @@ def with_enough(
     return problem, motion
 
 
-def off_by(
-    problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]
-) -> float:
+def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]) -> float:
     """Return by how much a Newton step with more combined frequencies changes a motion: root mean square over that of the motion, of the coordinate that it changes most.
 
     Parameters
@@ -346,12 +327,10 @@ def off_by(
     return float(np.max(change / np.maximum(size, FAINT * np.max(size))))
 
 
-def _with_free_tone(
-    balance: TorusBalance, x: FloatArray, at: TorusLinearisation
-) -> tuple[Bordered, FloatArray]:
+def _with_free_tone(balance: TorusBalance, x: FloatArray, at: TorusLinearisation) -> tuple[Bordered, FloatArray]:
     """Return a Jacobian and residual with the second frequency among the unknowns, and no step along the phase of the second tone."""
     own = balance.coefficients(x)
-    along = balance.unknowns(np.array([1j * k * row for (_, k), row in zip(balance.indices, own, strict=True)]))  # fmt: skip
+    along = balance.unknowns(np.array([1j * k * row for (_, k), row in zip(balance.indices, own, strict=True)]))
     return Bordered(at.jac, at.by_second, along, 0.0), np.append(at.residual, 0.0)
 
 

@@ -9,9 +9,7 @@ from stickslip.arrays import ComplexArray
 REAL = 1e-6  # rad: an angle that is smaller, or nearer to π, is none of a second frequency
 
 
-def tones_of_multipliers(
-    multipliers: ComplexArray, omega: float, highest: int, count: int = 1
-) -> list[float]:
+def tones_of_multipliers(multipliers: ComplexArray, omega: float, highest: int, count: int = 1) -> list[float]:
     """Return the frequencies (rad/s) of the disturbances that grow most, each beside every harmonic of the motion.
 
     Parameters

@@ -96,9 +96,7 @@ class _Evaluation:
 
 
 @by_one_thread
-def forced_motion(
-    problem: TwoTones, omega: float, start: ComplexArray | None = None
-) -> TorusMotion:
+def forced_motion(problem: TwoTones, omega: float, start: ComplexArray | None = None) -> TorusMotion:
     """Return the periodic motion under the first load alone, as a motion of two frequencies of which the second takes no part.
 
     Parameters
@@ -151,7 +149,7 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
         share = float(np.linalg.norm(own) / np.linalg.norm(motion))
         turned = _turned(balance.indices, motion, own[position])
         shape = balance.unknowns(turned / np.abs(own[position]))
-        found.append(Beginning(problem, omegas, x, shape, position, float(sizes[-1] / sizes[0]), share))  # fmt: skip
+        found.append(Beginning(problem, omegas, x, shape, position, float(sizes[-1] / sizes[0]), share))
     return sorted(found, key=lambda b: (-round(b.share, 2), b.defect))
 
 
@@ -195,9 +193,7 @@ def second_tone(beginning: Beginning) -> TorusMotion | None:
     return None
 
 
-def _between(
-    beginning: Beginning, below: ToneOfAmplitude, above: ToneOfAmplitude
-) -> TorusMotion | None:
+def _between(beginning: Beginning, below: ToneOfAmplitude, above: ToneOfAmplitude) -> TorusMotion | None:
     """Return the motion without a level between two amplitudes, the interval halved as long as Newton's method does not find it."""
     for _ in range(HALVINGS):
         share = below.ratio / (below.ratio - above.ratio)
@@ -223,10 +219,7 @@ def _between(
 
 @by_one_thread
 def solve_free(
-    problem: TwoTones,
-    x: FloatArray,
-    omegas: tuple[float, float],
-    path: TorusPath | None = None,
+    problem: TwoTones, x: FloatArray, omegas: tuple[float, float], path: TorusPath | None = None
 ) -> TorusMotion:
     """Return the motion with an unknown second frequency; the phase of the second tone is that of the start.
 
@@ -314,9 +307,7 @@ def _told(beginning: Beginning, amplitude: float, solution: Solution) -> ToneOfA
     return ToneOfAmplitude(amplitude, omega, ratio, solution.x[:-2], solution.status.converged)
 
 
-def _guess(
-    before: tuple[float, FloatArray] | None, last: tuple[float, FloatArray], amplitude: float
-) -> FloatArray:
+def _guess(before: tuple[float, FloatArray] | None, last: tuple[float, FloatArray], amplitude: float) -> FloatArray:
     """Continue the line through two points; through one the second tone alone grows by as much as the amplitude does."""
     if before is None:
         return last[1]
@@ -330,9 +321,7 @@ def _of_second(problem: TwoTones) -> BoolArray:
     return np.repeat([False, *rows], problem.balance.side.n)
 
 
-def _turned(
-    indices: Sequence[tuple[int, int]], motion: ComplexArray, along: complex
-) -> ComplexArray:
+def _turned(indices: Sequence[tuple[int, int]], motion: ComplexArray, along: complex) -> ComplexArray:
     """Return a motion with the second phase begun where `along`, a coefficient of (0, 1), is real and positive."""
     angle = float(np.angle(along))
     turns = np.array([np.exp(-1j * k * angle) for _, k in indices])

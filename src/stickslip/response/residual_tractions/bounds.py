@@ -110,13 +110,9 @@ class _Setup:
 
     def reference(self, omega: float, near: Sequence[FloatArray]) -> TractionState:
         """Solve from the model's own start."""
-        solution = without_branch(
-            self.system, self.given, self.problem.newton, omega, near, 0.0 if near else 1.0
-        )
+        solution = without_branch(self.system, self.given, self.problem.newton, omega, near, 0.0 if near else 1.0)
         if not solution.status.converged:
-            raise SingularError(
-                f"residual tractions: no motion at {omega:.6g} rad/s: {solution.status.advice}"
-            )
+            raise SingularError(f"residual tractions: no motion at {omega:.6g} rad/s: {solution.status.advice}")
         return self._state(solution.x, omega)
 
     def others(self, omega: float, reference: TractionState) -> list[TractionState]:
@@ -144,7 +140,7 @@ class _Setup:
 
 
 def _own_sliders(starts: Starts) -> FloatArray:
-    return np.array([getattr(law, "slider", None) or (0.0, 0.0) for law in starts.given.laws]).reshape(-1, 2)  # fmt: skip
+    return np.array([getattr(law, "slider", None) or (0.0, 0.0) for law in starts.given.laws]).reshape(-1, 2)
 
 
 @by_one_thread
@@ -241,7 +237,7 @@ def resonance_bounds(
     """
     known = [b for b in known if b.converged]
     if not known:
-        raise input_error("known", "holds no bounds that converged", "Give those of `traction_bounds`.")  # fmt: skip
+        raise input_error("known", "holds no bounds that converged", "Give those of `traction_bounds`.")
     heights = [getattr(b, end).amplitude for b in known]
     top = int(np.argmax(heights))
     if top in (0, len(known) - 1):
@@ -259,9 +255,8 @@ def resonance_bounds(
 
     limits = known[top - 1].omega, known[top + 1].omega
     scipy.optimize.minimize_scalar(
-        depth, bounds=limits, method="bounded",
-        options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS},
-    )  # fmt: skip
+        depth, bounds=limits, method="bounded", options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS}
+    )
     for omega in _highest(setup, *limits):  # a bound that ends at a fold has a jump there
         depth(omega)
     best = max(found.values(), key=lambda e: float(getattr(e, end).amplitude))
@@ -271,15 +266,11 @@ def resonance_bounds(
 
 
 def _setup(
-    system: System,
-    load: HarmonicLoad,
-    omegas: Sequence[float],
-    output: int,
-    discretisation: Discretisation | None,
+    system: System, load: HarmonicLoad, omegas: Sequence[float], output: int, discretisation: Discretisation | None
 ) -> _Setup:
     how = discretisation or Discretisation()
     if not (len(omegas) and all(0.0 < w < np.inf for w in omegas)):
-        raise input_error("omegas", f"are {list(omegas)[:3]}", "Give frequencies above zero, rad/s.")  # fmt: skip
+        raise input_error("omegas", f"are {list(omegas)[:3]}", "Give frequencies above zero, rad/s.")
     if not 0 <= output < system.outputs.size:
         have = system.outputs.size
         raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")
@@ -291,16 +282,10 @@ def _setup(
         for interface in (starts.interface, starts.given)
     )
     driven = Driven(int(np.searchsorted(linear.retained, dof)), driven_by(load)[0])
-    return _Setup(
-        replace(system, interface=starts.given),
-        TractionProblem(free, starts, driven, how.newton),
-        given,
-    )
+    return _Setup(replace(system, interface=starts.given), TractionProblem(free, starts, driven, how.newton), given)
 
 
-def _at(
-    setup: _Setup, omega: float, search: TractionSearch | None, *beside: Extremes | None
-) -> Extremes:
+def _at(setup: _Setup, omega: float, search: TractionSearch | None, *beside: Extremes | None) -> Extremes:
     near = [b for b in beside if b is not None]
     reference = setup.reference(omega, [b.reference.x for b in near])
     more = [s.inside() for b in near for s in (b.least, b.most)]
@@ -331,7 +316,7 @@ def _again(setup: _Setup, bounds: TractionBounds) -> Extremes:
 
     def state(bound: Bound) -> TractionState:
         x = balance.unknowns(bound.coefficients[:, balance.linear.retained])
-        found = newton(lambda v: setup.problem.at(bound.sliders).linearise(v, bounds.omega), x, setup.problem.newton)  # fmt: skip
+        found = newton(lambda v: setup.problem.at(bound.sliders).linearise(v, bounds.omega), x, setup.problem.newton)
         return TractionState(setup.problem, bounds.omega, bound.sliders, found.x)
 
     return Extremes(state(bounds.reference), state(bounds.least), state(bounds.most))
@@ -341,9 +326,7 @@ def _bounds(setup: _Setup, found: Extremes) -> TractionBounds:
     spent, names = setup.problem.spent, setup.problem.starts.interface.names
     reference, least, most = map(_bound, (found.reference, found.least, found.most))
     omega = found.reference.omega
-    made = TractionBounds(
-        omega, reference, least, most, names, spent.solves, spent.failures, found.branches
-    )
+    made = TractionBounds(omega, reference, least, most, names, spent.solves, spent.failures, found.branches)
     spent.solves = spent.failures = 0
     return made
 

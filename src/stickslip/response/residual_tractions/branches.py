@@ -43,14 +43,11 @@ def both_ways(
     """Return the branches from below the frequencies upward and from above them downward."""
     low, high = min(omegas) / WIDER, max(omegas) * WIDER
     points = POINTS + 2 * (len(omegas) - 1)
-    return [plain_sweep(system, balance, way, points, options) for way in ((low, high), (high, low))]  # fmt: skip
+    return [plain_sweep(system, balance, way, points, options) for way in ((low, high), (high, low))]
 
 
 def crossings(
-    branches: Sequence[Sequence[Followed]],
-    balance: HarmonicBalance,
-    omega: float,
-    options: Newton,
+    branches: Sequence[Sequence[Followed]], balance: HarmonicBalance, omega: float, options: Newton
 ) -> Iterator[FloatArray]:
     """Yield the unknowns of every motion in which a branch passes a frequency; the same one as often as it is met."""
     for branch in branches:

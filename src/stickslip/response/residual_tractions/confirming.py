@@ -79,7 +79,9 @@ def confirmed(
     balance = harmonic_balance(linear, interface, how.order, max(how.samples, SAMPLES), "march")
     start = balance.unknowns(bound.coefficients[:, linear.retained])
     # near an event a march has steps, between which no residual is as small as Newton's method asks for
-    found = newton(lambda x: balance.linearise(x, omega), start, replace(how.newton, tolerance=max(how.newton.tolerance, 1e-8)))  # fmt: skip
+    found = newton(
+        lambda x: balance.linearise(x, omega), start, replace(how.newton, tolerance=max(how.newton.tolerance, 1e-8))
+    )
     driven = list(driven_by(load)[0])
     motion = linear.recover(omega, balance.coefficients(found.x))
     resolved = float(np.linalg.norm(motion[driven, dof[0]])) if found.status.converged else np.nan
@@ -87,11 +89,16 @@ def confirmed(
     if isinstance(system.structure, TunedWheel):
         return Confirmation(resolved, np.nan, None, 0, same)
     result = integrate(
-        one_structure(system.structure, "confirmed"), interface.gap_operator, interface.laws, load, omega, dof,
+        one_structure(system.structure, "confirmed"),
+        interface.gap_operator,
+        interface.laws,
+        load,
+        omega,
+        dof,
         start_from_harmonics(bound.coefficients, omega, interface.gap_operator, interface.laws),
         stepping or TimeStepping(max_periods=600, harmonics=max(7, *driven)),
         weights=interface.weights,
-    )  # fmt: skip
+    )
     known = result.harmonics if result.settled else result.averages
     transient = float(np.linalg.norm(known[driven, 0]))
     near = bool(abs(bound.amplitude / transient - 1.0) <= NEAR)

@@ -27,9 +27,7 @@ def in_all_discs(centres: FloatArray, radii: FloatArray) -> tuple[FloatArray, fl
     return best, depth
 
 
-def farthest_in_discs(
-    inside: FloatArray, centres: FloatArray, radii: FloatArray, slope: FloatArray
-) -> FloatArray:
+def farthest_in_discs(inside: FloatArray, centres: FloatArray, radii: FloatArray, slope: FloatArray) -> FloatArray:
     """Return the place (2,) in all discs at which ``slope · z`` is largest.
 
     Parameters

@@ -127,7 +127,10 @@ class TractionState:
         for c in np.flatnonzero(starts.planar & np.any(slope != 0.0, axis=1)):
             if np.all(room.half[c] > 0.0):
                 k = np.maximum(starts.stiffness[c], 1e-300)
-                end[c] = farthest_in_discs(room.middle[c] * k, room.centres[c] * k[:, None], room.limits[c], slope[c] / k) / k  # fmt: skip
+                end[c] = (
+                    farthest_in_discs(room.middle[c] * k, room.centres[c] * k[:, None], room.limits[c], slope[c] / k)
+                    / k
+                )
         return np.where(room.sticks & (slope != 0.0), end, room.slider)
 
     def gradient(self) -> tuple[FloatArray, float]:
@@ -187,9 +190,7 @@ class TractionProblem:
         moved[:, :2] = np.where(self.starts.stiffness > 0.0, sliders, 0.0)
         return replace(self.balance, compiled=replace(self.balance.compiled, sliders=moved))
 
-    def solved(
-        self, sliders: FloatArray, omega: float, near: Iterable[TractionState]
-    ) -> TractionState | None:
+    def solved(self, sliders: FloatArray, omega: float, near: Iterable[TractionState]) -> TractionState | None:
         """Return the motion from a start, from the first of the motions `near` that leads there; None if none does."""
         for begin in near:
             found = self._from(sliders, omega, begin, HALVINGS)
@@ -198,9 +199,7 @@ class TractionProblem:
         self.spent.failures += 1
         return None
 
-    def _from(
-        self, sliders: FloatArray, omega: float, begin: TractionState, halvings: int
-    ) -> TractionState | None:
+    def _from(self, sliders: FloatArray, omega: float, begin: TractionState, halvings: int) -> TractionState | None:
         balance = self.at(sliders)
         self.spent.solves += 1
         solution = newton(partial(balance.linearise, omega=omega), begin.x, self.newton)
@@ -225,7 +224,7 @@ def room_of(starts: Starts, period: ContactPeriod) -> Room:
     slider = sliders[:, :, 0]
     # a slider that was dragged until it is only just touched rests but for rounding, whatever state a sample is said to be in
     sticks = springs & (np.ptp(sliders, axis=2) <= RESTS * np.max(reach, axis=2))
-    sticks[starts.planar] &= np.all(sticks[starts.planar] | ~springs[starts.planar], axis=1)[:, None]  # fmt: skip
+    sticks[starts.planar] &= np.all(sticks[starts.planar] | ~springs[starts.planar], axis=1)[:, None]
     low, high = np.max(gap - reach, axis=2), np.min(gap + reach, axis=2)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for c in np.flatnonzero(starts.planar & sticks.any(axis=1)):

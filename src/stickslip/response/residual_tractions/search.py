@@ -54,9 +54,7 @@ class Extremes:
     branches: int = 1
 
 
-def extremes(
-    reference: TractionState, search: TractionSearch | None, more: Iterable[FloatArray] = ()
-) -> Extremes:
+def extremes(reference: TractionState, search: TractionSearch | None, more: Iterable[FloatArray] = ()) -> Extremes:
     """Return the extremes at the frequency of a reference motion.
 
     Parameters
@@ -74,9 +72,7 @@ def extremes(
     own = () if search is None else _starts(reference, search)
     for sliders, shares in [*given, *own]:
         begun = problem.solved(sliders, reference.omega, (reference, *seen))
-        if (
-            begun is not None and shares is not None
-        ):  # its limits are others than those of the reference
+        if begun is not None and shares is not None:  # its limits are others than those of the reference
             again = sliders_at(begun, shares)
             begun = problem.solved(again, reference.omega, (begun, reference)) or begun
         if begun is not None and not any(_same(begun, other) for other in seen):
@@ -84,7 +80,7 @@ def extremes(
     least, most = (_best(seen, sense) for sense in (-1.0, 1.0))
     low = min((_ascended(s, -1.0) for s in least), key=lambda s: s.amplitude, default=reference)
     high = max((_ascended(s, 1.0) for s in most), key=lambda s: s.amplitude, default=reference)
-    ends = [e if abs(np.log(e.amplitude / reference.amplitude)) > GAIN else reference for e in (low, high)]  # fmt: skip
+    ends = [e if abs(np.log(e.amplitude / reference.amplitude)) > GAIN else reference for e in (low, high)]
     return Extremes(reference, ends[0], ends[1])
 
 
@@ -106,9 +102,7 @@ def _same(one: TractionState, other: TractionState) -> bool:
     return bool(np.max(np.abs(one.x - other.x)) <= 1e-9 * size)
 
 
-def _starts(
-    reference: TractionState, search: TractionSearch
-) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _starts(reference: TractionState, search: TractionSearch) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield sliders and the shares of the limits at t = 0 that they stand for in the reference: all limits, corners, and random ones."""
     problem = reference.problem
     springs = problem.starts.stiffness > 0.0
@@ -167,7 +161,7 @@ def _step(state: TractionState, sense: float) -> TractionState | None:
         return None
     # what is aimed behind the end is dragged back to where the end then is; in the plane from far away it would come back elsewhere
     planar = problem.starts.planar[:, None]
-    far = np.where(planar, inner + PLANAR * (end - inner), room.middle + BEYOND * (end - room.middle))  # fmt: skip
+    far = np.where(planar, inner + PLANAR * (end - inner), room.middle + BEYOND * (end - room.middle))
     aim = np.where(slope != 0.0, far, inner)
     for share in LENGTHS:
         tried = problem.solved(inner + share * (aim - inner), state.omega, (at, state))

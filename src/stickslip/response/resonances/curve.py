@@ -26,9 +26,7 @@ MOST = 10  # multiples of the smallest number of points at which a curve ends
 
 
 @by_one_thread
-def peak_curve(
-    search: PeakSearch, span: tuple[float, float], points: int = 30, peak: int = 0
-) -> Iterator[PeakPoint]:
+def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, peak: int = 0) -> Iterator[PeakPoint]:
     """Follow the curve of a resonance peak over a design parameter by arc length, round its folds.
 
     Parameters
@@ -61,9 +59,7 @@ def peak_curve(
     found = trackers(search, first, peak + 1)
     if peak >= len(found):
         raise input_error(
-            "peak",
-            f"is {peak}, of {len(found)} in the range",
-            f"Give 0 to {len(found) - 1}, or a wider range.",
+            "peak", f"is {peak}, of {len(found)} in the range", f"Give 0 to {len(found) - 1}, or a wider range."
         )
     tracker = found[peak]
     equation = _Equation(tracker.problem, span)

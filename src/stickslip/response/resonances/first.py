@@ -67,16 +67,10 @@ class PeakSearch:
         check_choice("by", self.by, get_args(Peak))
         if not 0 <= self.output < self.system.outputs.size:
             have = self.system.outputs.size
-            raise input_error(
-                "output", f"is {self.output}, of {have} outputs", f"Give 0 to {have - 1}."
-            )
+            raise input_error("output", f"is {self.output}, of {have} outputs", f"Give 0 to {have - 1}.")
         begin, end = self.omega_range
         if not 0.0 < begin < end < np.inf:
-            raise input_error(
-                "omega_range",
-                f"must be positive and growing, got {begin} to {end} rad/s",
-                "Swap them.",
-            )
+            raise input_error("omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them.")
         if self.harmonic is not None and not 1 <= self.harmonic <= self.how.order:
             raise input_error(
                 "harmonic",
@@ -116,9 +110,7 @@ class PeakSearch:
             self.load,
             self.parameter,
             first,
-            lambda s, f: self.how.balance(
-                s, f.over_periods(self.periods), np.array([self.peaking_dof])
-            ),
+            lambda s, f: self.how.balance(s, f.over_periods(self.periods), np.array([self.peaking_dof])),
         )
 
     def problem(self, first: float) -> PeakProblem:
@@ -233,9 +225,7 @@ def _goes_over(log_omega: FloatArray, log_height: FloatArray, peak: PeakPoint) -
     return bool(np.any((low <= place) & (place <= high) & (np.abs(above - height) <= SAG)))
 
 
-def _swept(
-    search: PeakSearch, problem: PeakProblem, value: float
-) -> tuple[list[Point], ComplexArray]:
+def _swept(search: PeakSearch, problem: PeakProblem, value: float) -> tuple[list[Point], ComplexArray]:
     """Return the points of a sweep at a value of the parameter, and the motion of the output in each."""
     balance, how = problem.family(value), search.how
     changed = system_at(search.system, search.parameter, value, balance)
@@ -271,9 +261,7 @@ def _descent(heights: FloatArray, top: int, way: int) -> float:
     return float(np.min(between, initial=heights[top]))
 
 
-def _near(
-    problem: PeakProblem, points: list[Point], motions: ComplexArray, top: int
-) -> tuple[FloatArray, float]:
+def _near(problem: PeakProblem, points: list[Point], motions: ComplexArray, top: int) -> tuple[FloatArray, float]:
     """Return state and frequency near a maximum of a sweep, or near the quadrature next to it."""
     if problem.by != "phase_quadrature":
         return points[top].x, points[top].p

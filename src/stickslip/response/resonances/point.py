@@ -77,12 +77,7 @@ class PeakPoint:
 
 
 def peak_point(
-    problem: PeakProblem,
-    force: float,
-    value: float,
-    solution: Solution,
-    evaluations: int,
-    peak: int = 0,
+    problem: PeakProblem, force: float, value: float, solution: Solution, evaluations: int, peak: int = 0
 ) -> PeakPoint:
     """Return what is told of a solution of the peak problem.
 
@@ -112,17 +107,27 @@ def peak_point(
     lag = float(np.angle(driven[0] * np.exp(-1j * force)))
     motion = balance.linear.recover(omega, balance.coefficients(y[:-1]))
     return PeakPoint(
-        value, omega, amplitude, lag, amplitude * slope, curvature, put_in(balance, motion, omega), taken(balance, y[:-1], omega),
-        below, motion, solution.status, solution.iterations, evaluations, peak,
-    )  # fmt: skip
+        value,
+        omega,
+        amplitude,
+        lag,
+        amplitude * slope,
+        curvature,
+        put_in(balance, motion, omega),
+        taken(balance, y[:-1], omega),
+        below,
+        motion,
+        solution.status,
+        solution.iterations,
+        evaluations,
+        peak,
+    )
 
 
 def put_in(balance: HarmonicBalance, motion: ComplexArray, omega: float) -> float:
     """Return the work of the harmonic load over a period of the first harmonic, J, for the (order+1, n) motion of all dofs."""
     load = balance.linear.load_at(omega)
-    return float(
-        sum(-np.pi * h * np.imag(np.vdot(f, motion[h])) for h, f in load.harmonics.items())
-    )
+    return float(sum(-np.pi * h * np.imag(np.vdot(f, motion[h])) for h, f in load.harmonics.items()))
 
 
 def taken(balance: HarmonicBalance, x: FloatArray, omega: float) -> float:

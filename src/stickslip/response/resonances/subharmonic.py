@@ -105,11 +105,7 @@ def _subharmonic(balance: HarmonicBalance, x: FloatArray) -> bool:
 
 
 def _followed(
-    balance: HarmonicBalance,
-    start: Point,
-    omega_range: tuple[float, float],
-    end: float,
-    way: Following,
+    balance: HarmonicBalance, start: Point, omega_range: tuple[float, float], end: float, way: Following
 ) -> list[Point]:
     """Follow the branch until it leaves the range, closes or is no subharmonic one any more."""
     found: list[Point] = []

@@ -35,9 +35,7 @@ class Tracker:
     evaluations: int = 0
     number: int = 0
     corner: bool = False  # whether the last peak sits on a corner of the response
-    tops: list[tuple[float, float]] = field(
-        default_factory=list
-    )  # phases of the last two maxima, by variable phase
+    tops: list[tuple[float, float]] = field(default_factory=list)  # phases of the last two maxima, by variable phase
 
     def point(self, value: float) -> PeakPoint:
         """Find the peak at a value of the parameter, from those known."""

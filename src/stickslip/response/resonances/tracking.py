@@ -75,10 +75,7 @@ def track_peak(
 
 @by_one_thread
 def follow_peaks(
-    search: PeakSearch,
-    values: Sequence[float] | FloatArray,
-    most: int = 3,
-    done: Sequence[PeakPoint] = (),
+    search: PeakSearch, values: Sequence[float] | FloatArray, most: int = 3, done: Sequence[PeakPoint] = ()
 ) -> Iterator[PeakPoint]:
     """Follow several resonance peaks through the values of a design parameter, each from its own last one.
 
@@ -214,11 +211,7 @@ def smallest_peak(
     (tracker,) = trackers(asked, float(span[0]), 1)
     ends = [tracker.point(value) for value in span]
     for end in (e for e in ends if not e.status.converged):
-        raise input_error(
-            "span",
-            f"the peak at {end.value:g} was not found ({end.status.advice})",
-            "Take another end.",
-        )
+        raise input_error("span", f"the peak at {end.value:g} was not found ({end.status.advice})", "Take another end.")
     if not ends[0].slope * ends[1].slope < 0.0:
         raise input_error(
             "span",

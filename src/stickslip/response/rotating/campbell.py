@@ -85,11 +85,7 @@ class Campbell:
 
         Magnitudes; a backward wave that rotation overtakes runs forward to the observer.
         """
-        k = (
-            self.wave_number
-            if 2 * self.wave_number <= self.sectors
-            else self.wave_number - self.sectors
-        )
+        k = self.wave_number if 2 * self.wave_number <= self.sectors else self.wave_number - self.sectors
         return np.abs(self.frequencies_hz - k * self.speeds[:, None] / HZ)
 
     def engine_order_hz(self, engine_order: int) -> FloatArray:
@@ -108,9 +104,7 @@ class _Spectrum:
     agreement: FloatArray  # (c,)
 
     def take(self, index: IntArray, agreement: FloatArray) -> "_Spectrum":
-        return _Spectrum(
-            self.speed, self.hertz[index], self.shapes[:, index], self.weighted[:, index], agreement
-        )
+        return _Spectrum(self.speed, self.hertz[index], self.shapes[:, index], self.weighted[:, index], agreement)
 
 
 @dataclass(eq=False)
@@ -124,9 +118,7 @@ class _Speeds:
 
     def at(self, speed: float) -> _Spectrum:
         if speed not in self.known:
-            self.known[speed] = _spectrum(
-                self.structure_at(speed), speed, self.n_modes, self.coriolis
-            )
+            self.known[speed] = _spectrum(self.structure_at(speed), speed, self.n_modes, self.coriolis)
         return self.known[speed]
 
     def forget(self, below: float) -> None:
@@ -180,11 +172,7 @@ def campbell(
     family = _Speeds(structure_at, n_modes, coriolis)
     first = family.at(float(speeds[0]))
     if first.hertz.size < n_modes:
-        raise input_error(
-            "campbell: n_modes",
-            f"{n_modes} of a structure with {first.hertz.size}",
-            "Ask for fewer.",
-        )
+        raise input_error("campbell: n_modes", f"{n_modes} of a structure with {first.hertz.size}", "Ask for fewer.")
     here = first.take(np.arange(n_modes), np.ones(n_modes))
     rows: list[_Spectrum] = [_without_shapes(here)]
     crossings = _crossings_at(here, engine_orders)
@@ -205,11 +193,15 @@ def campbell(
     )
 
 
-def _checked(
-    speeds: Sequence[float] | FloatArray, n_modes: int, engine_orders: Sequence[int]
-) -> FloatArray:
+def _checked(speeds: Sequence[float] | FloatArray, n_modes: int, engine_orders: Sequence[int]) -> FloatArray:
     values = np.asarray(speeds, dtype=float)
-    if values.ndim != 1 or not values.size or not np.all(np.isfinite(values)) or values[0] < 0 or np.any(np.diff(values) <= 0):  # fmt: skip
+    if (
+        values.ndim != 1
+        or not values.size
+        or not np.all(np.isfinite(values))
+        or values[0] < 0
+        or np.any(np.diff(values) <= 0)
+    ):
         raise input_error(
             "campbell: speeds",
             f"must ascend from 0 or more, got {values[:6].tolist() if values.ndim else values}",
@@ -301,11 +293,7 @@ def _crossings_at(here: _Spectrum, engine_orders: Sequence[int]) -> list[Crossin
 
 
 def _crossings(
-    family: _Speeds,
-    before: _Spectrum,
-    after: _Spectrum,
-    engine_orders: Sequence[int],
-    tolerance: float,
+    family: _Speeds, before: _Spectrum, after: _Spectrum, engine_orders: Sequence[int], tolerance: float
 ) -> list[Crossing]:
     """Return the crossings in the interval between two speeds, its end included."""
     found = []

@@ -133,11 +133,7 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
         If the contacts are rigid, or a load drives a harmonic that is not kept.
     """
     if system.interface.rigid:
-        raise input_error(
-            "envelope",
-            "needs contact forces that follow from gaps",
-            "Give the contacts a stiffness.",
-        )
+        raise input_error("envelope", "needs contact forces that follow from gaps", "Give the contacts a stiffness.")
     flow = _flow(system, load, sweep)
     omega = sweep.ends[0]
     balance = flow.at(omega)
@@ -219,9 +215,7 @@ class _Flow:
             structure = side.of_harmonic(h)
             stiffness = _dense(structure.stiffness)
             if h == 0:
-                parts.append(
-                    _Condensed.one(stiffness.real + 0j, force[0], self.balance.linear.retained)
-                )
+                parts.append(_Condensed.one(stiffness.real + 0j, force[0], self.balance.linear.retained))
                 continue
             mass, damping = _dense(structure.mass), _dense(structure.damping)
             if structure.loss is not None:
@@ -239,9 +233,7 @@ class _Flow:
         factor = balance.displacement_scale / balance.force_scale
         period = balance.forces(x, omega)
         jac = factor * real_matrix(small.stiffness[harmonics])
-        add_contact_jacobian(
-            period.blocks, balance.rows.columns, balance.rows.values, n, factor, jac
-        )
+        add_contact_jacobian(period.blocks, balance.rows.columns, balance.rows.values, n, factor, jac)
         q = to_complex(x.reshape(balance.n_rows, n)) * balance.displacement_scale
         force = np.einsum("hij,hj->hi", small.stiffness[harmonics], q) - small.load[harmonics]
         rows = to_real(force)
@@ -268,9 +260,13 @@ class _Condensed:
         solved = np.linalg.solve(inside, np.column_stack([across, load[far]]))
         back = matrix[np.ix_(near, far)] @ solved
         return cls(
-            matrix[np.ix_(near, near)] - back[:, :-1], load[near] - back[:, -1],
-            solved[:, -1], solved[:, :-1], near, far,
-        )  # fmt: skip
+            matrix[np.ix_(near, near)] - back[:, :-1],
+            load[near] - back[:, -1],
+            solved[:, -1],
+            solved[:, :-1],
+            near,
+            far,
+        )
 
     @classmethod
     def of(cls, parts: list["_Condensed"]) -> "_Condensed":
@@ -295,9 +291,7 @@ class _Condensed:
 def _flow(system: System, load: HarmonicLoad, sweep: SweepInTime) -> _Flow:
     harmonics = harmonics_of(sweep.harmonics)
     linear = system.condensed(load, harmonics[-1])
-    balance = harmonic_balance(
-        linear, system.interface, harmonics, sweep.samples, sweep.evaluator, "dense"
-    )
+    balance = harmonic_balance(linear, system.interface, harmonics, sweep.samples, sweep.evaluator, "dense")
     moving = np.setdiff1d(np.arange(system.structure.n), system.structure.multipliers)
     return _Flow(system, balance, sweep, moving)
 

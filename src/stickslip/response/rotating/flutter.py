@@ -62,11 +62,7 @@ def damping_ratio(eigenvalues: ComplexArray) -> FloatArray:
 
 
 def flutter_of_wave(
-    structure: Structure,
-    feedback: Feedback,
-    n_modes: int,
-    *,
-    ratios: float | Sequence[float] = 0.0,
+    structure: Structure, feedback: Feedback, n_modes: int, *, ratios: float | Sequence[float] = 0.0
 ) -> FlutterOfWave:
     """Return the damping of the lowest modes of a wave in a flow.
 
@@ -105,9 +101,7 @@ def flutter_of_wave(
     damping = shapes.conj().T @ (structure.damping @ shapes)
     turning = (damping - damping.conj().T) / 2
     given = np.atleast_1d(np.asarray(ratios, dtype=float))
-    zeta = (
-        np.full(modes.squares.size, given[0]) if given.size == 1 else np.zeros(modes.squares.size)
-    )
+    zeta = np.full(modes.squares.size, given[0]) if given.size == 1 else np.zeros(modes.squares.size)
     if given.size > 1:
         zeta[: given.size] = given[: modes.squares.size]
     own = damping + np.diag(2 * zeta * np.sqrt(np.maximum(modes.squares, 0.0)))
@@ -121,7 +115,7 @@ def flutter_of_wave(
     frequencies, amplitudes, energy, flow, damped = zip(*found, strict=True)
     return FlutterOfWave(
         np.array(frequencies), np.array(amplitudes), np.array(energy), np.array(flow), np.array(damped)
-    )  # fmt: skip
+    )
 
 
 def _mode(
@@ -173,10 +167,7 @@ def followed_mode(
 
 
 def _nearest(
-    stiffness: ComplexArray,
-    damping: ComplexArray,
-    force: ComplexArray,
-    near: tuple[complex, ComplexArray],
+    stiffness: ComplexArray, damping: ComplexArray, force: ComplexArray, near: tuple[complex, ComplexArray]
 ) -> tuple[complex, ComplexArray]:
     """Return the eigenvalue, frequency above zero, whose shape of unit mass is most like another one."""
     n = len(stiffness)

@@ -99,7 +99,7 @@ def nodal_diameter_map(
     """
     half = sector.sectors // 2
     diameters = np.arange(half + 1) if nodal_diameters is None else np.asarray(nodal_diameters)
-    if not diameters.size or diameters.min() < 0 or diameters.max() > half or np.any(np.diff(diameters) <= 0):  # fmt: skip
+    if not diameters.size or diameters.min() < 0 or diameters.max() > half or np.any(np.diff(diameters) <= 0):
         raise input_error(
             "nodal_diameter_map: nodal_diameters",
             f"must ascend from 0 to at most {half}, got {diameters[:8].tolist()}",

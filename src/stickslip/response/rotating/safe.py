@@ -83,13 +83,9 @@ class Safe:
         What lies there may be near and is not among the points, unless the map holds all modes that there are.
         """
         top = self.speed_range[1] * (1 + self.allowed) / (2 * math.pi)
-        return tuple(
-            m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0)
-        )
+        return tuple(m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0))
 
-    def speed_line(
-        self, speed: float, engine_orders: int | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    def speed_line(self, speed: float, engine_orders: int | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the zigzag that a speed draws: nodal diameters and frequencies in Hz of engine orders 0, 1, 2, ...
 
         Parameters
@@ -154,16 +150,15 @@ def safe(
     if not 0 <= margin < math.inf:
         raise input_error("safe: margin", f"must not be negative, got {margin}", "0.05 is 5 %.")
     if growth is not None and low != high:
-        raise input_error(
-            "safe: growth",
-            f"belongs to one speed, got a range {speed}",
-            "Give the speed of the map.",
-        )
+        raise input_error("safe: growth", f"belongs to one speed, got a range {speed}", "Give the speed of the map.")
     points = [p for m in engine_orders for p in _points(frequencies, int(m), low, high, growth)]
     return Safe(
-        frequencies, (low, high), tuple(int(m) for m in engine_orders), margin,
+        frequencies,
+        (low, high),
+        tuple(int(m) for m in engine_orders),
+        margin,
         tuple(sorted(points, key=lambda p: abs(p.margin))),
-    )  # fmt: skip
+    )
 
 
 def _points(

@@ -18,19 +18,11 @@ from stickslip.response.self_excited.problem import SelfExcited, levels
 from stickslip.solve.branch import Following
 from stickslip.solve.kept import KeptFactors
 from stickslip.solve.linear import Signed
-from stickslip.solve.newton_method import (
-    GLOBALISATIONS,
-    Newton,
-    Solution,
-    first_converged,
-    newton,
-)
+from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, first_converged, newton
 from stickslip.solve.status import Status
 
 FAINT = 1e-11  # m: a gap that moves less slips nowhere
-STATIC_SHARE = (
-    1e-5  # of the static displacement: a vibration that is smaller stands in its rounding
-)
+STATIC_SHARE = 1e-5  # of the static displacement: a vibration that is smaller stands in its rounding
 NOISE = 10.0  # times what is left of the equations in the linear mode: more is a contact
 MOST_DOUBLINGS = 80
 SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
@@ -146,12 +138,7 @@ class _Sticking:
         how = problem.how.newton
         kept = KeptFactors(how.tolerance, GLOBALISATIONS[how.globalisation](), known)
         found = (
-            newton(
-                lambda y: equation.linearise(y, p),
-                near[0],
-                replace(how, max_iterations=QUICK),
-                kept,
-            )
+            newton(lambda y: equation.linearise(y, p), near[0], replace(how, max_iterations=QUICK), kept)
             if near
             else _solved(problem, equation, p, near)
         )
@@ -179,9 +166,7 @@ class _Sticking:
 
 
 @by_one_thread
-def damping_over_amplitude(
-    problem: SelfExcited, span: tuple[float, float], points: int = 30
-) -> list[AmplitudePoint]:
+def damping_over_amplitude(problem: SelfExcited, span: tuple[float, float], points: int = 30) -> list[AmplitudePoint]:
     """Follow the motions of a mode over their amplitude, with the damping of each.
 
     Parameters
@@ -193,9 +178,7 @@ def damping_over_amplitude(
     points
         Least number of points.
     """
-    return [
-        _of_point(problem, f) for f in _followed(problem, problem.over_amplitude(), span, points)
-    ]
+    return [_of_point(problem, f) for f in _followed(problem, problem.over_amplitude(), span, points)]
 
 
 @by_one_thread
@@ -231,9 +214,7 @@ def parameter_over_amplitude(
     return [replace(_of_point(problem, f), level=scale * float(f.point.x[-1])) for f in found]
 
 
-def at_amplitude(
-    problem: SelfExcited, amplitude: float, near: Sequence[FloatArray] = ()
-) -> AmplitudePoint:
+def at_amplitude(problem: SelfExcited, amplitude: float, near: Sequence[FloatArray] = ()) -> AmplitudePoint:
     """Return the motion of an amplitude (m) and its damping, from unknowns of motions that may be near or from the linear mode."""
     found = _solved(problem, problem.over_amplitude(), float(np.log(amplitude)), near)
     return _point(problem, amplitude, found)
@@ -269,9 +250,7 @@ def _followed(
     return branch_of(follow(OneLevel(equation, way, begin), route))
 
 
-def _solved(
-    problem: SelfExcited, equation: PeriodicProblem, p: float, near: Sequence[FloatArray]
-) -> Solution:
+def _solved(problem: SelfExcited, equation: PeriodicProblem, p: float, near: Sequence[FloatArray]) -> Solution:
     """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
     static = preload(problem.system, problem.load.static)
     starts = [*near, problem.guess(static, float(np.exp(p)))]

@@ -65,11 +65,7 @@ class LimitCycle:
 
 @by_one_thread
 def limit_cycles(
-    problem: SelfExcited,
-    curve: Sequence[AmplitudePoint],
-    *,
-    most_harmonics: int = 0,
-    tolerance: float = 1e-5,
+    problem: SelfExcited, curve: Sequence[AmplitudePoint], *, most_harmonics: int = 0, tolerance: float = 1e-5
 ) -> list[LimitCycle]:
     """Return the limit cycles of a mode, by growing amplitude.
 
@@ -91,9 +87,7 @@ def limit_cycles(
     return sorted(found, key=lambda c: c.amplitude)
 
 
-def crossings(
-    curve: Sequence[AmplitudePoint],
-) -> list[tuple[AmplitudePoint, AmplitudePoint]]:
+def crossings(curve: Sequence[AmplitudePoint]) -> list[tuple[AmplitudePoint, AmplitudePoint]]:
     """Return the neighbours on a curve between which the damping changes its sign."""
     known = [p for p in curve if p.converged]
     return [(a, b) for a, b in pairwise(known) if a.level * b.level <= 0.0 and a.level != b.level]
@@ -151,18 +145,12 @@ def solve_cycle(
     """
     equation = problem.limit_cycle()
     guess = np.append(start, [np.log(omega / problem.mode.omega), np.log(amplitude)])
-    options = Newton(
-        tolerance=problem.how.newton.tolerance,
-        max_iterations=60,
-        linear=problem.how.newton.linear,
-    )
+    options = Newton(tolerance=problem.how.newton.tolerance, max_iterations=60, linear=problem.how.newton.linear)
     found = newton(lambda y: equation.linearise(y, level), guess, options)
     return found.x if found.status.converged else None
 
 
-def _between(
-    problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint
-) -> LimitCycle | None:
+def _between(problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint) -> LimitCycle | None:
     """Return the cycle between two points: at once, or by less and less damping from either, since slip begins with a corner."""
     share = before.level / (before.level - after.level)
     y = before.unknowns + share * (after.unknowns - before.unknowns)
@@ -188,7 +176,7 @@ def _undamped(problem: SelfExcited, point: AmplitudePoint) -> FloatArray | None:
     left, step = 1.0, 0.5
     while step > SHORTEST:
         ahead = max(left - step, 0.0)
-        found = solve_cycle(problem, known[:-2], float(np.exp(known[-1])), problem.omega(known), ahead * level)  # fmt: skip
+        found = solve_cycle(problem, known[:-2], float(np.exp(known[-1])), problem.omega(known), ahead * level)
         if found is None or abs(found[-1] - known[-1]) > FARTHEST_STEP:
             step *= 0.5
             continue

@@ -12,12 +12,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.marcher import prepared
-from stickslip.response.time.settling import (
-    last_third,
-    overflowed,
-    period_harmonics,
-    remaining_change,
-)
+from stickslip.response.time.settling import last_third, overflowed, period_harmonics, remaining_change
 from stickslip.response.time.start import TransientStart
 
 KEPT = 32  # samples of a period that are kept
@@ -103,9 +98,7 @@ def march_periods(  # noqa: PLR0913
         What may be left of the change of the largest amplitude, relative, where the march ends before; 0: it does not.
     """
     steps = -(-steps // KEPT) * KEPT
-    marcher = prepared(
-        structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
-    )
+    marcher = prepared(structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights)
     state, record = marcher.begun(start), marcher.record()
     rows = marcher.modes.basis[outputs].T
     first: list[ComplexArray] = []
@@ -215,9 +208,7 @@ def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
     turned = np.angle(np.sum(np.conj(forward[:, :-1]) * forward[:, 1:], axis=1))
     middle = forward[:, length // 4 : -(length // 4)] / taper[length // 4 : -(length // 4)]
     size = np.abs(middle)
-    spread = (size.max(axis=1) - size.min(axis=1)) / np.maximum(
-        size.max(axis=1), np.finfo(float).tiny
-    )
+    spread = (size.max(axis=1) - size.min(axis=1)) / np.maximum(size.max(axis=1), np.finfo(float).tiny)
     period = 2.0 * np.pi / marched.omega
     return WaveHistory(
         (np.arange(count) + 0.5) * window * period,
@@ -227,9 +218,7 @@ def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
     )
 
 
-def mixed_start(
-    motions: Sequence[tuple[ComplexArray, float]], like: TransientStart
-) -> TransientStart:
+def mixed_start(motions: Sequence[tuple[ComplexArray, float]], like: TransientStart) -> TransientStart:
     """Return the sum of motions (n,) complex amplitudes and their frequencies, rad/s, at t = 0, with the states of laws of another start."""
     moved = sum((a.real for a, _ in motions), np.zeros_like(like.displacement))
     rate = sum(((1j * omega * a).real for a, omega in motions), np.zeros_like(like.velocity))

@@ -19,9 +19,7 @@ from stickslip.response.system import System
 
 WHOLE = 400  # coordinates up to which eigenvalues are those of all motions
 SPARE = 20  # undamped modes beyond twice as many as are asked for
-STILL = (
-    1e-7  # of the fastest rate: what turns more slowly creeps, or is free to move but for rounding
-)
+STILL = 1e-7  # of the fastest rate: what turns more slowly creeps, or is free to move but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +82,7 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
 
 
 def sprung_modes(
-    system: System,
-    count: int,
-    springs: FloatArray,
-    harmonic: int = 1,
-    whole: int = WHOLE,
+    system: System, count: int, springs: FloatArray, harmonic: int = 1, whole: int = WHOLE
 ) -> list[StuckMode]:
     """Return the lowest modes of the structure with linear springs in place of its contacts; see `stuck_modes`.
 
@@ -139,9 +133,7 @@ def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[M
         return shapes, rigid
     coupling = free.damping @ shapes * np.sqrt(np.maximum(modes.squares, 0.0))
     coupling = coupling + (free.stiffness - still.stiffness) @ shapes
-    shift = (
-        float(np.max(modes.squares)) * 1e-3
-    )  # a body that is free to move has a static answer, too
+    shift = float(np.max(modes.squares)) * 1e-3  # a body that is free to move has a static answer, too
     answers = np.linalg.solve(still.stiffness + shift * still.mass, coupling)
     answers = answers[:, np.any(answers != 0.0, axis=0)]
     both = np.hstack([shapes, answers / np.linalg.norm(answers, axis=0)])
@@ -191,7 +183,5 @@ def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Mat
 
 
 def _hermitian(matrix: Matrix) -> Matrix:
-    dense: FloatArray | ComplexArray = np.asarray(
-        matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
-    )
+    dense: FloatArray | ComplexArray = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
     return 0.5 * (dense + dense.conj().T)

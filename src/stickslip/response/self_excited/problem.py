@@ -148,9 +148,7 @@ class SelfExcited:
     def _by_damping(self, state: State) -> FloatArray:
         """Return the derivative of the balance by the level of damping."""
         side, setting = self.system.structure, state.setting
-        slope = setting.balance.by_mass_damping(
-            state.x, setting.omega, lambda h: side.of_harmonic(h).mass
-        )
+        slope = setting.balance.by_mass_damping(state.x, setting.omega, lambda h: side.of_harmonic(h).mass)
         return -self.mode.omega * slope
 
     def limit_cycle(self) -> PeriodicProblem:
@@ -203,9 +201,7 @@ class SelfExcited:
         return Setting(scaled, omega, np.array([omega, 0.0]))
 
     def _bordered(
-        self,
-        settings: Callable[[FloatArray, float], Setting],
-        held: tuple[Condition, ...] | None = None,
+        self, settings: Callable[[FloatArray, float], Setting], held: tuple[Condition, ...] | None = None
     ) -> PeriodicProblem:
         own = (Held(self.position, 1, 1.0), Held(self.position, 2, 0.0))
         return PeriodicProblem(settings, held or own, partial(factorised, self.how.newton.linear))
@@ -243,9 +239,7 @@ def self_excited_motions(
     """
     if system.interface.rigid:
         raise input_error(
-            f"mode {mode.number}",
-            "a contact is rigid",
-            "Give the contacts a stiffness, as elastic_coulomb.",
+            f"mode {mode.number}", "a contact is rigid", "Give the contacts a stiffness, as elastic_coulomb."
         )
     if any(np.any(f) for f in load.harmonics.values()):
         raise input_error(
@@ -264,9 +258,7 @@ def self_excited_motions(
     still = HarmonicLoad(load.static)
     linear = system.condensed(still, how.order, np.array([dof]))
     some = HarmonicLoad(still.static, {1: np.ones(still.static.size, dtype=complex)})
-    balance = harmonic_balance(
-        linear.with_load(some), system.interface, how.order, how.samples, how.evaluator
-    )
+    balance = harmonic_balance(linear.with_load(some), system.interface, how.order, how.samples, how.evaluator)
     stiffness = (mode.omega / abs(mode.shape[dof])) ** 2  # of the mode, as its coordinate feels it
     balance = replace(balance, linear=linear, displacement_scale=1.0, force_scale=stiffness)
     position = int(np.searchsorted(linear.retained, dof))
@@ -281,8 +273,4 @@ def levels(problem: SelfExcited, parameter: Parameter, first: float) -> BalanceA
         return self_excited_motions(system, load, problem.mode, problem.dof, problem.how).balance
 
     family = parameter_family(problem.system, problem.load, parameter, first, made)
-    return lambda value: replace(
-        family(value),
-        displacement_scale=own.displacement_scale,
-        force_scale=own.force_scale,
-    )
+    return lambda value: replace(family(value), displacement_scale=own.displacement_scale, force_scale=own.force_scale)

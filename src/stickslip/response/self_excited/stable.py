@@ -11,11 +11,7 @@ from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.multipliers import stability_in_time
-from stickslip.response.stability.waves import (
-    WaveDisturbance,
-    growing_wave,
-    wave_disturbances,
-)
+from stickslip.response.stability.waves import WaveDisturbance, growing_wave, wave_disturbances
 from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import all_in_time
 

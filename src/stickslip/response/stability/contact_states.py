@@ -119,9 +119,7 @@ def located_states(interface: Interface, gap_coefficients: FloatArray) -> Contac
     return contact_states(events, compiled, own, interface.n_contacts) if events.whole else None
 
 
-def contact_states(
-    events: Events, compiled: CompiledContacts, own: IntArray, n_contacts: int
-) -> ContactStates:
+def contact_states(events: Events, compiled: CompiledContacts, own: IntArray, n_contacts: int) -> ContactStates:
     """Lay the states of all contacts out over the intervals between their transitions.
 
     Parameters
@@ -186,9 +184,7 @@ def _has_slipped(spring: _Spring, row: FloatArray) -> bool:
     return bool(spring.segments[0, ANCHOR] != began)
 
 
-def _add_normal(
-    stiffness: FloatArray, events: Events, compiled: CompiledContacts, middle: FloatArray
-) -> None:
+def _add_normal(stiffness: FloatArray, events: Events, compiled: CompiledContacts, middle: FloatArray) -> None:
     """Add the normal springs of all elements where they are closed."""
     for c in range(compiled.n_contacts):
         for e in range(compiled.first[c], compiled.first[c + 1]):
@@ -206,9 +202,7 @@ def _segment_at(spring: _Spring, middle: FloatArray) -> IntArray:
     return np.searchsorted(spring.segments[:, START], middle, side="right") - 1
 
 
-def _add_tangential(
-    stiffness: FloatArray, spring: _Spring, row: FloatArray, middle: FloatArray
-) -> None:
+def _add_tangential(stiffness: FloatArray, spring: _Spring, row: FloatArray, middle: FloatArray) -> None:
     """Add one tangential spring: its stiffness where it sticks, its share of the pressure where it slips."""
     at = spring.segments[_segment_at(spring, middle)]
     c, d = spring.contact, spring.tangent

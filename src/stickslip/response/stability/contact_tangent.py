@@ -154,9 +154,7 @@ def _rests(contacts: ContactStates, contact: int, own: IntArray) -> Rests:
     by_normal = contacts.by_normal[at, slider]
     normal = np.where(by_normal != 0.0, own.size - 1, place[slider])
     total_length = np.array([row[2] for row in found], dtype=float)
-    return Rests(
-        place[slider], normal, by_normal, contacts.springs[slider], contacts.times[at], total_length
-    )
+    return Rests(place[slider], normal, by_normal, contacts.springs[slider], contacts.times[at], total_length)
 
 
 def _lasting(z: ComplexArray, length: FloatArray) -> ComplexArray:

@@ -63,9 +63,7 @@ class Course:
         yield from (range(a, b) for a, b in pairwise(ends) if a < b)
 
 
-def course_of(
-    problem: ForcedProblem, points: Sequence[ForcedPoint], along: int, jumps: Sequence[int]
-) -> Course:
+def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int, jumps: Sequence[int]) -> Course:
     """Return the course of a response.
 
     Parameters
@@ -99,9 +97,7 @@ def course_of(
     chosen = [points[i] for i in order]
     sign = np.array([sign_of(problem, p) for p in chosen], dtype=float)
     folds = np.array(fold, dtype=bool) | (sign[1:] * sign[:-1] < 0.0)
-    return Course(
-        tuple(order), sign, tuple(cycle_of(problem, p) for p in chosen), folds, np.array(cut, dtype=bool)
-    )  # fmt: skip
+    return Course(tuple(order), sign, tuple(cycle_of(problem, p) for p in chosen), folds, np.array(cut, dtype=bool))
 
 
 def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
@@ -120,9 +116,7 @@ def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
     return np.nan
 
 
-def _inserted(
-    points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]
-) -> dict[int, list[int]]:
+def _inserted(points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]) -> dict[int, list[int]]:
     """Return the points that lie within each step of a branch: where they make its way the least longer."""
     if not others:
         return {}

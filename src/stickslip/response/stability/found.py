@@ -10,9 +10,7 @@ from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
 
 ROUGH = 0.5  # error of a multiplier, relative to it, beyond which it shows no growth
-NEUTRAL = (
-    1e-3  # change of a disturbance in a period, relative to it, that is neither growth nor decay
-)
+NEUTRAL = 1e-3  # change of a disturbance in a period, relative to it, that is neither growth nor decay
 TURNED = 0.1  # part of a multiplier's change along its circle that counts for its modulus
 CLEAR = 2.0  # times that change, from the real axis: a pair that is nearer may meet there and part
 
@@ -144,9 +142,7 @@ class Stability:
     def _decisive(self) -> tuple[float, float]:
         """Modulus and error of the largest multiplier among those that make the verdict what it is."""
         size, errors = self._judged
-        of_verdict = next(
-            (own for own in (self._outside, self._reaching) if np.any(own)), size >= 0.0
-        )
+        of_verdict = next((own for own in (self._outside, self._reaching) if np.any(own)), size >= 0.0)
         if not np.any(of_verdict):
             unknown = np.any(np.isnan(size))
             return (np.nan, np.inf) if unknown else (0.0, 0.0)

@@ -14,11 +14,7 @@ from stickslip.harmonic.fourier import to_real
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.contact_states import (
-    ContactStates,
-    is_located,
-    located_states,
-)
+from stickslip.response.stability.contact_states import ContactStates, is_located, located_states
 from stickslip.response.stability.contact_tangent import contact_tangents
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.hill_modes import HillSide
@@ -37,10 +33,7 @@ MUCH = 700  # rows up to which their number is doubled where those beyond matter
 CHEAP = 400  # rows up to which harmonics are added until every mode rings in one
 SMALL = 700  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
 ABOVE = 3e-4  # of a multiplier: what modes may do that ring above all harmonics that are solved; measured: 9e-5
-DECIDING, CLOSE = (
-    -0.03,
-    3e-3,
-)  # real part of exponents that decide; what harmonics beyond may change in these
+DECIDING, CLOSE = (-0.03, 3e-3)  # real part of exponents that decide; what harmonics beyond may change in these
 FURTHER_MOTIONS = 2  # with more harmonics, where a verdict stays open
 COMPARED = 3  # of them, those that grow most,
 NEAR = 0.95  # and the others count with the largest change of those that are as near to the largest one, or farther from it
@@ -81,9 +74,7 @@ class HillStability:
 
 
 @by_one_thread
-def hill_stability(
-    problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept
-) -> HillStability:
+def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept) -> HillStability:
     """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
 
     As in `stability`, the multipliers are those of the motion with more harmonics, and what these change is part of their errors. Structural damping
@@ -123,22 +114,12 @@ def hill_stability(
     if first.missing or more is None or better is point:
         return first
     return _climbed(
-        problem,
-        replace(point, coefficients=better.coefficients, harmonics=better.harmonics),
-        hill,
-        found,
-        first,
-        keep,
+        problem, replace(point, coefficients=better.coefficients, harmonics=better.harmonics), hill, found, first, keep
     )
 
 
 def _climbed(
-    problem: ForcedProblem,
-    point: ForcedPoint,
-    hill: Hill,
-    found: Exponents,
-    first: HillStability,
-    keep: Keep,
+    problem: ForcedProblem, point: ForcedPoint, hill: Hill, found: Exponents, first: HillStability, keep: Keep
 ) -> HillStability:
     """Return what the motion with about twice the harmonics says, and the one with twice these, where the first leaves the verdict open."""
     system, best = problem.system.at(point.omega), first
@@ -154,9 +135,7 @@ def _climbed(
 
 
 @by_one_thread
-def hill_exponents(
-    system: System, gaps: ComplexArray, omega: float, order: int | None = None
-) -> Exponents:
+def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int | None = None) -> Exponents:
     """Return the Floquet exponents near the imaginary axis and right of it of a motion as it is given.
 
     Parameters
@@ -200,11 +179,7 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
 
 
 def _of_point(
-    system: System,
-    problem: ForcedProblem,
-    point: ForcedPoint,
-    order: int | None = None,
-    keep: Keep = not_kept,
+    system: System, problem: ForcedProblem, point: ForcedPoint, order: int | None = None, keep: Keep = not_kept
 ) -> tuple[Hill | None, ContactStates | None]:
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
     hill, states = _prepared(system, gaps, point.omega, order)
@@ -283,9 +258,7 @@ def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
     return np.asarray(out)
 
 
-def _judged(
-    found: Exponents, change: FloatArray, states: ContactStates, hill: Hill
-) -> HillStability:
+def _judged(found: Exponents, change: FloatArray, states: ContactStates, hill: Hill) -> HillStability:
     values = found.multipliers
     errors = change + 2.0 * np.pi * np.abs(values) * found.errors
     ratios = hill.side.modes(0, 0).ratios

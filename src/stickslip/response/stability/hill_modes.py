@@ -17,9 +17,7 @@ from stickslip.reduction.nodal import own_motions
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.system import System
 
-RAISED = (
-    8  # times that the mass is weighted four times as much, until it makes the stiffness definite
-)
+RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
 COUPLED = 1e-9  # of the largest entry: what couples modes less does not
 
 
@@ -112,9 +110,7 @@ def hill_modes(
     feedback
         Aerodynamic force, of which the structure holds the frozen form; None for none.
     """
-    m, c, k, rows = (
-        _dense(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator)
-    )
+    m, c, k, rows = (_dense(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator))
     k = k + rows.T @ (springs[:, None] * rows)
     loss = np.zeros_like(k) if structure.loss is None else _dense(structure.loss)
     even, mass = 0.5 * (k + k.conj().T), 0.5 * (m + m.conj().T)
@@ -144,7 +140,7 @@ def hill_modes(
     damping, rest, lossy = parts
     return HillModes(
         1.0 - shift * values, omega**2 * values, damping, rest, lossy, held, rows[ports] @ basis, omega, own
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)

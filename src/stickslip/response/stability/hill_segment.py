@@ -24,10 +24,7 @@ AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode doe
 FARTHER = (1.0, 2.0, 4.0, 8.0)
 SMOOTH = 1e-4  # of its largest term: the last one of a polynomial that is near the matrix
 MOST_RINGING = 400  # modes of all harmonics together
-TAIL, MOST_TAIL = (
-    3,
-    60,
-)  # times the harmonics that are solved: up to which those beyond act, and so many at most
+TAIL, MOST_TAIL = (3, 60)  # times the harmonics that are solved: up to which those beyond act, and so many at most
 HALF = 0.5  # frequency of the motion: length of a segment
 Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
@@ -154,10 +151,7 @@ class Segment:
         place = f"wave {self.wave}, {self.low} + {self.growth}, {self.away}, H = {self.hill.order}"
         kept = self.hill.keep(place, self._matrices)
         names = [f.name for f in fields(Node)]
-        return [
-            Node(**dict(zip(names, own, strict=True)))
-            for own in zip(*(kept[name] for name in names), strict=True)
-        ]
+        return [Node(**dict(zip(names, own, strict=True))) for own in zip(*(kept[name] for name in names), strict=True)]
 
     def _matrices(self) -> dict[str, Any]:
         """Return the matrices of all nodes by their names in `Node`."""
@@ -208,9 +202,7 @@ class Segment:
         swaps = np.pi * np.count_nonzero(factors[1] != np.arange(k * m))
         return Node(whole + change, change, alone, float(turns + swaps))
 
-    def _beyond(
-        self, sigma: complex, core: IntArray, tail: IntArray, gaps: ComplexArray
-    ) -> ComplexArray:
+    def _beyond(self, sigma: complex, core: IntArray, tail: IntArray, gaps: ComplexArray) -> ComplexArray:
         """Return the change of the forces (k m, s) by harmonics beyond those that are solved."""
         k, m = core.size, self.hill.side.ports.size
         there = [t.matrix(sigma, tail, core) for t in self.hill.tangents]
@@ -225,9 +217,7 @@ class Segment:
             answer[i] = -_receptance(modes, sigma + 1j * h, away) @ forces[i]
         return self._felt(back, answer.reshape(tail.size * m, -1), tail.size, k)
 
-    def _felt(
-        self, matrices: Sequence[ComplexArray], gaps: ComplexArray, before: int, after: int
-    ) -> ComplexArray:
+    def _felt(self, matrices: Sequence[ComplexArray], gaps: ComplexArray, before: int, after: int) -> ComplexArray:
         """Return the forces (after m, s) by the gaps (before m, s), contact by contact."""
         m = self.hill.side.ports.size
         given = gaps.reshape(before, m, -1)
@@ -288,12 +278,7 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
         small = np.eye(len(held)) - z * (Y_r @ scaled)
         solved = solved + z * (scaled @ np.linalg.solve(small, Y_r @ solved))
     answer, follows = solved[:, : len(B)], solved[:, len(B) :]
-    return _Part(
-        inner - across @ follows,
-        B_s - B_r @ follows,
-        B_s.conj().T - across @ answer,
-        B_r @ answer,
-    )
+    return _Part(inner - across @ follows, B_s - B_r @ follows, B_s.conj().T - across @ answer, B_r @ answer)
 
 
 def _receptance(modes: HillModes, z: complex, away: BoolArray) -> ComplexArray:

@@ -93,7 +93,7 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
 
 def _confirmed(parts: list[Part]) -> list[Part]:
     """Return the parts with no exponent right of the axis but that which grows most among those that more harmonics confirm."""
-    growing = [(i, int(j)) for i, p in enumerate(parts) for j in np.flatnonzero(p.values.real > ON_AXIS)]  # fmt: skip
+    growing = [(i, int(j)) for i, p in enumerate(parts) for j in np.flatnonzero(p.values.real > ON_AXIS)]
     growing.sort(key=lambda at: -parts[at[0]].values[at[1]].real)
     out = [p.taken(p.values.real <= ON_AXIS) for p in parts]
     for i, j in growing[:TRIES]:
@@ -175,12 +175,7 @@ def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
         values.append(value)
         errors.append(abs(np.vdot(left, change @ right) / slope))
         most.append(harmonic[np.argmax(np.abs(right))])
-    return Part(
-        segment,
-        np.array(values, dtype=complex),
-        np.array(errors, dtype=float),
-        np.array(most, dtype=np.int64),
-    )
+    return Part(segment, np.array(values, dtype=complex), np.array(errors, dtype=float), np.array(most, dtype=np.int64))
 
 
 def _solved(

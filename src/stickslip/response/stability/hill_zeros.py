@@ -17,9 +17,7 @@ CLOSE = 1e-9  # change of a zero that ends it
 NUDGE = 1e-9  # beside a zero, where the matrix can be solved
 OUTSIDE = 1.5  # squared size of the ellipse beyond which the integral shows nothing
 FAR = 0.05  # a zero that Newton's method moves farther was none
-LARGEST_TURN = (
-    2.0  # rad between two values of a determinant, beyond which its turns are not counted
-)
+LARGEST_TURN = 2.0  # rad between two values of a determinant, beyond which its turns are not counted
 
 Matrix = Callable[[ComplexArray], ComplexArray]  # (k,) exponents -> (k, s, s)
 
@@ -79,18 +77,10 @@ def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high
     starts, vectors = centre + starts[beside], (u @ vectors)[:, beside].T
     if not starts.size:
         return Zeros(starts, none, none, starts, scale)
-    return _polished(
-        lambda x: matrix(x) / scale, lambda x: slope(x) / scale, starts, vectors, scale
-    )
+    return _polished(lambda x: matrix(x) / scale, lambda x: slope(x) / scale, starts, vectors, scale)
 
 
-def _polished(
-    matrix: Matrix,
-    slope: Matrix,
-    starts: ComplexArray,
-    vectors: ComplexArray,
-    scale: FloatArray,
-) -> Zeros:
+def _polished(matrix: Matrix, slope: Matrix, starts: ComplexArray, vectors: ComplexArray, scale: FloatArray) -> Zeros:
     """Return the zeros next to starts by inverse iteration, those that it does not find being left out."""
     now, right = starts.astype(complex), vectors.copy()
     change = np.full_like(now, np.inf)

@@ -37,13 +37,7 @@ def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list
 class _Kicks:
     """Sampled contacts: their states, and what their forces do to the motion."""
 
-    def __init__(
-        self,
-        modes: ModalStates,
-        tangents: SampledTangents,
-        weights: FloatArray,
-        size: int,
-    ) -> None:
+    def __init__(self, modes: ModalStates, tangents: SampledTangents, weights: FloatArray, size: int) -> None:
         n, most = tangents.kept.shape
         self.modes, self.jac = modes, tangents.jac
         self.by_rate = np.any(tangents.jac[:, :, :, 3:6] != 0.0, axis=(1, 2, 3))
@@ -97,9 +91,7 @@ def decayed(x: FloatArray) -> FloatArray:
     halvings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(x, 1)), 1e-9)))) + 2)
     part, one = x / 2**halvings, np.eye(len(x))
     square = part @ part
-    out = np.linalg.solve(
-        one + 0.5 * part + 0.1 * square + part @ square / 120.0, one + square / 60.0
-    )
+    out = np.linalg.solve(one + 0.5 * part + 0.1 * square + part @ square / 120.0, one + square / 60.0)
     for _ in range(halvings):
         out -= 0.5 * out @ part @ out
         part = 2.0 * part
@@ -107,11 +99,7 @@ def decayed(x: FloatArray) -> FloatArray:
 
 
 def sampled_monodromy(
-    modes: ModalStates,
-    contacts: ContactStates,
-    times: list[FloatArray],
-    tangents: SampledTangents,
-    weights: FloatArray,
+    modes: ModalStates, contacts: ContactStates, times: list[FloatArray], tangents: SampledTangents, weights: FloatArray
 ) -> FloatArray:
     """Return the derivative of all states after a period by those before.
 

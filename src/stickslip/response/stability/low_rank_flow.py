@@ -39,9 +39,7 @@ class Flow(Protocol):
     out: FloatArray  # (2n, 2n) and back
     gaps: FloatArray  # (3 n_contacts, k) gaps of the first k coordinates
 
-    def advance(
-        self, interval: int, length: float, states: FloatArray, sliders: FloatArray
-    ) -> FloatArray:
+    def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
         """Return what becomes of the states (2n, k) after `length` within an interval, all sliders (n_sliders, k) being where they are."""
         ...
 
@@ -56,9 +54,7 @@ class FullFlow:
         self.gaps: FloatArray = modes.gaps
         self.pull: FloatArray = modes.pull(modes.gaps[contacts.rows]) * contacts.springs
 
-    def advance(
-        self, interval: int, length: float, states: FloatArray, sliders: FloatArray
-    ) -> FloatArray:
+    def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
         """Propagate by the exponential of the interval's matrix."""
         stuck = self.contacts.sticks[interval]
         matrix = self.modes.matrix(self.contacts.stiffness[interval])
@@ -85,9 +81,7 @@ class LowRankFlow:
         self.rooms = [np.empty(0)] * 4
         self.probe = np.cos(np.arange(2.0 * n) ** 2)
 
-    def advance(
-        self, interval: int, length: float, states: FloatArray, sliders: FloatArray
-    ) -> FloatArray:
+    def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
         """Propagate by eigenvalues where the contacts are in the base's state, else by the exponential that thin matrices make."""
         if length == 0.0:  # two changes of state at one time
             return states
@@ -106,9 +100,7 @@ class LowRankFlow:
                     driven += exponential @ driven
                     exponential = exponential @ exponential
                 return np.asarray(exponential @ states + driven @ sliders[stuck])
-        return np.asarray(
-            self.into @ self.full.advance(interval, length, self.out @ states, sliders)
-        )
+        return np.asarray(self.into @ self.full.advance(interval, length, self.out @ states, sliders))
 
     @property
     def condition(self) -> float:
@@ -167,9 +159,7 @@ class LowRankFlow:
         inverse = 1.0 / (off * off + self.turn * self.turn)
         return off * inverse, np.asarray(self.turn * inverse, dtype=complex)
 
-    def _spread(
-        self, place: int, own: ComplexArray, cross: ComplexArray, rows: FloatArray
-    ) -> FloatArray:
+    def _spread(self, place: int, own: ComplexArray, cross: ComplexArray, rows: FloatArray) -> FloatArray:
         """Return (nodes, 2 r, 2n) the real parts of a resolvent's products with rows (r, 2n), and their imaginary parts."""
         shape = (len(own), 2, *rows.shape)
         out, more = self._room(place, shape), self._room(3, shape)
@@ -185,21 +175,14 @@ class LowRankFlow:
             self.rooms[place] = np.empty(size)
         return self.rooms[place][:size].reshape(shape)
 
-    def _small(
-        self, own: ComplexArray, cross: ComplexArray, columns: FloatArray, rows: FloatArray
-    ) -> ComplexArray:
+    def _small(self, own: ComplexArray, cross: ComplexArray, columns: FloatArray, rows: FloatArray) -> ComplexArray:
         """Return (nodes, r, r) ``V R U``."""
         both = columns, columns[self.other]
         first, second = (np.einsum("rk,ks->krs", rows, u).reshape(len(u), -1) for u in both)
         return np.asarray(own @ first + cross @ second).reshape(len(own), len(rows), -1)
 
     def _on_probe(
-        self,
-        own: ComplexArray,
-        cross: ComplexArray,
-        small: ComplexArray,
-        columns: FloatArray,
-        rows: FloatArray,
+        self, own: ComplexArray, cross: ComplexArray, small: ComplexArray, columns: FloatArray, rows: FloatArray
     ) -> FloatArray:
         """Return what the state adds to the exponential, times one vector."""
         known = own @ (rows * self.probe).T - cross @ (rows[:, self.other] * self.probe).T
@@ -213,8 +196,7 @@ def _real(matrices: ComplexArray) -> FloatArray:
     """Return (k, 2 r, 2 r) what complex matrices (k, r, r) do to real and imaginary parts."""
     real, imaginary = matrices.real, matrices.imag
     return np.concatenate(
-        [np.concatenate([real, -imaginary], axis=2), np.concatenate([imaginary, real], axis=2)],
-        axis=1,
+        [np.concatenate([real, -imaginary], axis=2), np.concatenate([imaginary, real], axis=2)], axis=1
     )
 
 
@@ -243,9 +225,7 @@ def _longest(contacts: ContactStates) -> FloatArray:
     return base
 
 
-def _real_form(
-    values: ComplexArray, vectors: ComplexArray
-) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+def _real_form(values: ComplexArray, vectors: ComplexArray) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
     """Return real parts, imaginary parts with sign, the other one of each pair, and the real basis of real and imaginary parts."""
     values, vectors = np.asarray(values, complex), np.asarray(vectors, complex)
     real, upper = np.flatnonzero(values.imag == 0.0), np.flatnonzero(values.imag > 0.0)

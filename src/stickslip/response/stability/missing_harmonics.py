@@ -100,15 +100,23 @@ def newton_work(rows: int) -> float:
     return STEP_WORK * rows
 
 
-def with_more(
-    point: ForcedPoint, coefficients: ComplexArray, harmonics: IntArray, error: float
-) -> ForcedPoint:
+def with_more(point: ForcedPoint, coefficients: ComplexArray, harmonics: IntArray, error: float) -> ForcedPoint:
     """Return the motion of a point with more harmonics, and its predicted error, as a point on its own."""
     none = np.zeros(0)
     return replace(
-        point, coefficients=coefficients, harmonics=harmonics, predicted_error=error, iterations=0, tangent=none, step=0.0,
-        orientation=0.0, kept=np.zeros((0, 0), dtype=np.int64), seconds_contact=0.0, seconds_linear=0.0, seconds_total=0.0,
-    )  # fmt: skip
+        point,
+        coefficients=coefficients,
+        harmonics=harmonics,
+        predicted_error=error,
+        iterations=0,
+        tangent=none,
+        step=0.0,
+        orientation=0.0,
+        kept=np.zeros((0, 0), dtype=np.int64),
+        seconds_contact=0.0,
+        seconds_linear=0.0,
+        seconds_total=0.0,
+    )
 
 
 def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPoint:

@@ -47,9 +47,7 @@ class ModalStates:
         return rows.T / (self.omega**2 * self.speed[:, None])
 
 
-def modal_states(
-    structure: Structure, gap_operator: Matrix, springs: FloatArray, omega: float
-) -> ModalStates:
+def modal_states(structure: Structure, gap_operator: Matrix, springs: FloatArray, omega: float) -> ModalStates:
     """Decompose a structure with its contacts stuck.
 
     Parameters
@@ -89,12 +87,7 @@ def modal_states(
         ) from error
     speed = np.maximum(1.0, np.sqrt(np.abs(values)) / omega)
     return ModalStates(
-        omega,
-        basis.T @ stiffness @ basis / omega**2,
-        basis.T @ damping @ basis / omega,
-        speed,
-        rows @ basis,
-        basis,
+        omega, basis.T @ stiffness @ basis / omega**2, basis.T @ damping @ basis / omega, speed, rows @ basis, basis
     )
 
 

@@ -55,9 +55,7 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
     return np.vstack([flow.out @ now.motion, now.sliders[held]])
 
 
-def share_of_monodromy(
-    modes: ModalStates, contacts: ContactStates, wheel: InTime
-) -> FloatArray | None:
+def share_of_monodromy(modes: ModalStates, contacts: ContactStates, wheel: InTime) -> FloatArray | None:
     """Return the derivative of all states after a share of the period, sectors renumbered, by those before; None where the motion has no shares.
 
     The motion of a travelling wave does in every share what it does in the first one, in other sectors: the multipliers of the period are

@@ -11,21 +11,12 @@ from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.structure import Structure
-from stickslip.response.stability.contact_states import (
-    ContactStates,
-    is_located,
-    located_part,
-    located_states,
-)
+from stickslip.response.stability.contact_states import ContactStates, is_located, located_part, located_states
 from stickslip.response.stability.found import Stability, changes, partners
 from stickslip.response.stability.kicks import sample_times, sampled_monodromy
 from stickslip.response.stability.modal_states import ModalStates, modal_states
 from stickslip.response.stability.monodromy import monodromy, share_of_monodromy
-from stickslip.response.stability.sampled_tangents import (
-    Path,
-    SampledTangents,
-    sampled_tangents,
-)
+from stickslip.response.stability.sampled_tangents import Path, SampledTangents, sampled_tangents
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet, floquet
 from stickslip.response.time.sectors import InTime
 
@@ -100,9 +91,7 @@ def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, i
     return modes, sampled_monodromy(modes, contacts, times, at, interface.factors[sampled]), 1
 
 
-def _located_matrix(
-    modes: ModalStates, contacts: ContactStates, own: InTime
-) -> tuple[FloatArray, int]:
+def _located_matrix(modes: ModalStates, contacts: ContactStates, own: InTime) -> tuple[FloatArray, int]:
     """Return the matrix of a share of the period, where there are shares, and their number."""
     share = share_of_monodromy(modes, contacts, own)
     return (monodromy(modes, contacts), 1) if share is None else (share, own.shares)
@@ -134,12 +123,7 @@ def _samples(
 
 
 def _judged(
-    contacts: ContactStates,
-    multipliers: ComplexArray,
-    errors: FloatArray,
-    moduli: FloatArray,
-    n: int,
-    more: int = 0,
+    contacts: ContactStates, multipliers: ComplexArray, errors: FloatArray, moduli: FloatArray, n: int, more: int = 0
 ) -> Stability:
     """Return the stability with a multiplier of zero for each slider without a state when the period begins."""
     size = 2 * n + contacts.rows.size + contacts.always_slipping + more
@@ -157,11 +141,7 @@ def _judged(
 
 
 def _sampled(
-    modes: ModalStates,
-    contacts: ContactStates,
-    interface: Interface,
-    own: IntArray,
-    gap_coefficients: FloatArray,
+    modes: ModalStates, contacts: ContactStates, interface: Interface, own: IntArray, gap_coefficients: FloatArray
 ) -> Stability:
     """Return the stability where the tangents of the contacts `own` are sampled: of two steps, extrapolated.
 
@@ -175,9 +155,7 @@ def _sampled(
         return _unknown(modes.n)
     kept = np.any([each.kept for each in tangents], axis=0)
     coarse, between, fine = (
-        floquet(
-            sampled_monodromy(modes, contacts, at, replace(each, kept=kept), interface.factors[own])
-        ).multipliers
+        floquet(sampled_monodromy(modes, contacts, at, replace(each, kept=kept), interface.factors[own])).multipliers
         for at, each in zip(times, tangents, strict=True)
     )
     extrapolated = fine + (fine - partners(coarse, fine)) / 3.0
@@ -187,20 +165,14 @@ def _sampled(
     extrapolated[np.abs(fine - 1.0) <= UNIT_TOLERANCE] = 1.0
     same = np.all([np.all(each.kept == kept, axis=1) for each in tangents], axis=0)
     resting, grazing = (int(np.sum(n[same])) for n in (tangents[-1].resting, tangents[-1].grazing))
-    whole = replace(
-        contacts, resting=contacts.resting + resting, grazing=contacts.grazing + grazing
-    )
+    whole = replace(contacts, resting=contacts.resting + resting, grazing=contacts.grazing + grazing)
     order = np.argsort(-np.abs(extrapolated), kind="stable")
     own_states = int(kept.sum())
     return _judged(whole, extrapolated[order], errors[order], moduli[order], modes.n, own_states)
 
 
 def _tangents(
-    laws: list[ContactLaw],
-    own: IntArray,
-    times: list[FloatArray],
-    polynomials: FloatArray,
-    omega: float,
+    laws: list[ContactLaw], own: IntArray, times: list[FloatArray], polynomials: FloatArray, omega: float
 ) -> SampledTangents:
     """Return the tangents of laws at samples, without what of them is located."""
     found = sampled_tangents(laws, own, Path(np.concatenate(times), polynomials, omega))

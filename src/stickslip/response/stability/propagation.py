@@ -20,9 +20,7 @@ NUMERATOR = (
 )  # fmt: skip  # of the diagonal Padé approximant of order 13, by the power of its argument
 
 
-def propagate(
-    a: FloatArray, states: FloatArray, pull: FloatArray, sliders: FloatArray, length: float
-) -> FloatArray:
+def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: FloatArray, length: float) -> FloatArray:
     """Return what becomes of the columns of `states` after `length` under ``dy/dτ = A y + (0, pull @ sliders)``.
 
     Parameters
@@ -57,10 +55,7 @@ def transition(a: FloatArray, pull: FloatArray, length: float) -> tuple[FloatArr
         a4 = a2 @ a2
         powers = a2, a4, a4 @ a2
         # roots of powers come closer to the spectral radius than norms do (Al-Mohy & Higham 2009)
-        size = length * max(
-            float(np.linalg.norm(m, 1)) ** (1.0 / k)
-            for m, k in zip(powers[1:], (4, 6), strict=True)
-        )
+        size = length * max(float(np.linalg.norm(m, 1)) ** (1.0 / k) for m, k in zip(powers[1:], (4, 6), strict=True))
         if not size < 1.0 / np.finfo(float).eps:  # not a digit of the phase is left
             raise FloatingPointError(TOO_FAST)
         halvings = max(0, int(np.ceil(np.log2(max(size, RATIONAL) / RATIONAL))))

@@ -162,9 +162,7 @@ class _Steps:
         columns = slice(0, 6) if not self.size else slice(3, 6)
         before = np.concatenate([[self.path.times[-1] - 2 * np.pi], self.times[:-1]])
         ends = np.column_stack([before, self.times])
-        if self.size and not np.any(
-            self._tangents(self.times, np.arange(len(ends)))[:, :, columns]
-        ):
+        if self.size and not np.any(self._tangents(self.times, np.arange(len(ends)))[:, :, columns]):
             return
         step = np.searchsorted(self.path.times, self.times)
 
@@ -194,6 +192,15 @@ class _Steps:
         new, s = np.array(state, dtype=float), self.size
         whole = np.zeros((len(self.samples), 3 + s, 9 + s))
         steps_along(
-            self.address, first, self.gap, self.velocity, new, self.parameters, self.share, self.samples, self.starts, whole
-        )  # fmt: skip
+            self.address,
+            first,
+            self.gap,
+            self.velocity,
+            new,
+            self.parameters,
+            self.share,
+            self.samples,
+            self.starts,
+            whole,
+        )
         return new, whole

@@ -9,11 +9,7 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.along import SAFETY
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.found import Stability, changes
-from stickslip.response.stability.missing_harmonics import (
-    corrected_by_step,
-    more_harmonics,
-    with_more,
-)
+from stickslip.response.stability.missing_harmonics import corrected_by_step, more_harmonics, with_more
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
 
@@ -49,17 +45,13 @@ class Settled:
 
 
 @by_one_thread
-def stability(
-    problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
-) -> Stability:
+def stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Stability:
     """Return the stability of a solved point of a forced response; see `settled_stability`, which returns the motion beside it."""
     return settled_stability(problem, point, more).stability
 
 
 @by_one_thread
-def settled_stability(
-    problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None
-) -> Settled:
+def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Settled:
     """Return the stability of a solved point of a forced response.
 
     The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them, times `ROUGHLY`, is
@@ -112,7 +104,7 @@ def settled_stability(
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
     """Return a verdict with its motion, where the point as it was solved has another; that nothing is known where that motion is no neighbour."""
     grows = first.stability.grows
-    if last is first or found.verdict not in ("stable", "unstable") or grows == (found.verdict == "unstable"):  # fmt: skip
+    if last is first or found.verdict not in ("stable", "unstable") or grows == (found.verdict == "unstable"):
         return Settled(found)
     if problem.real_error(first.point, last.point) > problem.strategy.threshold:
         return Settled(replace(_unsure(first), work=found.work))

@@ -21,10 +21,7 @@ def fourier_basis(tau: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
 
 
 def hat_integrals(
-    tangents: Callable[[FloatArray, IntArray], FloatArray],
-    ends: FloatArray,
-    step: IntArray,
-    samples: FloatArray,
+    tangents: Callable[[FloatArray, IntArray], FloatArray], ends: FloatArray, step: IntArray, samples: FloatArray
 ) -> FloatArray:
     """Return means of tangents about each sample, their weight falling linearly to zero at the neighbouring samples.
 
@@ -45,9 +42,7 @@ def hat_integrals(
     lengths = np.diff(samples, prepend=samples[-1] - 2 * np.pi)
     part, left, right = np.arange(len(ends)), ends[:, 0], ends[:, 1]
     shape = tangents(ends[:1, 1], part[:1]).shape[1:]
-    found = np.zeros(
-        (2, len(samples), int(np.prod(shape)))
-    )  # at the beginning and the end of a step
+    found = np.zeros((2, len(samples), int(np.prod(shape))))  # at the beginning and the end of a step
 
     def moments(tau: FloatArray, parts: IntArray) -> FloatArray:
         own = tangents(tau, parts).reshape(tau.size, -1)
@@ -69,9 +64,7 @@ def hat_integrals(
             break
         middle = 0.5 * (left + right)[~done]
         part = np.concatenate([part[~done]] * 2)
-        left, right = (
-            np.concatenate([left[~done], middle]), np.concatenate([middle, right[~done]])
-        )  # fmt: skip
+        left, right = (np.concatenate([left[~done], middle]), np.concatenate([middle, right[~done]]))
     shares = 0.5 * (lengths + np.roll(lengths, -1))
     means = (np.roll(found[0], -1, axis=0) + found[1]) / shares[:, None]
     return np.asarray(means.reshape(-1, *shape))

@@ -90,9 +90,7 @@ def _by_wave(rows: ComplexArray, sectors: int) -> ComplexArray:
     return np.asarray(np.fft.fft(rows.reshape(sectors, -1, rows.shape[1]), axis=0) / sectors)
 
 
-def _described(
-    multiplier: complex, moved: ComplexArray, rate: ComplexArray, sectors: int
-) -> WaveDisturbance:
+def _described(multiplier: complex, moved: ComplexArray, rate: ComplexArray, sectors: int) -> WaveDisturbance:
     """Return what a shape is: a real motion is the sum of it and its conjugate, of which that with a positive frequency is named."""
     size = np.sum(np.abs(moved) ** 2, axis=1)
     at, total = int(np.argmax(size)), float(np.sum(size))

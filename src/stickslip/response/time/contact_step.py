@@ -19,9 +19,7 @@ from stickslip.contact.law import OPEN
 
 # what compiled code alone calls is compiled with it, and needs no door to Python
 _compiled: Any = njit
-inner = _compiled(
-    no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy", forceinline=True
-)
+inner = _compiled(no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy", forceinline=True)
 large = _compiled(no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy")
 LANDING_STEPS = 8  # of Newton's method for the share of the step; one where the normal force is linear in the gap
 LOCATED = 1e-13  # of the step

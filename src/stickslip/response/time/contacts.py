@@ -53,9 +53,7 @@ class TimeContacts:
         return int(self.table.places[JAC, -1])
 
 
-def time_contacts(
-    laws: Sequence[ContactLaw], weights: FloatArray | None, caller: str
-) -> TimeContacts:
+def time_contacts(laws: Sequence[ContactLaw], weights: FloatArray | None, caller: str) -> TimeContacts:
     """Lay the laws of contacts out for the time step.
 
     Parameters
@@ -97,9 +95,7 @@ def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(arrays) if arrays else np.zeros(0)
 
 
-def _places(
-    kernels: Sequence[int], parameters: Sequence[FloatArray], states: Sequence[FloatArray]
-) -> IntArray:
+def _places(kernels: Sequence[int], parameters: Sequence[FloatArray], states: Sequence[FloatArray]) -> IntArray:
     """Return (5, n + 1) where everything of each contact is, see `ContactTable.places`."""
     sizes = np.array([s.size for s in states], dtype=np.int64)
     widths = [np.array([p.size for p in parameters]), sizes, (3 + sizes) * (12 + sizes)]

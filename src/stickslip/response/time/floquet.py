@@ -6,9 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 
-UNIT_TOLERANCE = (
-    1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
-)
+UNIT_TOLERANCE = 1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,9 +156,7 @@ class Marcher:
         plan = self._run(state, record, self._log(0), {STEPS: len(record.rows)})
         return int(plan[FAILED])
 
-    def march_logged(
-        self, state: StepState, record: Record, use: Callable[[StepLog, int], None]
-    ) -> int:
+    def march_logged(self, state: StepState, record: Record, use: Callable[[StepLog, int], None]) -> int:
         """March as `march` does, and hand over the log of the laws' derivatives, and how many rows it has, as often as it is full."""
         steps, taken, failures = len(record.rows), 0, 0
         log = self._log(max(1, min(steps, LOG_NUMBERS // max(self.contacts.log_width, 1))))
@@ -173,21 +171,11 @@ class Marcher:
     def _log(self, rows: int) -> StepLog:
         return StepLog(np.empty((rows, self.contacts.log_width)), np.zeros(rows, dtype=np.int64))
 
-    def _run(
-        self, state: StepState, record: Record, log: StepLog, task: dict[int, int]
-    ) -> IntArray:
+    def _run(self, state: StepState, record: Record, log: StepLog, task: dict[int, int]) -> IntArray:
         plan = np.zeros(7, dtype=np.int64)
         for what, value in task.items():
             plan[what] = value
-        run_steps()(
-            self.contacts.table,
-            self.operators,
-            state,
-            *self._work,
-            record.rows,
-            log,
-            plan,
-        )
+        run_steps()(self.contacts.table, self.operators, state, *self._work, record.rows, log, plan)
         return plan
 
 
@@ -210,13 +198,8 @@ def prepared(
     """
     one = one_structure(structure, caller)
     laid = time_contacts(laws, weights, caller)
-    operators, modes, springs = step_operators(
-        one, gap_operator, laid.table.stuck, load, omega, steps, caller
-    )
+    operators, modes, springs = step_operators(one, gap_operator, laid.table.stuck, load, omega, steps, caller)
     contacts = laid.on(springs)
     n_states = contacts.start.size
-    work = (
-        law_work(contacts.n, n_states, contacts.log_width),
-        newton_work(2 * one.n, 3 * contacts.n),
-    )
+    work = (law_work(contacts.n, n_states, contacts.log_width), newton_work(2 * one.n, 3 * contacts.n))
     return Marcher(operators, modes, contacts, one.dofs.labels, work)

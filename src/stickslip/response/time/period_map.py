@@ -160,10 +160,7 @@ class PeriodMap:
 
     def derivative(self, state: FloatArray) -> Derivative:
         """March one period with its tangents."""
-        (step, first), record = (
-            self._begun(state),
-            self.marcher.record(self.marcher.steps // self.shares),
-        )
+        (step, first), record = (self._begun(state), self.marcher.record(self.marcher.steps // self.shares))
         tangent = first_tangent(first, self.linear, step.law.size)
         seen = np.zeros(first.size, dtype=bool)
 

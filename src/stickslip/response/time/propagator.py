@@ -14,7 +14,9 @@ from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.response.time.time_step import StepOperators
 
-FAST = 10.0  # times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
+FAST = (
+    10.0  # times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
+)
 
 COUPLED = 1e-12  # of a mode's motion that a step gives to another: less is rounding
 
@@ -44,9 +46,7 @@ class ModalCoordinates:
 
     def motion(self, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return (q, w) of physical displacement and velocity."""
-        return np.concatenate(
-            [self.inverse @ displacement, self.inverse @ velocity / (self.omega * self.speed)]
-        )
+        return np.concatenate([self.inverse @ displacement, self.inverse @ velocity / (self.omega * self.speed)])
 
     def physical(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and velocity of (q, w)."""
@@ -84,11 +84,7 @@ def _paces(structure: Structure, gap_operator: FloatArray, stuck: FloatArray) ->
 
 
 def _coordinates(
-    structure: Structure,
-    stiffness: FloatArray,
-    gap_operator: FloatArray,
-    paces: FloatArray,
-    omega: float,
+    structure: Structure, stiffness: FloatArray, gap_operator: FloatArray, paces: FloatArray, omega: float
 ) -> ModalCoordinates:
     mass = _dense(structure.mass)
     with threads_for(len(mass)):
@@ -162,9 +158,7 @@ def _turn(step: FloatArray) -> FloatArray:
     return np.array([np.diag(part) for part in parts])
 
 
-def _motion_matrix(
-    stiffness: FloatArray, damping: FloatArray, modes: ModalCoordinates
-) -> FloatArray:
+def _motion_matrix(stiffness: FloatArray, damping: FloatArray, modes: ModalCoordinates) -> FloatArray:
     """Matrix A of ``d(q, w)/dτ = A (q, w)`` in the time ``τ = ωt``, from modal stiffness and damping."""
     speed, omega = modes.speed[:, None], modes.omega
     free = np.hstack([np.zeros_like(stiffness), np.diag(modes.speed)])
@@ -206,14 +200,7 @@ def _clock(orders: list[int], steps: int) -> FloatArray:
     return np.array([np.ones(steps), *waves]).T
 
 
-def _check(
-    n: int,
-    gap_operator: FloatArray,
-    rows: int,
-    load: PeriodicLoad,
-    omega: float,
-    caller: str,
-) -> None:
+def _check(n: int, gap_operator: FloatArray, rows: int, load: PeriodicLoad, omega: float, caller: str) -> None:
     require_array(f"{caller}: gap_operator", gap_operator, (rows, n))
     require_array(f"{caller}: load.static", load.static, (n,))
     for order, amplitude in load.harmonics.items():

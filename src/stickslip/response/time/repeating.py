@@ -149,9 +149,7 @@ def repetition(
     """
 
     def made(steps: int) -> Marcher:
-        return prepared(
-            structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
-        )
+        return prepared(structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights)
 
     # the march with half the step is the one that has to follow the impacts
     marcher = with_enough_steps(made, rest(structure.n, contacts.laws), steps, 2.0 * ROUGH)
@@ -193,9 +191,7 @@ def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) 
     change = _changes(seen.gaps, 1) if seen.finite else np.full(len(seen.gaps), np.inf)
     motion = _harmonics(record.motion @ basis.T, order)
     opened = float(np.mean(record.force[:, :, 2] == 0.0))
-    return Repetition(
-        motion, change, every, _wander(seen.first), growth, opened, marcher.steps, max(seen.angles), kept
-    )  # fmt: skip
+    return Repetition(motion, change, every, _wander(seen.first), growth, opened, marcher.steps, max(seen.angles), kept)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,9 +207,7 @@ class _Seen:
         return bool(self.gaps) and bool(np.all(np.isfinite(self.gaps[-1])))
 
 
-def _period_by_period(
-    marcher: Marcher, state: StepState, seen: _Seen, rows: FloatArray, order: int, most: int
-) -> int:
+def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: FloatArray, order: int, most: int) -> int:
     """March until there are so many periods or it repeats itself; return after how many periods it does, 0: it does not."""
     record = marcher.record()
     while len(seen.gaps) < most:
@@ -256,7 +250,7 @@ def _growth(marcher: Marcher, state: StepState) -> float:
     Of each half of the periods the largest distance counts: one that merely swings between displacement and speed does not grow.
     """
     n, record = marcher.n, marcher.record()
-    own, other = (StepState(state.x.copy(), state.seen.copy(), state.law.copy(), state.status.copy()) for _ in range(2))  # fmt: skip
+    own, other = (StepState(state.x.copy(), state.seen.copy(), state.law.copy(), state.status.copy()) for _ in range(2))
     other.x[n : 2 * n] += KICK * np.abs(state.x[n : 2 * n]).max() * np.cos(2.4 * np.arange(n))
     size = float(np.linalg.norm(state.x[: 2 * n]))
     apart: list[float] = []
@@ -278,7 +272,7 @@ def _harmonics(samples: FloatArray, order: int) -> ComplexArray:
 def _changes(gaps: Sequence[ComplexArray], turns: int) -> FloatArray:
     """Return the changes over so many periods, of the size of the vibration."""
     size = max(*(float(np.linalg.norm(g[1:])) for g in gaps), np.finfo(float).tiny)
-    return np.array([float(np.linalg.norm(b - a)) / size for a, b in zip(gaps, gaps[turns:], strict=False)])  # fmt: skip
+    return np.array([float(np.linalg.norm(b - a)) / size for a, b in zip(gaps, gaps[turns:], strict=False)])
 
 
 def _lasts(change: FloatArray) -> bool:

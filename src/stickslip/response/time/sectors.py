@@ -128,9 +128,7 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
         loads[h] = _travelling(wheel, h, amplitude[:own], sectors)
     waves = [_wave(wheel, common * k) for k in range(sectors)]
     weights = None if interface.weights is None else np.tile(interface.weights, sectors)
-    gaps = _circulant(
-        [_dense(interface.gap_operator) @ own_motions(w, wheel.multipliers) for w in waves]
-    )
+    gaps = _circulant([_dense(interface.gap_operator) @ own_motions(w, wheel.multipliers) for w in waves])
     turns = sectors > 1 and alike == (sectors, common)
     motion = WaveMotion(1, 0)
     if turns:
@@ -142,9 +140,7 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
         _circulant([_dense(w.damping)[:own, :own] for w in waves]),
         _circulant([_dense(w.stiffness)[:own, :own] for w in waves]),
         _dofs(wheel.dofs.take(np.arange(own)), sectors),
-        loss=None
-        if waves[0].loss is None
-        else _circulant([_dense(w.loss)[:own, :own] for w in waves]),
+        loss=None if waves[0].loss is None else _circulant([_dense(w.loss)[:own, :own] for w in waves]),
     )
     names = tuple(f"sector{s}.{name}" for s in range(sectors) for name in interface.names)
     contacts = Interface(names, interface.laws * sectors, gaps, weights)
@@ -201,14 +197,7 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
     whole = whole_wheel(system)
     shares, common = different_sectors(wheel)
     ahead = pow(wheel.engine_order // common % shares, -1, shares) if shares > 1 else 0
-    return InTime(
-        whole.structure,
-        whole.contacts,
-        to_real(whole.travelling(gaps)),
-        wheel.sectors,
-        shares,
-        ahead,
-    )
+    return InTime(whole.structure, whole.contacts, to_real(whole.travelling(gaps)), wheel.sectors, shares, ahead)
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
@@ -246,9 +235,7 @@ def _wave(wheel: TunedWheel, k: int) -> Structure:
 
 def _chosen(waves: Mapping[int, Structure], k: int, wheel: TunedWheel) -> int:
     """Return k or the wave number of the other direction, whichever belongs to the lower harmonic."""
-    excited = (
-        excited_wave(wheel.engine_order, wheel.sectors, h) for h in range(wheel.harmonics + 1)
-    )
+    excited = (excited_wave(wheel.engine_order, wheel.sectors, h) for h in range(wheel.harmonics + 1))
     for found in (*excited, *sorted(waves)):
         if found in waves and found in (k, (wheel.sectors - k) % wheel.sectors):
             return found
@@ -279,9 +266,7 @@ def _circulant(waves: list[Matrix]) -> FloatArray:
     """Return the (n p, n q) matrix of n sectors from the (p, q) matrices of their waves."""
     parts = np.fft.ifft(np.array([_dense(w) for w in waves]), axis=0)
     if np.abs(parts.imag).max(initial=0.0) > REAL * np.abs(parts).max(initial=0.0):
-        raise input_error(
-            "all_sectors", "the waves are those of no real matrices", "Give waves of a real sector."
-        )
+        raise input_error("all_sectors", "the waves are those of no real matrices", "Give waves of a real sector.")
     n = len(parts)
     return np.block([[parts[(row - column) % n].real for column in range(n)] for row in range(n)])
 
@@ -293,12 +278,5 @@ def _dense(matrix: Matrix) -> Matrix:
 def _dofs(own: Dofs, sectors: int) -> Dofs:
     """Return the table of the coordinates of all sectors."""
     named = own.part or ("",) * len(own.component)
-    parts = [
-        f"sector{s}.{part}" if part else f"sector{s}" for s in range(sectors) for part in named
-    ]
-    return Dofs(
-        np.tile(own.node, sectors),
-        own.component * sectors,
-        np.tile(own.position, (sectors, 1)),
-        tuple(parts),
-    )
+    parts = [f"sector{s}.{part}" if part else f"sector{s}" for s in range(sectors) for part in named]
+    return Dofs(np.tile(own.node, sectors), own.component * sectors, np.tile(own.position, (sectors, 1)), tuple(parts))

@@ -9,9 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 
 SettlingStatus = Literal["settled", "unsettled", "diverged"]
-LONGEST_MEMORY = (
-    1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
-)
+LONGEST_MEMORY = 1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
 OVERFLOW = 1e100  # far above every motion, and its square is still a number
 
 
@@ -75,15 +73,9 @@ class Progress:
     each: list[ComplexArray] = field(default_factory=list)  # the harmonics of every period
     means: list[FloatArray] = field(default_factory=list)  # (n,) mean displacement of every period
 
-    def take_in(
-        self, harmonics: ComplexArray, mean: FloatArray, failures: int, tolerance: float
-    ) -> None:
+    def take_in(self, harmonics: ComplexArray, mean: FloatArray, failures: int, tolerance: float) -> None:
         """Add a period and judge whether the motion has settled."""
-        self.harmonics, self.periods, self.failures = (
-            harmonics,
-            self.periods + 1,
-            self.failures + failures,
-        )
+        self.harmonics, self.periods, self.failures = (harmonics, self.periods + 1, self.failures + failures)
         self.each.append(harmonics)
         self.means.append(mean)
         if self.periods > 1:

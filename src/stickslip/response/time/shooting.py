@@ -27,13 +27,9 @@ from stickslip.response.time.step_check import COARSE, StepErrors, harmonics, st
 from stickslip.response.time.transient import TimeStepping, check_outputs
 
 ShootingStatus = Literal["converged", "coarse", "not converged", "diverged"]
-TOLERANCE = (
-    1e-9  # of the distance to the orbit, relative to its vibration, where no stepping is given
-)
+TOLERANCE = 1e-9  # of the distance to the orbit, relative to its vibration, where no stepping is given
 MOST_CORRECTIONS = 40
-WARM_UP = (
-    2  # periods before the first correction: slipping contacts forget what the start got wrong
-)
+WARM_UP = 2  # periods before the first correction: slipping contacts forget what the start got wrong
 SHORTEST = 1.0 / 16.0  # part of a correction, tried before it is given up
 CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, halves the distance
 FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
@@ -197,18 +193,12 @@ def shoot(  # noqa: PLR0913
 def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, corrections: int) -> None:
     """Correct the state until it converges, or the corrections or all periods have run out."""
     last = search.corrections + corrections
-    while (
-        search.status == "not converged"
-        and search.corrections < last
-        and search.periods < stepping.max_periods
-    ):
+    while search.status == "not converged" and search.corrections < last and search.periods < stepping.max_periods:
         if not _correct(mapping, search, stepping.tolerance):
             _march(mapping, search, FALLBACK)
 
 
-def _march_and_search(
-    mapping: PeriodMap, search: _Search, stepping: TimeStepping, warm: FloatArray
-) -> None:
+def _march_and_search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, warm: FloatArray) -> None:
     """March on from `warm` in blocks, each twice as long as the last, with a search begun anew after each.
 
     The march does not take over what a search that failed has left: it comes to every orbit that `integrate` comes to, in
@@ -229,22 +219,12 @@ def _march_and_search(
 def _search_anew(mapping: PeriodMap, search: _Search, stepping: TimeStepping) -> None:
     """Take some corrections; leave it to the march where one does not come nearer."""
     last = search.corrections + ANEW
-    while (
-        search.status == "not converged"
-        and search.corrections < last
-        and search.periods < stepping.max_periods
-    ):
+    while search.status == "not converged" and search.corrections < last and search.periods < stepping.max_periods:
         if not _correct(mapping, search, stepping.tolerance):
             return
 
 
-def _settle(
-    mapping: PeriodMap,
-    search: _Search,
-    periods: int,
-    changes: list[float],
-    tolerance: float,
-) -> bool:
+def _settle(mapping: PeriodMap, search: _Search, periods: int, changes: list[float], tolerance: float) -> bool:
     """March plain periods; return whether the state has settled, as `integrate` judges the first harmonic."""
     for _ in range(periods):
         image = mapping.image(search.state)
@@ -293,13 +273,7 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
     return _approach(mapping, search, inverse, correction, tolerance * vibration)
 
 
-def _approach(
-    mapping: PeriodMap,
-    search: _Search,
-    inverse: FloatArray,
-    correction: FloatArray,
-    close: float,
-) -> bool:
+def _approach(mapping: PeriodMap, search: _Search, inverse: FloatArray, correction: FloatArray, close: float) -> bool:
     """Correct the state, and go on with the same derivative for as long as that pays; return whether it came nearer.
 
     Distances are taken in the measure of the correction itself, in which weakly damped directions count as much as others.
@@ -325,11 +299,7 @@ def _approach(
 
 
 def _result(
-    mapping: PeriodMap,
-    search: _Search,
-    outputs: IntArray,
-    stepping: TimeStepping,
-    finer: Callable[[int], Marcher],
+    mapping: PeriodMap, search: _Search, outputs: IntArray, stepping: TimeStepping, finer: Callable[[int], Marcher]
 ) -> ShootingResult:
     """March the period that is reported, and hold it against one with finer steps."""
     image = mapping.period(search.state)
@@ -352,16 +322,13 @@ def _result(
         floquet=multipliers,
         periods=search.periods + 1,
         corrections=search.corrections,
-        residual=known
-        * float(np.linalg.norm(image.state - search.state) / mapping.vibration(image)),
+        residual=known * float(np.linalg.norm(image.state - search.state) / mapping.vibration(image)),
         distance=known * search.distance,
         step_error=errors.motion,
         growth_error=errors.growth,
         contact_failures=image.failures,
         final=TransientStart(
-            known * final.displacement,
-            known * final.velocity,
-            tuple(known * s for s in final.states),
+            known * final.displacement, known * final.velocity, tuple(known * s for s in final.states)
         ),
         outputs=known * (record.motion @ basis),
         gap=known * record.gap,

@@ -76,16 +76,12 @@ def start_from_harmonics(
     contacts = time_contacts(laws, None, caller)
     shape = (3 * contacts.n, coefficients.shape[1])
     if gap_operator.shape != shape:
-        raise input_error(
-            f"{caller}: gap_operator", f"has shape {gap_operator.shape}", f"It must be {shape}."
-        )
+        raise input_error(f"{caller}: gap_operator", f"has shape {gap_operator.shape}", f"It must be {shape}.")
     orders = np.arange(len(coefficients))[:, None]
     rates = 1j * orders * omega * coefficients
     gaps, gap_rates = ((gap_operator @ c.T).T for c in (coefficients, rates))
     states = settled_states(contacts, gaps, gap_rates)
-    return TransientStart(
-        np.sum(coefficients.real, axis=0), np.sum(rates.real, axis=0), contacts.separate(states)
-    )
+    return TransientStart(np.sum(coefficients.real, axis=0), np.sum(rates.real, axis=0), contacts.separate(states))
 
 
 def settled_states(contacts: TimeContacts, gaps: ComplexArray, rates: ComplexArray) -> FloatArray:
@@ -148,13 +144,9 @@ def check_start(start: TransientStart, n: int, contacts: TimeContacts, caller: s
     given = [np.size(s) for s in start.states]
     if given != sizes:
         raise input_error(
-            f"{caller}: start.states",
-            f"hold {given} numbers",
-            f"The laws remember {sizes}, one array a contact.",
+            f"{caller}: start.states", f"hold {given} numbers", f"The laws remember {sizes}, one array a contact."
         )
-    for c, (state, own) in enumerate(
-        zip(start.states, contacts.separate(contacts.start), strict=True)
-    ):
+    for c, (state, own) in enumerate(zip(start.states, contacts.separate(contacts.start), strict=True)):
         unknown = ~np.isfinite(np.ravel(state))
         settles = np.isnan(np.ravel(state)) & np.isnan(own)
         if np.any(unknown & ~settles):

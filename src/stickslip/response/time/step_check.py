@@ -15,9 +15,7 @@ from stickslip.response.time.step_tangent import tangent_operators
 COARSE = 0.01  # of the largest harmonic: a step that errs by more has not found the motion
 CLOSE = 0.05  # distance of the growth from 1 below which its error is looked for
 JUMP = 1.5  # times the largest friction force: a change within a step that passes over stick
-TURNS = (
-    2.0  # the same of first order: of the derivative, which feels where in a step a slider turns
-)
+TURNS = 2.0  # the same of first order: of the derivative, which feels where in a step a slider turns
 RICHARDSON = 4.0 / 3.0  # error of a method of second order over its change when the step is halved
 ERRATIC = 10.0  # the most: where the second of two changes is as large as the first nothing says that more steps lead anywhere
 
@@ -40,8 +38,13 @@ class StepErrors:
 
 
 def step_errors(
-    mapping: PeriodMap, finer: Callable[[int], Marcher], state: FloatArray, found: Derivative, outputs: IntArray, order: int
-) -> StepErrors:  # fmt: skip
+    mapping: PeriodMap,
+    finer: Callable[[int], Marcher],
+    state: FloatArray,
+    found: Derivative,
+    outputs: IntArray,
+    order: int,
+) -> StepErrors:
     """Compare a periodic motion with twice as many steps; where a contact opens or closes with four times as many, too.
 
     Parameters
@@ -120,9 +123,7 @@ def _jumps(image: Image) -> bool:
     return bool(np.any(np.abs(np.diff(force, axis=0)) > JUMP * largest[None]))
 
 
-def harmonics(
-    mapping: PeriodMap, state: FloatArray, image: Image, outputs: IntArray, order: int
-) -> ComplexArray:
+def harmonics(mapping: PeriodMap, state: FloatArray, image: Image, outputs: IntArray, order: int) -> ComplexArray:
     """Return the (order + 1, n_outputs) harmonics of a period from a state, m."""
     marcher = mapping.marcher
     began = mapping.start_of(state).x[: marcher.n]

@@ -78,9 +78,7 @@ def tangent_operators(marcher: Marcher) -> TangentOperators:
     )
 
 
-def law_derivatives(
-    rows: FloatArray, linear: TangentOperators, n_states: int
-) -> Iterator[LawDerivatives]:
+def law_derivatives(rows: FloatArray, linear: TangentOperators, n_states: int) -> Iterator[LawDerivatives]:
     """Yield the (r, ...) rows of a log as matrices."""
     k = linear.springs.size
     whole = np.zeros((len(rows), k + n_states, 2 * k + n_states))
@@ -97,9 +95,8 @@ def law_derivatives(
     split = 2 * k
     for own, before, lands in zip(whole, entry, landed, strict=True):
         yield LawDerivatives(
-            own[:k, :split], own[:k, split:], own[k:, :split], own[k:, split:],
-            before if lands else before[:, :0],
-        )  # fmt: skip
+            own[:k, :split], own[:k, split:], own[k:, :split], own[k:, split:], before if lands else before[:, :0]
+        )
 
 
 def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
@@ -129,9 +126,7 @@ def advanced(log: StepLog, rows: int, tangent: FloatArray, linear: TangentOperat
     return tangent
 
 
-def _steps(
-    count: int, laws: LawDerivatives, tangent: FloatArray, linear: TangentOperators
-) -> FloatArray:
+def _steps(count: int, laws: LawDerivatives, tangent: FloatArray, linear: TangentOperators) -> FloatArray:
     """Carry the tangent over steps with the same derivatives."""
     k = linear.springs.size
     beyond = laws.force.copy()
@@ -149,10 +144,7 @@ def _holds_still(laws: LawDerivatives) -> bool:
     """Whether states are forgotten in each step or kept for all: sliders that slip and stick."""
     force, new = laws.force_by_law, laws.law_by_law
     return not (
-        np.any(force @ laws.law)
-        or np.any(new @ laws.law)
-        or np.any(force @ new != force)
-        or np.any(new @ new != new)
+        np.any(force @ laws.law) or np.any(new @ laws.law) or np.any(force @ new != force) or np.any(new @ new != new)
     )
 
 
@@ -200,11 +192,7 @@ def _seen(linear: TangentOperators, motion: FloatArray, *, rates: bool) -> Float
 
 
 def _step(
-    laws: LawDerivatives,
-    beyond: FloatArray,
-    newton: FloatArray,
-    tangent: FloatArray,
-    linear: TangentOperators,
+    laws: LawDerivatives, beyond: FloatArray, newton: FloatArray, tangent: FloatArray, linear: TangentOperators
 ) -> FloatArray:
     """Carry the tangent over a step: the laws answer to gaps and rates that the change of r at its end moves, too."""
     m, k = linear.hold.shape

@@ -27,16 +27,11 @@ from stickslip.response.time.contact_step import (
     large,
     law_work,
 )
-from stickslip.response.time.step_newton import (
-    back_substitute,
-    dot,
-    factor_anew,
-    factor_slopes,
-    newton_work,
-    slopes,
-)
+from stickslip.response.time.step_newton import back_substitute, dot, factor_anew, factor_slopes, newton_work, slopes
 
-FULL_STEPS = 12  # Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
+FULL_STEPS = (
+    12  # Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
+)
 NEWTON_STEPS = 60
 GAP_TOLERANCE = 1e-12  # of the largest gap: some hundred roundings
 
@@ -72,12 +67,7 @@ def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
     for j in range(0, whole, 4):
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
         for i in range(out.size):
-            out[i] += (
-                matrix[j, i] * a
-                + matrix[j + 1, i] * b
-                + matrix[j + 2, i] * c
-                + matrix[j + 3, i] * d
-            )
+            out[i] += matrix[j, i] * a + matrix[j + 1, i] * b + matrix[j + 2, i] * c + matrix[j + 3, i] * d
     for j in range(whole, x.size):
         for i in range(out.size):
             out[i] += matrix[j, i] * x[j]

@@ -65,9 +65,7 @@ class TimeStepping:
         check_quantities(self)
         if 2 * self.harmonics >= self.steps_per_period:
             problem = f"{self.harmonics} are too many for {self.steps_per_period} steps a period"
-            raise input_error(
-                "TimeStepping.harmonics", problem, "Ask for less than half the number of steps."
-            )
+            raise input_error("TimeStepping.harmonics", problem, "Ask for less than half the number of steps.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +147,7 @@ class TransientResult:
     def drifting(self) -> tuple[str, ...]:
         """Names of the coordinates whose mean moves by a visible share of their swing in every period."""
         visible = np.maximum(DRIFT_THRESHOLD * self.swing, 1e-9 * np.max(self.swing))
-        return tuple(
-            name
-            for name, moves in zip(self.labels, np.abs(self.drift) > visible, strict=True)
-            if moves
-        )
+        return tuple(name for name, moves in zip(self.labels, np.abs(self.drift) > visible, strict=True) if moves)
 
 
 @by_one_thread
@@ -198,23 +192,17 @@ def integrate(  # noqa: PLR0913
         If an argument has a wrong shape or value, the mass matrix is singular, or a contact is rigid.
     """
     stepping = stepping or TimeStepping()
-    marcher = prepared(
-        structure, gap_operator, laws, load, omega, stepping.steps_per_period, weights
-    )
+    marcher = prepared(structure, gap_operator, laws, load, omega, stepping.steps_per_period, weights)
     check_outputs(outputs, marcher.n, "integrate")
     start = start or rest(marcher.n, laws)
     check_start(start, marcher.n, marcher.contacts, "integrate")
-    driven = tuple(h for h, f in sorted(load.harmonics.items()) if 0 < h <= stepping.harmonics and np.any(f))  # fmt: skip
+    driven = tuple(h for h, f in sorted(load.harmonics.items()) if 0 < h <= stepping.harmonics and np.any(f))
     judged = tuple(range(1, stepping.harmonics + 1)) if stepping.every_harmonic else driven or (1,)
     return _settle(marcher, marcher.begun(start), outputs, stepping, judged)
 
 
 def _settle(
-    marcher: Marcher,
-    state: StepState,
-    outputs: IntArray,
-    stepping: TimeStepping,
-    judged: tuple[int, ...],
+    marcher: Marcher, state: StepState, outputs: IntArray, stepping: TimeStepping, judged: tuple[int, ...]
 ) -> TransientResult:
     """March period by period until what is left of the change of the judged harmonics is below the tolerance."""
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
@@ -225,11 +213,7 @@ def _settle(
         failed = marcher.march(state, record)
         if failed < 0 or overflowed(state.x, record.motion):
             now.periods, now.status = now.periods + 1, "diverged"
-            for array in (
-                state.x,
-                state.law,
-                record.rows,
-            ):  # infinities are no numbers to go on with
+            for array in (state.x, state.law, record.rows):  # infinities are no numbers to go on with
                 array.fill(np.nan)
             break
         modal = period_harmonics(began, record.motion, stepping.harmonics)
@@ -237,9 +221,7 @@ def _settle(
     return _result(marcher, state, record, outputs, now)
 
 
-def _result(
-    marcher: Marcher, state: StepState, record: Record, outputs: IntArray, now: Progress
-) -> TransientResult:
+def _result(marcher: Marcher, state: StepState, record: Record, outputs: IntArray, now: Progress) -> TransientResult:
     # a number that overflowed later was none before
     known = np.nan if now.status == "diverged" else 1.0
     motion = record.motion @ marcher.modes.basis.T
@@ -268,6 +250,4 @@ def _result(
 def check_outputs(outputs: IntArray, n: int, caller: str) -> None:
     """Refuse outputs that the structure does not have."""
     if len(outputs) == 0 or np.min(outputs) < 0 or np.max(outputs) >= n:
-        raise input_error(
-            f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}."
-        )
+        raise input_error(f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}.")

@@ -85,7 +85,7 @@ def _said(question: Question) -> str:
 
 def _told(stage: Stage, inputs: Question) -> str:
     if stage.kind == "branch":
-        how = {"sweep": "the sweep", "deflation": "a branch found by deflation", "time": "a branch found in time"}  # fmt: skip
+        how = {"sweep": "the sweep", "deflation": "a branch found by deflation", "time": "a branch found in time"}
         return f"{how[stage.origin]}: {stage.omega.size} points; {stage.end}"
     hertz = inputs.search.places[stage.place] / HZ
     told = {

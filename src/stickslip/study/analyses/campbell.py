@@ -35,16 +35,12 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     told = solved.notes["model"]
     wheel = Wheel(int(told["sectors"]), bool(told["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
-    unseen = sorted(
-        m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel)
-    )
+    unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel))
     doubts = [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
     return _curves(waves, asked) | _crossings(waves) | _beyond(beyond), doubts
 
 
-def _unfollowed(
-    waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable
-) -> list[tuple[int, float]]:
+def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable) -> list[tuple[int, float]]:
     """Return engine orders that leave all followed modes of their wave below them, and the speed in rpm from which they do."""
     known = {w.wave_number: w.frequencies_hz for w in waves}
     found = []
@@ -61,9 +57,7 @@ def _curves(waves: Sequence[WaveBranches], asked: CampbellTable) -> Variables:
     about = "natural frequency in the rotating frame"
     return {
         "speed_rpm": variable("speed", np.array(asked.speeds) / RPM, "rpm", "speed of the rotor"),
-        "engine_orders": variable(
-            "order", orders, "1", "engine order whose crossings are looked for"
-        ),
+        "engine_orders": variable("order", orders, "1", "engine order whose crossings are looked for"),
         "frequency_hz": variable("wave speed mode", frequencies(waves), "Hz", about),
         "basis_error": variable("wave", error, "1", "relative error of frequencies between speeds"),
     }

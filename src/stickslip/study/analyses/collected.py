@@ -46,9 +46,7 @@ def of_cases(
 def described(about: About, values: Mapping[str, Any], model: Mapping[str, Any]) -> Variables:
     """Return the values that are not empty as variables, beside what is known of the model."""
     known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {
-        name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()
-    }
+    return told(model) | {name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()}
 
 
 def each(records: Sequence[object], name: str) -> Any:

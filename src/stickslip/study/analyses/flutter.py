@@ -27,10 +27,7 @@ from stickslip.study.analyses.waves.texts import flutter_tables
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
 
-INFLUENCE, WHEEL = (
-    "influence",
-    "wheel",
-)  # notes of the coefficients, and of a wheel whose sectors differ
+INFLUENCE, WHEEL = ("influence", "wheel")  # notes of the coefficients, and of a wheel whose sectors differ
 EVERY = 2.0  # degrees of inter-blade phase angle between points of the curve
 APART = 0.1  # of the largest damping: energy method and eigenvalue differ by more
 PERCENT = 100.0
@@ -69,18 +66,28 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     curve = least_stable_curve(_influence(known), np.radians(around), each, angles, reference)
     signed = np.degrees(np.where(angles > np.pi + 1e-9, angles - 2 * np.pi, angles))
     found = {
-        "frequency_hz": variable("wave mode", np.array([w.frequencies_hz for w in waves]), "Hz", "natural frequency in still fluid"),
+        "frequency_hz": variable(
+            "wave mode", np.array([w.frequencies_hz for w in waves]), "Hz", "natural frequency in still fluid"
+        ),
         "phase_angle_deg": variable("wave", signed, "deg", "inter-blade phase angle"),
         "damping_by_energy": variable("wave mode", energy, "1", "aerodynamic damping ratio by the energy method"),
-        "damping_by_eigenvalue": variable("wave mode", by_eigenvalue, "1", "aerodynamic damping ratio of the eigenvalue"),
+        "damping_by_eigenvalue": variable(
+            "wave mode", by_eigenvalue, "1", "aerodynamic damping ratio of the eigenvalue"
+        ),
         "damping": variable("wave mode", total, "1", "damping ratio of the eigenvalue, with that of the structure"),
-        "frequency_in_flow_hz": variable("wave mode", both.imag / HZ, "Hz", "frequency of the eigenvalue, with that damping"),
+        "frequency_in_flow_hz": variable(
+            "wave mode", both.imag / HZ, "Hz", "frequency of the eigenvalue, with that damping"
+        ),
         "curve_angle_deg": variable("curve", around, "deg", "inter-blade phase angle of the curve"),
-        "curve_damping": variable("mode curve", curve, "1", "aerodynamic damping ratio by the energy method, over any inter-blade phase angle"),
+        "curve_damping": variable(
+            "mode curve", curve, "1", "aerodynamic damping ratio by the energy method, over any inter-blade phase angle"
+        ),
         "least_wave": variable("", int(least[0]), "1", "index of the least stable wave"),
         "least_mode": variable("", int(least[1]), "1", "index of its mode"),
-        "required_damping": variable("", asked.required_percent / PERCENT, "1", "damping ratio that every wave must have"),
-    }  # fmt: skip
+        "required_damping": variable(
+            "", asked.required_percent / PERCENT, "1", "damping ratio that every wave must have"
+        ),
+    }
     told = _unstable(waves, total, sectors, asked)
     if WHEEL in solved.notes:  # then no wave is a mode
         own = np.asarray(solved.notes[WHEEL]["eigenvalues"])
@@ -95,7 +102,7 @@ def _of_wheel(eigenvalues: ComplexArray) -> Variables:
     return {
         "wheel_damping": variable("wheel_mode", damping_ratio(eigenvalues), "1", f"damping ratio {about}"),
         "wheel_frequency_hz": variable("wheel_mode", eigenvalues.imag / HZ, "Hz", f"frequency {about}"),
-    }  # fmt: skip
+    }
 
 
 def _unstable_wheel(eigenvalues: ComplexArray, asked: FlutterTable) -> list[Verdict]:
@@ -103,11 +110,7 @@ def _unstable_wheel(eigenvalues: ComplexArray, asked: FlutterTable) -> list[Verd
     if damping[0] >= asked.required_percent / PERCENT:
         return []
     grows = int(np.count_nonzero(damping < 0))
-    what = (
-        f"{grows} of its modes grow"
-        if grows
-        else f"it has less than the {asked.required_percent:g} % required"
-    )
+    what = f"{grows} of its modes grow" if grows else f"it has less than the {asked.required_percent:g} % required"
     why = f"the wheel whose sectors differ has a least damping of {PERCENT * damping[0]:.4g} % at {eigenvalues[0].imag / HZ:.5g} Hz: {what}"
     return [Verdict("trusted", why=why, remedy=FLUTTERS if grows else MORE, warns=True)]
 
@@ -119,9 +122,7 @@ def _influence(note: Any) -> InfluenceCoefficients:
     return InfluenceCoefficients(distances, values, frequencies, speeds, "nearest")
 
 
-def _unstable(
-    waves: Sequence[WaveFlutter], total: FloatArray, sectors: int, asked: FlutterTable
-) -> list[Verdict]:
+def _unstable(waves: Sequence[WaveFlutter], total: FloatArray, sectors: int, asked: FlutterTable) -> list[Verdict]:
     """Say which waves have less damping than is wanted, the least stable first."""
     required = asked.required_percent / PERCENT
     rows = [(total[i, m], i, m) for i, m in np.argwhere(total < required)]
@@ -129,9 +130,7 @@ def _unstable(
         return []
     worst, i, m = min(rows)
     name = label(waves[i].wave_number, sectors, parted=True)
-    what = (
-        "grows" if worst < 0 else f"has less damping than the {asked.required_percent:g} % required"
-    )
+    what = "grows" if worst < 0 else f"has less damping than the {asked.required_percent:g} % required"
     why = f"{name}, mode {m + 1} {what}: damping {PERCENT * worst:.4g} % at {waves[i].frequencies_hz[m]:.5g} Hz{_others(rows, worst)}"
     return [Verdict("trusted", why=why, remedy=FLUTTERS if worst < 0 else MORE, warns=True)]
 
@@ -153,7 +152,9 @@ def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:
     if not off > APART * size:
         return []
     why = f"energy method and eigenvalue differ by up to {PERCENT * off:.3g} % of critical damping"
-    remedy = "The fluid changes the modes: trust the eigenvalues, and give coefficients between all modes near each other."
+    remedy = (
+        "The fluid changes the modes: trust the eigenvalues, and give coefficients between all modes near each other."
+    )
     return [Verdict("doubtful", why=why, remedy=remedy)]
 
 

@@ -16,12 +16,7 @@ from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced.bifurcating import (
-    bifurcations_line,
-    followed,
-    located,
-    of_bifurcations,
-)
+from stickslip.study.analyses.forced.bifurcating import bifurcations_line, followed, located, of_bifurcations
 from stickslip.study.analyses.forced.blades import of_blades
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
@@ -41,45 +36,17 @@ from stickslip.study.analyses.forced.known import (
 )
 from stickslip.study.analyses.forced.model_change import model_changes, stiffness_changes
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
-from stickslip.study.analyses.forced.not_periodic import (
-    in_time_instead,
-    of_answers,
-    without_periodic,
-)
-from stickslip.study.analyses.forced.physics import (
-    PHYSICS,
-    beforehand,
-    driven_line,
-    of_physics,
-    physics_of,
-)
+from stickslip.study.analyses.forced.not_periodic import in_time_instead, of_answers, without_periodic
+from stickslip.study.analyses.forced.physics import PHYSICS, beforehand, driven_line, of_physics, physics_of
 from stickslip.study.analyses.forced.points import Response, lost_point
 from stickslip.study.analyses.forced.pressures import pressure_lines
-from stickslip.study.analyses.forced.question import (
-    HARMONICS,
-    IN_TIME,
-    STABLE,
-    Question,
-    question_of,
-    with_comparisons,
-)
+from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME, STABLE, Question, question_of, with_comparisons
 from stickslip.study.analyses.forced.retention import peak_shift
 from stickslip.study.analyses.forced.section import ForcedResponse
-from stickslip.study.analyses.forced.stable import (
-    Examined,
-    cost_line,
-    with_motion,
-)
+from stickslip.study.analyses.forced.stable import Examined, cost_line, with_motion
 from stickslip.study.analyses.forced.stable_words import peak_word, point_of, stability_log
 from stickslip.study.analyses.forced.summary import tables
-from stickslip.study.analyses.forced.values import (
-    Values,
-    of_checks,
-    of_doubt,
-    of_examined,
-    of_model,
-    of_response,
-)
+from stickslip.study.analyses.forced.values import Values, of_checks, of_doubt, of_examined, of_model, of_response
 from stickslip.study.analyses.forced.verdicts import verdicts
 from stickslip.study.analyses.forced.with_stability import integrated, with_stability
 from stickslip.study.analyses.verdict import Verdict, to_json
@@ -123,9 +90,7 @@ class ForcedResponseAnalysis:
             LOG.info(line)
         return with_comparisons(question_of(case, model), case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[ForcedPoint], notes: Notes
-    ) -> Iterator[ForcedPoint]:
+    def solve(self, inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
         """Yield the points that are not done; put down what the dataset needs, and the checks asked for."""
         points = list(done)
         failure: Exception | None = None
@@ -233,9 +198,7 @@ def _of_physics(question: Question, response: Response) -> Values:
     )
 
 
-def _put_down(
-    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
-) -> None:
+def _put_down(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
     """Put down all that the dataset needs, once."""
     if notes.get("response") is not None:
         return
@@ -252,12 +215,10 @@ def _put_down(
     sum_up(f"{peak}, {lost}" if response.failed else peak, line)
 
 
-def _judge(
-    question: Question, response: Response, examined: list[Examined], notes: Notes
-) -> list[Examined]:
+def _judge(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
     """Integrate in time what was asked for, and return what is known of the stability then."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
-    checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}  # fmt: skip
+    checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
     for one in told:
         known = notes.get(f"{IN_TIME}.{one.omega!r}")
@@ -275,9 +236,7 @@ def _judge(
     return told
 
 
-def _answer_in_time(
-    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
-) -> None:
+def _answer_in_time(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
     """March where no periodic motion stands for the response, once."""
     if notes.get(NOT_PERIODIC) is not None:
         return
@@ -291,9 +250,7 @@ def _answer_in_time(
         notes.put(NOT_PERIODIC, of_answers(answers))
 
 
-def _bifurcations(
-    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
-) -> Values:
+def _bifurcations(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> Values:
     """Locate the bifurcations of the response, and follow what leaves there."""
     found = located(question, response, notes)
     for line in found.sentences:

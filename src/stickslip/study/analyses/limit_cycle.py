@@ -34,9 +34,7 @@ class LimitCycleAnalysis:
         """Return the assembled model and what is asked of it."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[CycleBranch], notes: Notes
-    ) -> Iterator[CycleBranch]:
+    def solve(self, inputs: Question, done: Sequence[CycleBranch], notes: Notes) -> Iterator[CycleBranch]:
         """Yield what is found of each mode."""
         return solve(inputs, done, notes)
 
@@ -51,9 +49,7 @@ class LimitCycleAnalysis:
         for wave in question.waves:
             for mode in question.followed(question.modes(wave)):
                 of = "" if wave == ONE else f"wave {wave}, "
-                lines.append(
-                    f"limit_cycle: {of}mode {mode.number}, damping ratio {100 * mode.ratio:+.3g} %"
-                )
+                lines.append(f"limit_cycle: {of}mode {mode.number}, damping ratio {100 * mode.ratio:+.3g} %")
         why = too_long(question.model.system, forced=False)
         stability = f"limit_cycle: stability not examined, {why}" if why else ""
         none = "limit_cycle: no mode grows with contacts stuck"

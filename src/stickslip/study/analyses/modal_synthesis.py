@@ -33,9 +33,7 @@ class ModalSynthesisAnalysis:
         """Return the assembled model and what is asked of it."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[SynthesisLevel], notes: Notes
-    ) -> Iterator[SynthesisLevel]:
+    def solve(self, inputs: Question, done: Sequence[SynthesisLevel], notes: Notes) -> Iterator[SynthesisLevel]:
         """Yield the levels."""
         return solve(inputs, done, notes)
 
@@ -46,7 +44,11 @@ class ModalSynthesisAnalysis:
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Say which mode answers."""
         mode = self.inputs(case, model).mode
-        told = "" if mode is None else f"mode {mode.number}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"  # fmt: skip
+        told = (
+            ""
+            if mode is None
+            else f"mode {mode.number}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"
+        )
         return (f"{NAME}: {len(case.settings.modal_synthesis.levels)} levels of {told}",)
 
     def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:

@@ -42,10 +42,7 @@ def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
 def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     waves: Sequence[WaveModes] = solved.records
     hertz = frequencies(waves)
-    found = {
-        "frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"),
-        "growth": growth(waves),
-    }
+    found = {"frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"), "growth": growth(waves)}
     more = _of_stages(waves) | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves)
     of_wheel = variables(solved.notes.get(NOTE))
     return found | more | of_wheel, [*flange_doubts(waves), *_of_other_speed(solved)]
@@ -58,14 +55,9 @@ def _of_stages(waves: Sequence[WaveModes]) -> Variables:
         return {}
     stiffest = np.array([w.stiffest_hz for w in waves])
     return {
-        "stage_share": variable(
-            "wave mode stage", shares, "1", "share of a stage in the kinetic energy"
-        ),
+        "stage_share": variable("wave mode stage", shares, "1", "share of a stage in the kinetic energy"),
         "stiffest_hz": variable(
-            "wave mode",
-            stiffest,
-            "Hz",
-            "natural frequency with all harmonics held that flanges do not couple",
+            "wave mode", stiffest, "Hz", "natural frequency with all harmonics held that flanges do not couple"
         ),
     }
 
@@ -158,9 +150,7 @@ class Modes(WaveAnalysis):
         """Say how many modes there will be, and which waves of several stages are in no list."""
         return (*super().check(case, model), *_unreached(self.inputs(case, model)))
 
-    def solve(
-        self, inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: Notes
-    ) -> Iterator[WaveModes]:
+    def solve(self, inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: Notes) -> Iterator[WaveModes]:
         """Yield what is found of each wave, or nodal diameter of stages, and put down the modes of a wheel whose sectors differ."""
         if isinstance(inputs, StagesQuestion):
             yield from each_diameter(inputs, done, notes)
@@ -182,9 +172,7 @@ def _refuse_too_many(model: Model, number: int) -> None:
     most = sum(int(np.count_nonzero(part.structure.mass.diagonal())) for part in parts)
     if number > most:
         raise input_error(
-            "modes.number",
-            f"is {number}, and the model has {most} dofs with mass",
-            f"Give at most {most}.",
+            "modes.number", f"is {number}, and the model has {most} dofs with mass", f"Give at most {most}."
         )
 
 

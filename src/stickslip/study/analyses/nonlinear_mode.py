@@ -34,9 +34,7 @@ class NonlinearModeAnalysis:
         """Return the assembled model and what is asked of it."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[ModeRecord], notes: Notes
-    ) -> Iterator[ModeRecord]:
+    def solve(self, inputs: Question, done: Sequence[ModeRecord], notes: Notes) -> Iterator[ModeRecord]:
         """Yield what is found along the modes."""
         return solve(inputs, done, notes)
 

@@ -34,9 +34,7 @@ class QuasiPeriodicAnalysis:
         """Return the assembled model and what is asked of it."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[TwoFrequencies], notes: Notes
-    ) -> Iterator[TwoFrequencies]:
+    def solve(self, inputs: Question, done: Sequence[TwoFrequencies], notes: Notes) -> Iterator[TwoFrequencies]:
         """Yield the motions."""
         return solve(inputs, done, notes)
 

@@ -7,21 +7,11 @@ import xarray as xr
 
 from stickslip.assembly.model import Model
 from stickslip.contact.starts import starts_of
-from stickslip.response.residual_tractions.bounds import (
-    End,
-    TractionBounds,
-    resonance_bounds,
-    traction_bounds,
-)
+from stickslip.response.residual_tractions.bounds import End, TractionBounds, resonance_bounds, traction_bounds
 from stickslip.response.residual_tractions.confirming import Confirmation, confirmed
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.tractions.dataset import dataset
-from stickslip.study.analyses.tractions.question import (
-    MOTIONS,
-    Question,
-    cost_of,
-    question_of,
-)
+from stickslip.study.analyses.tractions.question import MOTIONS, Question, cost_of, question_of
 from stickslip.study.analyses.tractions.records import TractionRecord, of_record, to_record
 from stickslip.study.analyses.tractions.table import ResidualTractionsTable
 from stickslip.study.analyses.tractions.words import tables
@@ -49,9 +39,7 @@ class ResidualTractions:
         """Return the assembled model and what is asked of it."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[TractionRecord], notes: Notes
-    ) -> Iterator[TractionRecord]:
+    def solve(self, inputs: Question, done: Sequence[TractionRecord], notes: Notes) -> Iterator[TractionRecord]:
         """Yield the bounds at each frequency, then where each of them is highest."""
         told = {
             "output": inputs.model.output_labels[0],
@@ -86,9 +74,7 @@ class ResidualTractions:
         cost = cost_of(model, question.asked)
         counted = f"{springs} tangential springs that may keep a traction, {question.asked.points} frequencies"
         seconds = f"{cost.least_seconds:.1g} to {cost.most_seconds:.2g} s"
-        return (
-            f"residual_tractions: {counted}, some {MOTIONS[0]} to {MOTIONS[1]} motions each, {seconds}",
-        )
+        return (f"residual_tractions: {counted}, some {MOTIONS[0]} to {MOTIONS[1]} motions each, {seconds}",)
 
     def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
         """Return what was found when the dataset was made."""
@@ -106,9 +92,7 @@ def _along(question: Question, done: Sequence[TractionRecord]) -> Iterator[Tract
         return
     near = next((of_record(r) for r in reversed(done) if np.isfinite(r.amplitude[0])), None)
     model = question.model
-    each = traction_bounds(
-        model.system, model.load, left.tolist(), 0, question.discretisation, question.search, near
-    )
+    each = traction_bounds(model.system, model.load, left.tolist(), 0, question.discretisation, question.search, near)
     for k, bounds in enumerate(each, len(done) + 1):
         yield to_record(bounds, "point")
         advance(0.9 * k / len(question.omegas), _told(bounds))
@@ -123,9 +107,7 @@ def _told(bounds: TractionBounds) -> str:
 
 def _resonance(question: Question, known: Sequence[TractionBounds], end: End) -> TractionBounds:
     model = question.model
-    return resonance_bounds(
-        model.system, model.load, known, end, 0, question.discretisation, question.search
-    )
+    return resonance_bounds(model.system, model.load, known, end, 0, question.discretisation, question.search)
 
 
 def _confirmed(question: Question, tops: Sequence[TractionBounds]) -> dict[str, object]:
@@ -133,7 +115,7 @@ def _confirmed(question: Question, tops: Sequence[TractionBounds]) -> dict[str, 
     each: list[Confirmation] = [
         confirmed(model.system, model.load, top.omega, getattr(top, end), 0, question.discretisation)
         for end, top in zip(TOPS, tops, strict=True)
-    ]  # fmt: skip
+    ]
     return {
         "resolved_amplitude": np.array([c.resolved for c in each]),
         "time_amplitude": np.array([c.transient for c in each]),

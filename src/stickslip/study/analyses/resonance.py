@@ -47,21 +47,12 @@ class ResonanceAnalysis:
         LOG.info(f"resonance: peaks of {question.output} over {question.asked.parameter}")
         return question
 
-    def solve(
-        self, inputs: Question, done: Sequence[PeakPoint], notes: Notes
-    ) -> Iterator[PeakPoint]:
+    def solve(self, inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterator[PeakPoint]:
         """Yield the peaks that are not done."""
         if notes.get(LAST) is not None:
             return
         asked = inputs.asked
-        notes.put(
-            MODEL,
-            {
-                "verdicts": to_json(map(doubt, inputs.warnings)),
-                "output": inputs.output,
-                **inputs.facts,
-            },
-        )
+        notes.put(MODEL, {"verdicts": to_json(map(doubt, inputs.warnings)), "output": inputs.output, **inputs.facts})
         every = list(done)
         try:
             for point in _told(self._points(inputs, done), inputs):
@@ -120,7 +111,7 @@ class ResonanceAnalysis:
         question = question_of(case, model)
         asked = question.asked
         count = len(asked.values) if asked.values else asked.points
-        told = f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}"  # fmt: skip
+        told = f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}"
         if asked.span is not None and callable(question.search.parameter):
             told += "; a span makes the model anew for each trial, which takes minutes where a contact begins to slip at the peak: values are faster"
         return (told,)

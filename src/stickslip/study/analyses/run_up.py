@@ -11,26 +11,12 @@ from stickslip.response.forced.response import forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced.estimate import estimate
 from stickslip.study.analyses.running.fast import NO_SOLUTION, fast_run_ups
-from stickslip.study.analyses.running.question import (
-    Along,
-    Question,
-    RunUpPoint,
-    of_order,
-    question_of,
-)
+from stickslip.study.analyses.running.question import Along, Question, RunUpPoint, of_order, question_of
 from stickslip.study.analyses.running.sweeps import sweep_along
 from stickslip.study.analyses.running.table import RunUpTable
 from stickslip.study.analyses.running.values import dataset, values_of
 from stickslip.study.analyses.running.words import UNKNOWN, tables, verdicts_of
-from stickslip.study.analyses.verdict import (
-    ATTRIBUTE,
-    Verdict,
-    doubt,
-    from_json,
-    of_all_cases,
-    stored,
-    to_json,
-)
+from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, doubt, from_json, of_all_cases, stored, to_json
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ, RPM
 
@@ -54,9 +40,7 @@ class RunUp:
         """Return the model along each engine order; refuse what cannot be computed."""
         return question_of(case, model)
 
-    def solve(
-        self, inputs: Question, done: Sequence[RunUpPoint], notes: Notes
-    ) -> Iterator[RunUpPoint]:
+    def solve(self, inputs: Question, done: Sequence[RunUpPoint], notes: Notes) -> Iterator[RunUpPoint]:
         """Yield the points that are not done, one engine order after the other; put down what the dataset needs."""
         if notes.get(VALUES) is not None:
             return
@@ -70,9 +54,7 @@ class RunUp:
         notes.put(MODEL, {"verdicts": to_json(dict.fromkeys(told)), "limit": inputs.limit})
         notes.put(VALUES, values_of(inputs, every, notes))
 
-    def _points(
-        self, along: Along, every: Sequence[RunUpPoint], before: float, count: int
-    ) -> Iterator[RunUpPoint]:
+    def _points(self, along: Along, every: Sequence[RunUpPoint], before: float, count: int) -> Iterator[RunUpPoint]:
         own = [p for p in every if p.engine_order == along.order]
         system, load, sweep = along.model.system, along.model.load, along.sweep
         first, last = sweep.ends
@@ -108,9 +90,7 @@ class RunUp:
         refuse_whole("run_up", model)
         table: RunUpTable = case.settings.run_up
         count = len(table.engine_orders or [0])
-        return (
-            f"run-up: {count} engine orders, each {estimate(model, sweep_along(case.settings, 1))}",
-        )
+        return (f"run-up: {count} engine orders, each {estimate(model, sweep_along(case.settings, 1))}",)
 
     def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
         """Return what is to be thought of each case."""

@@ -100,17 +100,13 @@ class SafeDiagram(WaveAnalysis):
         rpm = float(f"{model.speed / RPM:.12g}") if asked.speed_rpm is None else asked.speed_rpm
         if rpm <= 0:
             raise input_error(
-                "safe.speed_rpm",
-                f"must be above zero, got {rpm:g}",
-                "Give the speed at which the engine orders act.",
+                "safe.speed_rpm", f"must be above zero, got {rpm:g}", "Give the speed at which the engine orders act."
             )
         at = rpm * RPM if model.rotates else 0.0
         wheel = Wheel(model.sectors, model.coriolis and model.rotates)
         still, left_out = in_still_fluid(model)
         numbers = wheel.numbers()
-        return Question(
-            still, asked.contacts, wheel, numbers, asked.modes, (at,), rpm=rpm, left_out=left_out
-        )
+        return Question(still, asked.contacts, wheel, numbers, asked.modes, (at,), rpm=rpm, left_out=left_out)
 
 
 SAFE = SafeDiagram()

@@ -69,7 +69,7 @@ class Verdict:
     def finding(self) -> str:
         """The verdict in words, but for its level and what to do."""
         hertz = self.frequency_hz
-        place = "" if hertz is None else f"{hertz:.2f} Hz: " if hertz >= 1.0 else f"{hertz:.4g} Hz: "  # fmt: skip
+        place = "" if hertz is None else f"{hertz:.2f} Hz: " if hertz >= 1.0 else f"{hertz:.4g} Hz: "
         return said(self.case, f"{place}{self.why}.")
 
     @property

@@ -55,9 +55,7 @@ def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> N
         return
     if model.sectors == 1 or model.mistuning is not None:
         raise input_error(
-            f"{analysis}.wave_numbers",
-            "are those of a tuned wheel, and the model is none",
-            "Leave them out.",
+            f"{analysis}.wave_numbers", "are those of a tuned wheel, and the model is none", "Leave them out."
         )
     beyond = [k for k in wanted if k >= model.sectors]
     if beyond:
@@ -82,7 +80,7 @@ def require_flow(model: Assembled, modes: Sequence[StuckMode], most: int, what: 
     force = model.system.structure.feedback_of(1)
     if force is not None and force.influence.refuses and modes:
         low, high = (f(m.omega for m in modes) for f in (min, max))
-        force.influence.require(low, most * high, f"{what} with up to {most} harmonics (most_harmonics)")  # fmt: skip
+        force.influence.require(low, most * high, f"{what} with up to {most} harmonics (most_harmonics)")
 
 
 def as_wave(system: System, wave: int) -> System:

@@ -108,9 +108,7 @@ def chosen(
     if name == FORCED:
         return _forced(data, case, point_of(data, case, hz))
     if "retained_displacement" not in data:
-        what = (
-            f"the result keeps no motion of [{name}]: it has none, or an earlier version wrote it"
-        )
+        what = f"the result keeps no motion of [{name}]: it has none, or an earlier version wrote it"
         raise input_error("export", what, "Run the study again with --fresh.")
     own = one_case(data, case)
     label = str(data["case_label"].values[case]) if "case_label" in data else ""
@@ -121,7 +119,7 @@ def chosen(
 def _analysis(tree: xr.DataTree, wanted: str) -> str:
     can = [name for name in WRITTEN if name in tree.children]
     if wanted not in ("", *can) or not can:
-        named, has = (", ".join(f"[{n}]" for n in names) for names in (WRITTEN, can or tree.children))  # fmt: skip
+        named, has = (", ".join(f"[{n}]" for n in names) for names in (WRITTEN, can or tree.children))
         of = f"{wanted!r} cannot be written: " if wanted else ""
         what = f"{of}motions are written of {named}; this result has {has or 'nothing'}"
         remedy = f"Name {has}." if can else "Ask the study for one of these."
@@ -151,9 +149,7 @@ def point_of(data: xr.Dataset, case: int, hz: float | None) -> int:
     solved = np.isfinite(data["retained_displacement"].values).any(axis=(1, 2, 3))
     mine = np.flatnonzero((data["point_case"].values == case) & solved)
     if not mine.size:
-        raise input_error(
-            "export", f"no point of case {case} has converged", "Export another case."
-        )
+        raise input_error("export", f"no point of case {case} has converged", "Export another case.")
     if hz is None:
         peak = int(data["peak_point"].values[case])
         if peak in mine:
@@ -235,14 +231,7 @@ def _cycle(own: xr.Dataset, label: str, number: int, _amplitude_mm: float | None
     return _free(cycle, own, CYCLE, told, label, (hz, 0.0, wave))
 
 
-def _free(
-    one: xr.Dataset,
-    own: xr.Dataset,
-    name: str,
-    told: str,
-    label: str,
-    at: tuple[float, float, int],
-) -> Chosen:
+def _free(one: xr.Dataset, own: xr.Dataset, name: str, told: str, label: str, at: tuple[float, float, int]) -> Chosen:
     """Return a motion that nothing drives, by its frequency, damping ratio and wave number."""
     hz, ratio, wave = at
     retained, labels = _known(one["retained_displacement"].values, own["retained_label"].values)
@@ -251,9 +240,20 @@ def _free(
     if own.attrs.get("concept") == "decaying":
         omega, rate, decays = omega * float(np.sqrt(1.0 - ratio**2)), 0.0, ratio * omega
     return Chosen(
-        name, told, label, omega, labels, retained[: most + 1], outputs, reported[: most + 1],
-        orders=(most,), wave_number=None if wave == ONE else wave, free=True, rate=rate, decays=decays,
-    )  # fmt: skip
+        name,
+        told,
+        label,
+        omega,
+        labels,
+        retained[: most + 1],
+        outputs,
+        reported[: most + 1],
+        orders=(most,),
+        wave_number=None if wave == ONE else wave,
+        free=True,
+        rate=rate,
+        decays=decays,
+    )
 
 
 def _require_number(own: xr.Dataset, dim: str, name: str, number: int) -> None:

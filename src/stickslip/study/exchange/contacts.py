@@ -72,13 +72,9 @@ class ContactMotion:
         return np.asarray(np.sqrt(((steps * (self.state == SLIP)) ** 2).sum(axis=1)).sum(axis=-1))
 
 
-def contacts_of(
-    data: xr.Dataset, motion: Motion, case: int, point: int
-) -> tuple[ContactMotion, ...]:
+def contacts_of(data: xr.Dataset, motion: Motion, case: int, point: int) -> tuple[ContactMotion, ...]:
     """Return what contacts do at a point of a response, sector by sector; none where they have no place in space."""
-    position, frame, area = (
-        _of_case(data, f"contact_{name}", case) for name in ("position", "frame", "area")
-    )
+    position, frame, area = (_of_case(data, f"contact_{name}", case) for name in ("position", "frame", "area"))
     placed = np.isfinite(position).all(axis=1)
     if not placed.any():
         return ()
@@ -88,10 +84,7 @@ def contacts_of(
         state = _of_case(data, "peak_state", case).astype(np.int64)
     else:
         samples = data.sizes["sample"]
-        gap, force = (
-            _signal(as_complex(data[name].values[point]), samples)
-            for name in ("gap", "contact_force")
-        )
+        gap, force = (_signal(as_complex(data[name].values[point]), samples) for name in ("gap", "contact_force"))
         state = None
     found = []
     for n in range(1 if motion.lag is None else motion.sectors):  # else points are those of all

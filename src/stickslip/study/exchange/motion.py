@@ -6,14 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.assembly.everywhere import (
-    Everywhere,
-    Felt,
-    Nodes,
-    as_it_is,
-    everywhere,
-    nodes_of,
-)
+from stickslip.assembly.everywhere import Everywhere, Felt, Nodes, as_it_is, everywhere, nodes_of
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.harmonic.decaying import DecayingStiffness
@@ -22,9 +15,7 @@ from stickslip.study.exchange.chosen import Chosen
 from stickslip.study.keep.progress import LOG
 
 AGREE = 1e-6  # relative, of the outputs: the model is that of the result, not another one
-CHANGED = (
-    "Files of the model have changed since the run, or the study has: run it again, then export."
-)
+CHANGED = "Files of the model have changed since the run, or the study has: run it again, then export."
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +131,7 @@ def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
         ways += [(chosen.orders[-1], False), (chosen.orders[-1], True)]
     worst = np.inf
     for k, (harmonics, every_wave) in enumerate(ways):
-        LOG.info("reducing the model again, with the way back to all nodes" if k == 0 else "with other waves")  # fmt: skip
+        LOG.info("reducing the model again, with the way back to all nodes" if k == 0 else "with other waves")
         whole = everywhere(model, harmonics, every_wave=every_wave, wave_number=chosen.wave_number)
         more, order = _coordinates(chosen, whole)
         fields = whole.fields(chosen.omega, chosen.retained[:, order], more, _felt(chosen))
@@ -150,9 +141,7 @@ def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
         worst = min(worst, float(np.abs(found - chosen.reported).max() / size))
         if worst <= AGREE:
             return whole, fields
-    what = (
-        f"the outputs of the model move otherwise than those of the result, by {100 * worst:.2g} %"
-    )
+    what = f"the outputs of the model move otherwise than those of the result, by {100 * worst:.2g} %"
     raise input_error("export", what, CHANGED)
 
 

@@ -47,30 +47,45 @@ def write_uff(motion: Motion, data: xr.Dataset | None, case: int, path: Path) ->
 
 
 def _units() -> dict[str, Any]:
-    return {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 2} | SI  # fmt: skip
+    return {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 2} | SI
 
 
 def _nodes(motion: Motion, numbers: IntArray) -> dict[str, Any]:
     x, y, z = np.vstack([body.nodes.points for body in motion.bodies]).T
-    colour = np.repeat(
-        np.arange(1, len(motion.bodies) + 1), [len(b.nodes.points) for b in motion.bodies]
-    )
+    colour = np.repeat(np.arange(1, len(motion.bodies) + 1), [len(b.nodes.points) for b in motion.bodies])
     global_axes = np.zeros(numbers.size, dtype=np.int64)
     return {
-        "type": 2411, "node_nums": numbers, "def_cs": global_axes, "disp_cs": global_axes,
-        "color": colour, "x": x, "y": y, "z": z,
-    }  # fmt: skip
+        "type": 2411,
+        "node_nums": numbers,
+        "def_cs": global_axes,
+        "disp_cs": global_axes,
+        "color": colour,
+        "x": x,
+        "y": y,
+        "z": z,
+    }
 
 
 def _shapes(motion: Motion, numbers: IntArray) -> Iterator[dict[str, Any]]:
     for h in (h for h in motion.harmonics if h > 0):
         x, y, z = np.vstack([body.amplitudes[h] for body in motion.bodies]).T
         yield {
-            "type": 55, "id1": f"Operating deflection shape, harmonic {h}", "id2": motion.label or "NONE",
-            "id3": "u(t) = Re(U exp(i 2 pi f t)), amplitude in m", "model_type": 1, "analysis_type": AT_FREQUENCY,
-            "data_ch": TRANSLATIONS, "spec_data_type": DISPLACEMENT, "load_case": 1, "freq_step_n": h,
-            "freq": h * motion.hz, "node_nums": numbers, "r1": x, "r2": y, "r3": z,
-        }  # fmt: skip
+            "type": 55,
+            "id1": f"Operating deflection shape, harmonic {h}",
+            "id2": motion.label or "NONE",
+            "id3": "u(t) = Re(U exp(i 2 pi f t)), amplitude in m",
+            "model_type": 1,
+            "analysis_type": AT_FREQUENCY,
+            "data_ch": TRANSLATIONS,
+            "spec_data_type": DISPLACEMENT,
+            "load_case": 1,
+            "freq_step_n": h,
+            "freq": h * motion.hz,
+            "node_nums": numbers,
+            "r1": x,
+            "r2": y,
+            "r3": z,
+        }
 
 
 def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str, Any]]:
@@ -92,19 +107,31 @@ def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str
                 continue
             function = h in driven
             yield {
-                "type": 58, "func_type": RESPONSE_FUNCTION if function else GENERAL,
-                "id1": f"{label}, harmonic {h}", "id2": motion.label or "NONE",
+                "type": 58,
+                "func_type": RESPONSE_FUNCTION if function else GENERAL,
+                "id1": f"{label}, harmonic {h}",
+                "id2": motion.label or "NONE",
                 "id3": "displacement over force amplitude" if function else "displacement",
-                "id4": "over the frequency of the excitation", "rsp_ent_name": point[:10],
+                "id4": "over the frequency of the excitation",
+                "rsp_ent_name": point[:10],
                 "rsp_node": numbers.get(motion.outputs.get(label, NOWHERE), 0),
-                "rsp_dir": DIRECTIONS.get(component, 0), "ref_ent_name": "load" if function else "NONE", "ref_node": 0,
-                "ref_dir": 0, "abscissa_spacing": 0, "abscissa_spec_data_type": FREQUENCY, "abscissa_axis_lab": "Frequency",
-                "abscissa_axis_units_lab": "Hz", "ordinate_spec_data_type": DISPLACEMENT,
-                "ordinate_axis_lab": "Displacement", "ordinate_axis_units_lab": "rad" if component[:1] == "r" else "m",
-                "orddenom_spec_data_type": FORCE if function else 0, "orddenom_axis_lab": "Force" if function else "NONE",
+                "rsp_dir": DIRECTIONS.get(component, 0),
+                "ref_ent_name": "load" if function else "NONE",
+                "ref_node": 0,
+                "ref_dir": 0,
+                "abscissa_spacing": 0,
+                "abscissa_spec_data_type": FREQUENCY,
+                "abscissa_axis_lab": "Frequency",
+                "abscissa_axis_units_lab": "Hz",
+                "ordinate_spec_data_type": DISPLACEMENT,
+                "ordinate_axis_lab": "Displacement",
+                "ordinate_axis_units_lab": "rad" if component[:1] == "r" else "m",
+                "orddenom_spec_data_type": FORCE if function else 0,
+                "orddenom_axis_lab": "Force" if function else "NONE",
                 "orddenom_axis_units_lab": "N" if function else "NONE",
-                "x": hertz, "data": values / force if function else values,
-            }  # fmt: skip
+                "x": hertz,
+                "data": values / force if function else values,
+            }
 
 
 def in_order(data: xr.Dataset, mine: BoolArray) -> IntArray:

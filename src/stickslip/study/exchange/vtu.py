@@ -16,9 +16,7 @@ from stickslip.study.keep.whole import whole_file, write_whole
 Cells = list[tuple[str, IntArray]]
 
 
-def write_vtu(
-    motion: Motion, contacts: Sequence[ContactMotion], folder: Path, steps: int
-) -> tuple[Path, ...]:
+def write_vtu(motion: Motion, contacts: Sequence[ContactMotion], folder: Path, steps: int) -> tuple[Path, ...]:
     """Write the motion of all nodes and contact points over one period; return the files.
 
     Parameters
@@ -99,11 +97,7 @@ def _cells(motion: Motion) -> tuple[Cells, dict[str, list[IntArray]]]:
 
 
 def _write(
-    path: Path,
-    points: FloatArray,
-    cells: Cells,
-    fields: Mapping[str, Any],
-    numbers: Mapping[str, list[IntArray]],
+    path: Path, points: FloatArray, cells: Cells, fields: Mapping[str, Any], numbers: Mapping[str, list[IntArray]]
 ) -> None:
     try:
         import meshio

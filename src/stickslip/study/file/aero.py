@@ -45,20 +45,14 @@ class AeroTable(Section):
         description="whose modes: wave (each wave has its own), nodal_diameter (those of one, in all waves) or blade_alone (those of a "
         "part with its root and its cyclic faces held)",
     )
-    nodal_diameter: int | None = Field(
-        None, ge=0, le=1000, description="of shapes = 'nodal_diameter': a whole number"
-    )
+    nodal_diameter: int | None = Field(None, ge=0, le=1000, description="of shapes = 'nodal_diameter': a whole number")
     clamped: Name | None = Field(
-        None,
-        description='of shapes = "blade_alone": the node set that holds it, such as "blade.root"',
+        None, description='of shapes = "blade_alone": the node set that holds it, such as "blade.root"'
     )
     largest_displacement_m: Positive | None = Field(
-        None,
-        description="largest displacement in m that the modes were scaled to; left out: they have unit mass",
+        None, description="largest displacement in m that the modes were scaled to; left out: they have unit mass"
     )
-    over: Name | None = Field(
-        None, description="part on which the largest displacement is looked for; left out: all"
-    )
+    over: Name | None = Field(None, description="part on which the largest displacement is looked for; left out: all")
     contacts: Literal["static", "stuck", "open"] = Field(
         "static", description="what contacts do in the modes: static, stuck or open, as in [modes]"
     )
@@ -67,8 +61,7 @@ class AeroTable(Section):
         description='names and places of points, where the coefficients belong to points: tip = {on = "blade.tip", direction = "x"}',
     )
     beyond: Literal["refuse", "nearest"] = Field(
-        "refuse",
-        description="frequencies outside of the table: refuse, or take the nearest of the table",
+        "refuse", description="frequencies outside of the table: refuse, or take the nearest of the table"
     )
 
     @model_validator(mode="after")
@@ -79,7 +72,7 @@ class AeroTable(Section):
             if given and self.shapes != shapes:
                 raise custom_error(
                     f"is given for shapes = {self.shapes!r}", f"Leave it out, or write shapes = {shapes!r}.", key
-                )  # fmt: skip
+                )
             if not given and self.shapes == shapes:
                 raise custom_error(f"is missing with shapes = {shapes!r}", "Say which it is.", key)
         of_modes = {"shapes", "mode", "largest_displacement_m", "over", "contacts"}
@@ -87,7 +80,7 @@ class AeroTable(Section):
         if strange:
             raise custom_error(
                 "belongs to modes, and the coefficients are those of points", "Leave one out.", strange[0]
-            )  # fmt: skip
+            )
         if self.over is not None and self.largest_displacement_m is None:
             raise custom_error("is given without largest_displacement_m", "Leave it out.", "over")
         return self

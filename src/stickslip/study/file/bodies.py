@@ -36,9 +36,7 @@ class Placed(Section):
         description='where the axes x, y, z of the part come to point, such as ["y", "z", "x"] or ["-y", "x", "z"]',
     )
     turn_deg: float = Field(0.0, ge=-360, le=360, description="turn about the axis in degrees")
-    axis: Literal["x", "y", "z"] = Field(
-        "z", description="axis through the origin of the turn: x, y or z"
-    )
+    axis: Literal["x", "y", "z"] = Field("z", description="axis through the origin of the turn: x, y or z")
     move_m: Triple = Field([0.0, 0.0, 0.0], description="displacement [x, y, z] in m")
 
     @model_validator(mode="after")
@@ -62,10 +60,7 @@ class Placed(Section):
     @property
     def new_axes(self) -> FloatArray:
         """(3, 3) matrix of the turn that `axes` names."""
-        columns = [
-            np.array(AXES[word[-1]]) * (-1.0 if word.startswith("-") else 1.0)
-            for word in self.axes or "xyz"
-        ]
+        columns = [np.array(AXES[word[-1]]) * (-1.0 if word.startswith("-") else 1.0) for word in self.axes or "xyz"]
         return np.column_stack(columns)
 
 
@@ -103,9 +98,7 @@ class Surface(Section):
     normal: Triple | None = Field(
         None, description="direction [x, y, z] out of the body, the same at all points; or normals"
     )
-    normals: list[Triple] | None = Field(
-        None, max_length=10_000, description="such a direction of each point"
-    )
+    normals: list[Triple] | None = Field(None, max_length=10_000, description="such a direction of each point")
     tangent: Triple | None = Field(
         None,
         description="direction whose part in the contact plane is the tangent t; left out: the axis nearest to the plane",
@@ -130,17 +123,11 @@ class Surface(Section):
     def _has_directions(self) -> Self:
         if (self.normal is None) == (self.normals is None):
             problem = "and normals are both given" if self.normal else "is missing"
-            raise custom_error(
-                problem, "Give normal for all points alike, or normals, one a point.", "normal"
-            )
+            raise custom_error(problem, "Give normal for all points alike, or normals, one a point.", "normal")
         for key in ("normals", "names", "areas_m2"):
             own = getattr(self, key)
             if own is not None and len(own) != len(self.points_m):
-                raise custom_error(
-                    f"has {len(own)} entries for {len(self.points_m)} points",
-                    "Give one a point.",
-                    key,
-                )
+                raise custom_error(f"has {len(own)} entries for {len(self.points_m)} points", "Give one a point.", key)
         once(self.names or [], "names")
         for i, normal in enumerate(self.normals or [self.normal]):
             if not any(normal or ()):
@@ -168,10 +155,7 @@ RigidBodyTable = table_of(
     shape=shape("rigid_body"),
     surfaces=(
         dict[Name, Surface],
-        Field(
-            default_factory=dict,
-            description="the tables surfaces.NAME, points that touch something",
-        ),
+        Field(default_factory=dict, description="the tables surfaces.NAME, points that touch something"),
     ),
     placed=_placed(),
 )

@@ -3,14 +3,7 @@
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    ValidationInfo,
-    create_model,
-    field_validator,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
 from stickslip.assembly.contact import GROUND, NEXT, SPATIAL, PairingKind, Share
 from stickslip.contact.law import ContactLaw
@@ -28,9 +21,7 @@ POPULATIONS: dict[str, type] = {
     "first_loading": FirstLoading,
 }  # of the sliders of the law iwan
 _TABLES = {
-    name: table_of(
-        cls, name=cls.__name__, kind=(Literal[name], Field(description=f'kind = "{name}"'))
-    )
+    name: table_of(cls, name=cls.__name__, kind=(Literal[name], Field(description=f'kind = "{name}"')))
     for name, cls in POPULATIONS.items()
 }
 
@@ -42,9 +33,7 @@ def _kind(given: Any) -> str | None:
 def _known_kind(given: Any) -> Any:
     kind = _kind(given)
     if isinstance(given, dict) and kind not in POPULATIONS:
-        raise custom_error(
-            f"is not known, got {shown(kind)}", did_you_mean(str(kind), list(POPULATIONS)), "kind"
-        )
+        raise custom_error(f"is not known, got {shown(kind)}", did_you_mean(str(kind), list(POPULATIONS)), "kind")
     return given
 
 
@@ -79,9 +68,7 @@ class Pair(Section):
             )
         for name in given:
             if name != GROUND and "." not in name.removeprefix(NEXT):
-                raise custom_error(
-                    f"{name!r} is no surface", 'Name part and surface, such as "blade.tip".'
-                )
+                raise custom_error(f"{name!r} is no surface", 'Name part and surface, such as "blade.tip".')
         return given
 
 
@@ -185,9 +172,7 @@ def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
     """Return the keys of a law and whether each is needed."""
     columns = columns_of(ALL_LAWS[law], per_area=per_area)
     others = ["preload_pa" if per_area else "preload_n", *(["population"] if law == "iwan" else [])]
-    return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(
-        others, False
-    )
+    return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(others, False)
 
 
 def _owners(key: str, *, per_area: bool) -> list[str]:
@@ -215,8 +200,7 @@ def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
         ours, theirs = (list(keys_of(law, per_area=a)) for a in (area, not area))
         what = '"area"' if area else "one other than area"
         return custom_error(
-            f"is not the key with per = {what}, got {shown(value)}",
-            f"Give {ours[theirs.index(key)]}, or another per.",
+            f"is not the key with per = {what}, got {shown(value)}", f"Give {ours[theirs.index(key)]}, or another per."
         )
     having = ", ".join(_owners(key, per_area=area) or _owners(key, per_area=not area))
     return custom_error(
@@ -228,9 +212,7 @@ def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
 def _columns() -> dict[str, Any]:
     """Return the keys of all laws: each may be left out, and the law says which must not be."""
     sliders = "how the sliders of iwan share stiffness and limit, a table with its kind"
-    found: dict[str, Any] = {
-        "population": (PopulationTable | None, Field(None, description=sliders))
-    }
+    found: dict[str, Any] = {"population": (PopulationTable | None, Field(None, description=sliders))}
     for area in (False, True):
         unit = "Pa" if area else "N"
         found[f"preload_{unit.lower()}"] = (
@@ -248,11 +230,7 @@ def _made() -> type[ContactBase]:
     columns = _columns()
     check: Any = field_validator(*columns)(classmethod(_is_of_the_law))
     return create_model(
-        "Contact",
-        __base__=ContactBase,
-        __doc__=ContactBase.__doc__,
-        __validators__={"is_of_the_law": check},
-        **columns,
+        "Contact", __base__=ContactBase, __doc__=ContactBase.__doc__, __validators__={"is_of_the_law": check}, **columns
     )
 
 

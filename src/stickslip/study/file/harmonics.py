@@ -38,8 +38,7 @@ class Harmonics(Section):
     )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     selection: Selection = Field(
-        SELECTION,
-        description="what chooses the harmonics of a frequency: " + ", ".join(SELECTIONS),
+        SELECTION, description="what chooses the harmonics of a frequency: " + ", ".join(SELECTIONS)
     )
     passages: Passages = Field(
         "double",
@@ -98,18 +97,12 @@ class Harmonics(Section):
         labels = isinstance(given, list) and given and all(isinstance(v, str) for v in given)
         if given in PLACES or labels:
             return given
-        remedy = (
-            did_you_mean(given, list(PLACES)) if isinstance(given, str) else "Give one of these."
-        )
-        raise custom_error(
-            f"must be {', '.join(PLACES)} or a list of labels, got {shown(given)}", remedy
-        )
+        remedy = did_you_mean(given, list(PLACES)) if isinstance(given, str) else "Give one of these."
+        raise custom_error(f"must be {', '.join(PLACES)} or a list of labels, got {shown(given)}", remedy)
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        refuse_all(
-            [*_of_supports(self), *_of_options(self), *_of_threshold(self), *_of_alert(self)]
-        )
+        refuse_all([*_of_supports(self), *_of_options(self), *_of_threshold(self), *_of_alert(self)])
         return self
 
     @property
@@ -120,9 +113,7 @@ class Harmonics(Section):
     def beginning(self, driven: Iterable[int]) -> Support:
         """Return the harmonics of the first passage, from 0: where `low` is left out those that loads drive."""
         own = {h for h in driven if h > 0}
-        return (
-            self.low_harmonics if "low" in self.model_fields_set or not own else harmonics_of(own)
-        )
+        return self.low_harmonics if "low" in self.model_fields_set or not own else harmonics_of(own)
 
     @property
     def high_harmonics(self) -> Support:
@@ -162,11 +153,7 @@ def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
     elif "low" not in table.model_fields_set and isinstance(table.high, list):
         pass  # the loads say what it has to hold
     elif isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
-        yield custom_error(
-            f"must not be below low = {table.low}, got {table.high}",
-            "Raise it, or lower low.",
-            "high",
-        )
+        yield custom_error(f"must not be below low = {table.low}, got {table.high}", "Raise it, or lower low.", "high")
     elif not set(low) <= set(high):
         lacking = ", ".join(str(h) for h in low if h not in high)
         yield custom_error(
@@ -186,11 +173,7 @@ def _of_samples(table: Harmonics, highest: int) -> Iterator[PydanticCustomError]
     value = getattr(table, key)
     better = 2 ** (fewest - 1).bit_length()
     if "samples" in table.model_fields_set:
-        of = (
-            f"the harmonic {highest} that {key} = {value!r} begins with"
-            if value == "auto"
-            else f"{key} = {value}"
-        )
+        of = f"the harmonic {highest} that {key} = {value!r} begins with" if value == "auto" else f"{key} = {value}"
         yield custom_error(
             f"must be at least {SAMPLES_A_HARMONIC} times {of}, got {table.samples}",
             f"Give at least {fewest}, better {better}.",

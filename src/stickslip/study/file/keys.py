@@ -59,7 +59,7 @@ def table_keys(name: str) -> list[Keys]:
         return [_of_contact(title, found[""], kind)]
     if kind and kind not in found:
         known = did_you_mean(kind, [word for word in found if word])
-        raise input_error(name, f"is no kind of [{title}]", f"{known} 'stickslip keys {table}' has all.")  # fmt: skip
+        raise input_error(name, f"is no kind of [{title}]", f"{known} 'stickslip keys {table}' has all.")
     chosen = {word: node for word, node in found.items() if not kind or word == kind}
     return [Keys(_title(title, word, node), _rows(node)) for word, node in chosen.items()]
 
@@ -93,9 +93,7 @@ def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
     return Keys(f'[{title}] with law = "{law}"', tuple(rows))
 
 
-def _kinds(
-    schema: Mapping[str, Any], entry: Mapping[str, Any]
-) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _kinds(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the kinds of a table by the word that chooses each, empty where there is one."""
     for node in _nodes(schema, entry):
         words = [str(own["const"]) for own in node["properties"].values() if "const" in own]

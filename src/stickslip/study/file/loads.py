@@ -8,15 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.study.file.bodies import AXES, Triple
-from stickslip.study.file.section import (
-    FilePath,
-    Name,
-    Positive,
-    Section,
-    custom_error,
-    once,
-    shown,
-)
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]
 Speed = Annotated[float, Field(ge=0, le=1e7)]  # rpm
@@ -35,10 +27,7 @@ def unit_direction(given: Any) -> Any:
         length = sum(v * v for v in given) ** 0.5
         if 0 < length < float("inf"):
             return [v / length if length != 1.0 else float(v) for v in given]
-    raise custom_error(
-        f"is no direction, got {shown(given)}",
-        'Give "x", "y", "z", "-x" ... or a vector [x, y, z].',
-    )
+    raise custom_error(f"is no direction, got {shown(given)}", 'Give "x", "y", "z", "-x" ... or a vector [x, y, z].')
 
 
 class LoadTable(Section):
@@ -49,22 +38,16 @@ class LoadTable(Section):
         'among its nodes), a node ("blade.node12") or a dof ("chain.m1")'
     )
     force_n: float | None = Field(
-        None,
-        description="the whole force, or its amplitude, in N; or give ratio_of and ratio, or pressure",
+        None, description="the whole force, or its amplitude, in N; or give ratio_of and ratio, or pressure"
     )
     pressure: FilePath | None = Field(
         None,
         description="file of a pressure field that acts on the faces of the node set, relative to the study: CSV (columns x_m, y_m, z_m, "
         "real_pa, imag_pa) or a surface of VTK (.vtk, .vtu)",
     )
-    length_unit: Literal["m", "mm"] = Field(
-        "m", description="unit of the places in a VTK file of pressures: m or mm"
-    )
+    length_unit: Literal["m", "mm"] = Field("m", description="unit of the places in a VTK file of pressures: m or mm")
     modal_forces: int = Field(
-        3,
-        ge=0,
-        le=50,
-        description="number of modes whose modal force by the pressure is told, 0 to 50",
+        3, ge=0, le=50, description="number of modes whose modal force by the pressure is told, 0 to 50"
     )
     ratio_of: Name | None = Field(
         None, description='another load, such as "load.pull", of which this one is a fraction'
@@ -75,12 +58,8 @@ class LoadTable(Section):
     direction: Annotated[Triple | None, BeforeValidator(unit_direction)] = Field(
         None, description='"x", "y", "z", "-x" ... or a vector [x, y, z]; left out for single dofs'
     )
-    harmonic: int = Field(
-        1, ge=0, le=30, description="multiple of the frequency that it acts with; 0: a static force"
-    )
-    phase_deg: float = Field(
-        0.0, ge=-360, le=360, description="phase of a harmonic force in degrees, -360 to 360"
-    )
+    harmonic: int = Field(1, ge=0, le=30, description="multiple of the frequency that it acts with; 0: a static force")
+    phase_deg: float = Field(0.0, ge=-360, le=360, description="phase of a harmonic force in degrees, -360 to 360")
     engine_order: int | None = Field(
         None,
         ge=0,
@@ -99,7 +78,7 @@ class LoadTable(Section):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         if self.frequency_hz is not None and self.frequency_ratio is not None:
-            raise custom_error("cannot stand beside frequency_hz", "Give one of them.", "frequency_ratio")  # fmt: skip
+            raise custom_error("cannot stand beside frequency_hz", "Give one of them.", "frequency_ratio")
         for key in ("frequency_hz", "frequency_ratio"):
             if getattr(self, key) is not None and self.harmonic == 0:
                 raise custom_error("is given for a static force", "Leave it out.", key)
@@ -108,11 +87,9 @@ class LoadTable(Section):
             found = " and ".join(given) or "none of them"
             raise custom_error(
                 f"needs one of force_n, ratio_of and pressure, got {found}", "Give exactly one.", "force_n"
-            )  # fmt: skip
-        if self.pressure is not None and self.direction is not None:
-            raise custom_error(
-                "is given for a pressure, which acts along normals", "Leave it out.", "direction"
             )
+        if self.pressure is not None and self.direction is not None:
+            raise custom_error("is given for a pressure, which acts along normals", "Leave it out.", "direction")
         strange = sorted({"length_unit", "modal_forces"} & self.model_fields_set)
         if self.pressure is None and strange:
             raise custom_error("belongs to a pressure", "Leave it out.", strange[0])
@@ -138,8 +115,7 @@ class Rotation(Section):
     )
     coriolis: bool = Field(False, description="keep the Coriolis matrix: true or false")
     centrifugal: bool = Field(
-        True,
-        description="whether the centrifugal load of what rotates is a static load: true or false",
+        True, description="whether the centrifugal load of what rotates is a static load: true or false"
     )
 
 
@@ -149,9 +125,7 @@ class Point(Section):
     on: Name = Field(
         description='a node set ("blade.tip", its first node), a node, a dof, or a part together with near_m'
     )
-    near_m: Triple | None = Field(
-        None, description="place [x, y, z] in m: the nearest node of the part is taken"
-    )
+    near_m: Triple | None = Field(None, description="place [x, y, z] in m: the nearest node of the part is taken")
     directions: list[Component] | None = Field(
         None, min_length=1, description="of x, y, z, rx, ry, rz; left out: output.directions"
     )
@@ -165,11 +139,7 @@ class Output(Section):
     """Where motion is reported, and where the results go."""
 
     folder: str = Field(
-        "results",
-        min_length=1,
-        max_length=200,
-        validate_default=True,
-        description="a folder inside the study's folder",
+        "results", min_length=1, max_length=200, validate_default=True, description="a folder inside the study's folder"
     )
     points: dict[Name, Annotated[Point, BeforeValidator(_point)]] = Field(
         default_factory=dict,
@@ -179,9 +149,7 @@ class Output(Section):
         None, min_length=1, description="of x, y, z, rx, ry, rz; left out: those that a point has"
     )
     peak: str = Field(
-        "",
-        max_length=100,
-        description="label whose peak is resolved, such as tip.x; left out: the first",
+        "", max_length=100, description="label whose peak is resolved, such as tip.x; left out: the first"
     )
 
     measure: AmplitudeOf = Field(
@@ -195,9 +163,7 @@ class Output(Section):
     def _are_names(cls, given: dict[str, Point]) -> dict[str, Point]:
         for name in given:
             if "." in name:
-                raise custom_error(
-                    f"the name {name!r} has a dot", "Labels are name.direction: leave it out."
-                )
+                raise custom_error(f"the name {name!r} has a dot", "Labels are name.direction: leave it out.")
         return given
 
     @model_validator(mode="after")
@@ -210,17 +176,10 @@ class Output(Section):
     def _stays_inside(cls, name: str, info: ValidationInfo) -> str:
         """Links are followed before the check; without the context of a study file only the name is judged."""
         relative, remedy = Path(name), "Give a plain relative name such as 'results'."
-        if (
-            not name.isprintable()
-            or relative.is_absolute()
-            or ".." in relative.parts
-            or relative == Path()
-        ):
+        if not name.isprintable() or relative.is_absolute() or ".." in relative.parts or relative == Path():
             raise custom_error(f"must be a folder inside the study's folder, got {name!r}", remedy)
         home = Path(realpath((info.context or {}).get("study", "study.toml"))).parent
-        target = Path(
-            realpath(home / relative)
-        )  # of a link to itself the link, which the run refuses
+        target = Path(realpath(home / relative))  # of a link to itself the link, which the run refuses
         if target == home or not target.is_relative_to(home):
             raise custom_error(
                 f"leads out of the study's folder, got {name!r}, which is a link to {target}",
@@ -240,13 +199,9 @@ class Retention(Section):
 class Limits(Section):
     """What a run may cost; a study that is estimated above is refused before it starts."""
 
-    memory_gb: Positive = Field(
-        4.0,
-        description="memory in GB that a run may take, greater than zero",
-    )
+    memory_gb: Positive = Field(4.0, description="memory in GB that a run may take, greater than zero")
     work_s: Positive = Field(
-        7200.0,
-        description="estimated seconds that one case of an analysis may take on one core, greater than zero",
+        7200.0, description="estimated seconds that one case of an analysis may take on one core, greater than zero"
     )
     job_s: Positive | None = Field(
         None,

@@ -72,8 +72,7 @@ class ReductionTable(Section):
         "are kept",
     )
     factor: Annotated[float, Field(ge=1, le=20)] | None = Field(
-        None,
-        description="with up_to_hz: modes up to factor times it are kept, 1 to 20; left out: 1.5",
+        None, description="with up_to_hz: modes up to factor times it are kept, 1 to 20; left out: 1.5"
     )
     frequency_error: Annotated[float, Field(gt=0, lt=0.5)] | None = Field(
         None,
@@ -92,16 +91,10 @@ class ReductionTable(Section):
         if self.method == "none" and self.up_to_hz is not None:
             raise _not_of(self.method, "up_to_hz")
         if own is not None and self.up_to_hz is not None and getattr(self, own) is not None:
-            raise custom_error(
-                f"is given together with {own}",
-                "Give a number of modes or a frequency.",
-                "up_to_hz",
-            )
+            raise custom_error(f"is given together with {own}", "Give a number of modes or a frequency.", "up_to_hz")
         for key in ("factor", "frequency_error"):
             if getattr(self, key) is not None and self.up_to_hz is None:
-                raise custom_error(
-                    "goes together with up_to_hz", "Give the highest frequency of interest.", key
-                )
+                raise custom_error("goes together with up_to_hz", "Give the highest frequency of interest.", key)
         if self.factor is not None and self.frequency_error is not None:
             raise custom_error(
                 "is given together with factor",
@@ -109,11 +102,7 @@ class ReductionTable(Section):
                 "frequency_error",
             )
         if self.method == "rubin" and self.free_interface_modes is None and self.up_to_hz is None:
-            raise custom_error(
-                "is missing with rubin",
-                "Give a number of modes, or up_to_hz.",
-                "free_interface_modes",
-            )
+            raise custom_error("is missing with rubin", "Give a number of modes, or up_to_hz.", "free_interface_modes")
         return self
 
     def library(self) -> Reduction | None:
@@ -141,17 +130,14 @@ class StudyReduction(ReductionTable):
 
 
 def _not_of(method: str, key: str) -> Exception:
-    return custom_error(
-        f"is no key of the method {method}", "Remove it, or choose the method that has it.", key
-    )
+    return custom_error(f"is no key of the method {method}", "Remove it, or choose the method that has it.", key)
 
 
 class DampingTable(Section):
     """Damping of a part: ratio and between_hz, or alpha_per_s and beta_s, or modal_ratio, or modal_ratios; and a loss factor."""
 
     ratio: Annotated[float, Field(ge=0, lt=1)] | None = Field(
-        None,
-        description="damping ratio at the two frequencies of between_hz, from 0 to below 1 (0.01 is 1 %)",
+        None, description="damping ratio at the two frequencies of between_hz, from 0 to below 1 (0.01 is 1 %)"
     )
     between_hz: list[Positive] | None = Field(
         None, min_length=2, max_length=2, description="two frequencies in Hz, the lower first"
@@ -159,12 +145,9 @@ class DampingTable(Section):
     alpha_per_s: float | None = Field(
         None, ge=0, le=1e6, description="damping proportional to the mass: C = α M + β K, α in 1/s"
     )
-    beta_s: float | None = Field(
-        None, ge=0, le=1, description="damping proportional to the stiffness: β in s"
-    )
+    beta_s: float | None = Field(None, ge=0, le=1, description="damping proportional to the stiffness: β in s")
     modal_ratio: Annotated[float, Field(ge=0, lt=1)] | None = Field(
-        None,
-        description="one damping ratio of all modes of the part by itself, its contacts open, 0 to 1",
+        None, description="one damping ratio of all modes of the part by itself, its contacts open, 0 to 1"
     )
     modal_ratios: list[Annotated[float, Field(ge=0, lt=1)]] | None = Field(
         None,

@@ -34,10 +34,7 @@ class Spot:
 
 
 def told(
-    place: str,
-    model: type[BaseModel],
-    error: ValidationError,
-    renamed: Mapping[str, str] | None = None,
+    place: str, model: type[BaseModel], error: ValidationError, renamed: Mapping[str, str] | None = None
 ) -> InputError:
     """Return one error that tells each problem: ``FILE: table.key: problem, got VALUE. REMEDY``.
 
@@ -93,9 +90,7 @@ def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
         yield {**details, "ctx": context}
 
 
-def _told(
-    place: str, model: type[BaseModel], details: ErrorDetails, renamed: Mapping[str, str]
-) -> InputError:
+def _told(place: str, model: type[BaseModel], details: ErrorDetails, renamed: Mapping[str, str]) -> InputError:
     context: dict[str, Any] = details.get("ctx", {})
     if details["type"] == "stickslip":
         problem, remedy = context["problem"], context["remedy"]

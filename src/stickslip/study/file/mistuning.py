@@ -6,14 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from stickslip.study.file.section import (
-    FilePath,
-    Name,
-    Positive,
-    Section,
-    custom_error,
-    refuse_all,
-)
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, refuse_all
 
 MODES = 6  # blade-alone modes that carry a deviation where the study does not say
 MOST_MODES = 200  # of a blade that a study or a file may name
@@ -45,17 +38,12 @@ class MistuningTable(Section):
     )
     contact: Name | None = Field(None, description="name of the contact that differs")
     part: Name | None = Field(None, description="part that is another one in a single sector")
-    sector: int | None = Field(
-        None, ge=0, le=10_000, description="of part: number of that sector, from 0"
-    )
+    sector: int | None = Field(None, ge=0, le=10_000, description="of part: number of that sector, from 0")
     by: Name | None = Field(
         None,
         description="of part: the part [part.NAME] that stands there instead, with the same nodes; it is nowhere else",
     )
-    quantity: (
-        Literal["frequency", "stiffness", "friction_coefficient", "slip_limit", "preload", "gap"]
-        | None
-    ) = Field(
+    quantity: Literal["frequency", "stiffness", "friction_coefficient", "slip_limit", "preload", "gap"] | None = Field(
         None,
         description="what differs: of blades frequency (the default) or stiffness; of contacts friction_coefficient, slip_limit, "
         "stiffness, preload or gap",
@@ -78,12 +66,8 @@ class MistuningTable(Section):
     standard_deviation: Annotated[float, Field(gt=0, le=0.2)] | None = Field(
         None, description="of random deviations but gaps, relative, above 0 to 0.2"
     )
-    standard_deviation_m: Positive | None = Field(
-        None, description="of random gaps in m, greater than zero"
-    )
-    seed: int = Field(
-        1, ge=0, le=2**31, description="of random deviations: the same seed gives the same"
-    )
+    standard_deviation_m: Positive | None = Field(None, description="of random gaps in m, greater than zero")
+    seed: int = Field(1, ge=0, le=2**31, description="of random deviations: the same seed gives the same")
     file: FilePath | None = Field(
         None,
         description="CSV file of measured blade-alone frequencies, relative to the study; columns blade (from 0), mode (from 1), "
@@ -118,9 +102,7 @@ class MistuningTable(Section):
     def _quantity(self) -> None:
         wanted = ("frequency", "stiffness") if self.of else None
         known = wanted or ("friction_coefficient", "slip_limit", "stiffness", "preload", "gap")
-        if (self.quantity is None and not self.of) or (
-            self.quantity is not None and self.quantity not in known
-        ):
+        if (self.quantity is None and not self.of) or (self.quantity is not None and self.quantity not in known):
             raise custom_error(
                 "is missing" if self.quantity is None else f"is {self.quantity}",
                 f"Give one of {', '.join(known)}.",
@@ -150,9 +132,7 @@ class MistuningTable(Section):
                 other,
             )
         if self.distribution is not None and getattr(self, spread) is None:
-            raise custom_error(
-                "is missing beside distribution", "Say how much it scatters.", spread
-            )
+            raise custom_error("is missing beside distribution", "Say how much it scatters.", spread)
         if self.file is not None and (self.of is None or self.quantity == "stiffness"):
             raise custom_error("is of blades' frequencies", "Give a list of deviations.", "file")
 
@@ -161,9 +141,7 @@ class MistuningTable(Section):
             return
         for key in ("sector", "by"):
             if getattr(self, key) is None:
-                yield custom_error(
-                    "is missing beside part", "Say which sector, and what stands there.", key
-                )
+                yield custom_error("is missing beside part", "Say which sector, and what stands there.", key)
         for key in ("quantity", *WAYS):
             if getattr(self, key) is not None:
                 yield custom_error("is given beside part", "A part of its own has no pattern.", key)

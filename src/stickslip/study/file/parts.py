@@ -3,13 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from stickslip.assembly.contact import NEXT
 from stickslip.errors import did_you_mean, nearest
@@ -17,26 +11,10 @@ from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, Bending
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
-from stickslip.study.file.bodies import (
-    Cylinder,
-    FlatCurved,
-    RigidBodyTable,
-    Steps,
-    Triple,
-    Wedge,
-    shape,
-)
+from stickslip.study.file.bodies import Cylinder, FlatCurved, RigidBodyTable, Steps, Triple, Wedge, shape
 from stickslip.study.file.material import DampingTable, MaterialTable, ReductionTable
 from stickslip.study.file.quantities import table_of
-from stickslip.study.file.section import (
-    FilePath,
-    Name,
-    Positive,
-    Section,
-    custom_error,
-    once,
-    shown,
-)
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
 from stickslip.study.file.sets import SetTable
 
 
@@ -46,9 +24,7 @@ class PartTable(Section):
     material: MaterialTable | None = Field(
         None, description="the table of its material; left out: the table [material]"
     )
-    damping: DampingTable | None = Field(
-        None, description="the table of its damping; left out: the table [damping]"
-    )
+    damping: DampingTable | None = Field(None, description="the table of its damping; left out: the table [damping]")
     reduction: ReductionTable | None = Field(
         None, description="the table of its reduction; left out: the table [reduction]"
     )
@@ -106,9 +82,7 @@ class Lumped(PartTable):
     """Masses that move along one direction, springs and dashpots between them, to the ground and to the next sector."""
 
     shape: Literal["lumped"] = Field(description='shape = "lumped"')
-    masses_kg: list[Positive] = Field(
-        min_length=1, max_length=2000, description="the masses in kg, greater than zero"
-    )
+    masses_kg: list[Positive] = Field(min_length=1, max_length=2000, description="the masses in kg, greater than zero")
     names: list[Name] | None = Field(
         None, description="names of the masses, which are sets of the part; left out: m1, m2, ..."
     )
@@ -124,10 +98,7 @@ class Lumped(PartTable):
         description="dashpots [end, end, coefficient in N s/m]; ends as of springs",
     )
     sectors: int = Field(
-        1,
-        ge=1,
-        le=1000,
-        description="number of equal sectors that make the wheel; 1 where it stands alone",
+        1, ge=1, le=1000, description="number of equal sectors that make the wheel; 1 where it stands alone"
     )
 
     @property
@@ -185,9 +156,7 @@ class FileModel(PartTable):
         None,
         description="name of the node set of the cyclic face at the lower angle; left out: the faces of the deck's cyclic tie",
     )
-    high_face: Name | None = Field(
-        None, description="name of the node set of the cyclic face at the higher angle"
-    )
+    high_face: Name | None = Field(None, description="name of the node set of the cyclic face at the higher angle")
     cyclic: Literal["node_to_node", "segment_to_segment", "none"] = Field(
         "node_to_node",
         description="how the cyclic faces are tied: node_to_node where their meshes match, or segment_to_segment, in the mean, where "
@@ -200,8 +169,7 @@ class FileModel(PartTable):
         description="names of the node sets of a mesh that are held in all directions, beside what a deck holds itself",
     )
     axis_direction: Triple | None = Field(
-        None,
-        description="direction [x, y, z] of the axis of rotation; left out: that of the deck, else the z axis",
+        None, description="direction [x, y, z] of the axis of rotation; left out: that of the deck, else the z axis"
     )
     axis_origin_m: Triple = Field(
         [0.0, 0.0, 0.0],
@@ -220,33 +188,25 @@ class FileModel(PartTable):
         description="beside matrices without coordinates: the mesh file with the nodes and their sets (.inp for CalculiX's .sti)",
     )
     mass: FilePath | None = Field(
-        None,
-        description="with matrices in separate files: that of the mass; file is the stiffness",
+        None, description="with matrices in separate files: that of the mass; file is the stiffness"
     )
-    damping_matrix: FilePath | None = Field(
-        None, description="with matrices in separate files: that of the damping"
-    )
+    damping_matrix: FilePath | None = Field(None, description="with matrices in separate files: that of the damping")
     nodes: FilePath | None = Field(
-        None,
-        description="with matrices in separate files: CSV of node, component, x, y, z of every row",
+        None, description="with matrices in separate files: CSV of node, component, x, y, z of every row"
     )
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         if (self.low_face is None) != (self.high_face is None):
             missing = "low_face" if self.low_face is None else "high_face"
-            raise custom_error(
-                "is missing, the other face is given", "Name both faces or neither.", missing
-            )
+            raise custom_error("is missing, the other face is given", "Name both faces or neither.", missing)
         if self.axis_direction is not None and not any(self.axis_direction):
             raise custom_error("has no length", "The z axis is [0, 0, 1].", "axis_direction")
         return self
 
     def files(self) -> dict[str, str]:
         """Return the keys that name files, and the names."""
-        named = {
-            key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")
-        }
+        named = {key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")}
         return {key: name for key, name in named.items() if name is not None}
 
     def axis(self) -> Axis | None:
@@ -297,14 +257,10 @@ def _known_kind(given: Any) -> Any:
                 remedy = did_you_mean(key, ["shape", "file"])
                 raise custom_error(f"unknown key {key!r}", remedy, key)
         raise custom_error(
-            "is missing",
-            f'Say what the part is: a shape ({shapes}), file = "...", or of = "...".',
-            "shape",
+            "is missing", f'Say what the part is: a shape ({shapes}), file = "...", or of = "...".', "shape"
         )
     raise custom_error(
-        f"is not known, got {shown(given['shape'])}",
-        did_you_mean(str(given["shape"]), list(SHAPES)),
-        "shape",
+        f"is not known, got {shown(given['shape'])}", did_you_mean(str(given["shape"]), list(SHAPES)), "shape"
     )
 
 

@@ -14,9 +14,20 @@ from stickslip.study.file.section import Section, custom_error
 from stickslip.units import Quantity, quantity_of
 
 IN_WORDS = {
-    "m": "m", "m2": "m²", "m4": "m⁴", "deg": "degrees", "kg": "kg", "kg_m2": "kg m²", "kg_per_m3": "kg/m³",
-    "pa": "Pa", "n": "N", "n_per_m": "N/m", "n_per_m3": "N/m³", "n_per_m5": "N/m⁵", "m_per_s": "m/s",
-}  # fmt: skip
+    "m": "m",
+    "m2": "m²",
+    "m4": "m⁴",
+    "deg": "degrees",
+    "kg": "kg",
+    "kg_m2": "kg m²",
+    "kg_per_m3": "kg/m³",
+    "pa": "Pa",
+    "n": "N",
+    "n_per_m": "N/m",
+    "n_per_m3": "N/m³",
+    "n_per_m5": "N/m⁵",
+    "m_per_s": "m/s",
+}
 Column = tuple[Any, Any]  # annotation and pydantic's field
 
 
@@ -65,18 +76,12 @@ def table_of(
 
 
 def columns_of(
-    cls: type,
-    *,
-    without: Collection[str] = (),
-    optional: Collection[str] = (),
-    per_area: bool = False,
+    cls: type, *, without: Collection[str] = (), optional: Collection[str] = (), per_area: bool = False
 ) -> dict[str, Any]:
     """Return the keys that the quantities of a dataclass make, each with its annotation and what pydantic knows of it."""
     hints = get_type_hints(cls)
     return {
-        q.key_of(entry.name, per_area=per_area): _column(
-            entry, q, hints[entry.name], entry.name in optional, per_area
-        )
+        q.key_of(entry.name, per_area=per_area): _column(entry, q, hints[entry.name], entry.name in optional, per_area)
         for entry, q in quantities_of(cls)
         if entry.name not in without
     }
@@ -98,9 +103,7 @@ def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) ->
         value = getattr(table, q.key_of(entry.name, per_area=per_area), None)
         if value is not None:
             given[entry.name] = _in_si(value, q, hints[entry.name])
-        elif _inner(hints[entry.name]) is not hints[entry.name] and is_dataclass(
-            _inner(hints[entry.name])
-        ):
+        elif _inner(hints[entry.name]) is not hints[entry.name] and is_dataclass(_inner(hints[entry.name])):
             given[entry.name] = None  # a table that is left out is not there
     return cls(**given)
 

@@ -19,8 +19,7 @@ def _plain_name(given: str) -> str:
     if given.isprintable() and not set(given) & set(_NO_NAME) and given == given.strip():
         return given
     raise custom_error(
-        f"is no name, got {shown(given)}",
-        "Use letters, digits, '_' and '-': files are named after parts.",
+        f"is no name, got {shown(given)}", "Use letters, digits, '_' and '-': files are named after parts."
     )
 
 
@@ -90,22 +89,14 @@ def shown(value: object) -> str:
 def rising_pair(values: Sequence[float], key: str, what: str = "frequency") -> None:
     """Refuse a pair that does not rise."""
     if len(values) == 2 and values[0] == values[1]:
-        raise custom_error(
-            f"begins and ends at {values[0]:g}",
-            f"Give the lower {what} first, then a higher one.",
-            key,
-        )
+        raise custom_error(f"begins and ends at {values[0]:g}", f"Give the lower {what} first, then a higher one.", key)
     if len(values) == 2 and not values[0] < values[1]:
         raise custom_error(
-            f"must be the lower before the higher, got {list(values)}",
-            f"Give the lower {what} first.",
-            key,
+            f"must be the lower before the higher, got {list(values)}", f"Give the lower {what} first.", key
         )
 
 
 def once(values: Sequence[object], key: str) -> None:
     """Refuse a list that holds an entry twice."""
     if len(set(values)) < len(values):
-        raise custom_error(
-            f"holds an entry twice, got {shown(list(values))}", "Give every one once.", key
-        )
+        raise custom_error(f"holds an entry twice, got {shown(list(values))}", "Give every one once.", key)

@@ -57,22 +57,12 @@ class Solver(Section):
 class Tables(Section):
     """Everything a study file may hold, but for the tables of the analyses."""
 
-    schema_version: Literal[2] = Field(
-        description="schema_version = 2, the version of the file's layout"
-    )
+    schema_version: Literal[2] = Field(description="schema_version = 2, the version of the file's layout")
     title: str = Field("", max_length=200, description="a title of one line")
-    part: dict[Name, AnyPart] = Field(
-        min_length=1, description="the tables [part.NAME], one for each part"
-    )
-    material: MaterialTable | None = Field(
-        None, description="the table [material], of all parts without their own"
-    )
-    damping: DampingTable | None = Field(
-        None, description="the table [damping], of all parts without their own"
-    )
-    reduction: StudyReduction | None = Field(
-        None, description="the table [reduction], of all parts without their own"
-    )
+    part: dict[Name, AnyPart] = Field(min_length=1, description="the tables [part.NAME], one for each part")
+    material: MaterialTable | None = Field(None, description="the table [material], of all parts without their own")
+    damping: DampingTable | None = Field(None, description="the table [damping], of all parts without their own")
+    reduction: StudyReduction | None = Field(None, description="the table [reduction], of all parts without their own")
     contact: dict[Name, ContactTable] = Field(  # type: ignore[valid-type]
         default_factory=dict, description="the tables [contact.NAME]"
     )
@@ -81,27 +71,18 @@ class Tables(Section):
     )
     load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
-    aero: AeroTable | None = Field(
-        None, description="the table [aero], of aerodynamic influence coefficients"
-    )
+    aero: AeroTable | None = Field(None, description="the table [aero], of aerodynamic influence coefficients")
     mistuning: dict[Name, MistuningTable] = Field(
-        default_factory=dict,
-        description="the tables [mistuning.NAME], of what differs from sector to sector",
+        default_factory=dict, description="the tables [mistuning.NAME], of what differs from sector to sector"
     )
-    output: Output = (
-        Field(  # validated even if left out: its folder may be a link that leads elsewhere
-            {},
-            validate_default=True,
-            description="the table [output]",
-        )
+    output: Output = Field(  # validated even if left out: its folder may be a link that leads elsewhere
+        {}, validate_default=True, description="the table [output]"
     )
     harmonics: Harmonics = Field(default_factory=Harmonics, description="the table [harmonics]")
     solver: Solver = Field(default_factory=Solver, description="the table [solver]")
     retention: Retention = Field(default_factory=Retention, description="the table [retention]")
     limits: Limits = Field(default_factory=Limits, description="the table [limits]")
-    measured: Measured | None = Field(
-        None, description="the table [measured], of peaks from a test"
-    )
+    measured: Measured | None = Field(None, description="the table [measured], of peaks from a test")
     vary: Any = Field(
         None,
         description="the table [vary], or several [[vary]]: keys of the file and the lists of their values; the lists of one table "
@@ -118,8 +99,7 @@ def _table(place: str) -> Any:
 def study_tables() -> type[Tables]:
     """Return the section of the whole file, with one optional table for each analysis."""
     asked: dict[str, Any] = {
-        name: (_table(place) | None, Field(None, description=f"the table [{name}]"))
-        for name, place in TABLES.items()
+        name: (_table(place) | None, Field(None, description=f"the table [{name}]")) for name, place in TABLES.items()
     }
     made: type[Tables] = create_model(
         "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked

@@ -16,8 +16,7 @@ DEEPEST = 20  # lists or tables within each other: ours go to four
 MOST_DIGITS = 400  # of a number: the largest that a computer holds has 309
 
 _TEXTS = re.compile(
-    r"""\"{3}(?:[^\\]|\\.)*?\"{3} | '{3}.*?'{3} | "(?:[^"\\\n]|\\.)*" | '[^'\n]*' | \#[^\n]*""",
-    re.DOTALL | re.VERBOSE,
+    r"""\"{3}(?:[^\\]|\\.)*?\"{3} | '{3}.*?'{3} | "(?:[^"\\\n]|\\.)*" | '[^'\n]*' | \#[^\n]*""", re.DOTALL | re.VERBOSE
 )
 _KEY = re.compile(rf"(?<![\w.-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 _TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
@@ -58,35 +57,23 @@ def _text(path: Path) -> str:
     place = str(path)
     if not path.exists():
         raise input_error(
-            place,
-            "there is no such file",
-            "Check the name, or write an example with 'stickslip new NAME'.",
+            place, "there is no such file", "Check the name, or write an example with 'stickslip new NAME'."
         )
     if not path.is_file():
         inside = path / "study.toml"
-        name = f"{inside}." if inside.is_file() else "the study file itself, for example two_blades/study.toml."  # fmt: skip
-        raise input_error(
-            place, "is a folder" if path.is_dir() else "is not a file", f"Give {name}"
-        )
+        name = f"{inside}." if inside.is_file() else "the study file itself, for example two_blades/study.toml."
+        raise input_error(place, "is a folder" if path.is_dir() else "is not a file", f"Give {name}")
     try:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
-            raise input_error(
-                place,
-                f"is larger than {LARGEST_FILE} bytes",
-                "A study file is a few kilobytes of TOML.",
-            )
+            raise input_error(place, f"is larger than {LARGEST_FILE} bytes", "A study file is a few kilobytes of TOML.")
         # TOML allows both line ends; one form keeps hashes and provenance the same
         return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors mark UTF-8
     except OSError as error:
-        raise input_error(
-            place, f"cannot be read ({error.strerror})", "Check its permissions."
-        ) from None
+        raise input_error(place, f"cannot be read ({error.strerror})", "Check its permissions.") from None
     except UnicodeDecodeError as error:
-        raise input_error(
-            place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8."
-        ) from None
+        raise input_error(place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8.") from None
 
 
 def _check_size(path: Path, text: str) -> None:
@@ -99,10 +86,7 @@ def _check_size(path: Path, text: str) -> None:
     steps = ((b in "[{") - (b in "]}") for b in re.findall(r"[][{}]", bare))
     if max(accumulate(steps), default=0) > DEEPEST:
         raise _too_large(path, bare, 0, f"has over {DEEPEST} lists or tables within each other")
-    for what, count, most in (
-        ("tables", len(_TABLE.findall(bare)), MOST_TABLES),
-        ("keys", bare.count("="), MOST_KEYS),
-    ):
+    for what, count, most in (("tables", len(_TABLE.findall(bare)), MOST_TABLES), ("keys", bare.count("="), MOST_KEYS)):
         if count > most:
             raise _too_large(path, bare, 0, f"has {count} {what}, more than {most}")
 

@@ -49,20 +49,14 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
         raise together(errors)
     count = prod(len(next(iter(lists.values()))) for lists in flat if lists)
     if count > MOST_CASES:
-        raise input_error(
-            f"{place}: vary", f"spans {count} cases, more than {MOST_CASES}", "Vary fewer values."
-        )
+        raise input_error(f"{place}: vary", f"spans {count} cases, more than {MOST_CASES}", "Vary fewer values.")
     runs = [
-        [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
-        for lists in flat
-        if lists
+        [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)] for lists in flat if lists
     ]
     return [{k: v for part in parts for k, v in part.items()} for parts in product(*runs)]
 
 
-def with_values(
-    raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False
-) -> dict[str, Any]:
+def with_values(raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False) -> dict[str, Any]:
     """Return the content of a file with some keys in place, without [vary] unless it is kept."""
     content = {k: v for k, v in deepcopy(dict(raw)).items() if keep_vary or k != "vary"}
     for key, value in values.items():
@@ -118,10 +112,7 @@ def _flat(
         elif isinstance(value, list) and value:
             yield key, value
         elif value == []:
-            problem, remedy = (
-                "is an empty list: there is nothing to compute",
-                "Give one value or more.",
-            )
+            problem, remedy = ("is an empty list: there is nothing to compute", "Give one value or more.")
             errors.append(input_error(f"{place}: vary.{key}", problem, remedy))
         else:
             problem = f"must be a list of values, got {shown(value)}"
@@ -129,10 +120,7 @@ def _flat(
 
 
 def _wrong(
-    place: str,
-    tables: Sequence[Mapping[str, list[Any]]],
-    raw: Mapping[str, Any],
-    model: type[BaseModel],
+    place: str, tables: Sequence[Mapping[str, list[Any]]], raw: Mapping[str, Any], model: type[BaseModel]
 ) -> Iterator[InputError]:
     seen: set[str] = set()
     for lists in tables:
@@ -151,20 +139,14 @@ def _wrong(
             )
 
 
-def _unknown(
-    place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel]
-) -> list[InputError]:
+def _unknown(place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[InputError]:
     """Return the complaint about a key that the file cannot have."""
     content: Any = raw
     here: Any = model
     for i, name in enumerate(key.split(".")):
         known, here = _below(here, content, name)
         if name not in known or (i == 0 and name in ("vary", "schema_version", "title")):
-            return [
-                input_error(
-                    f"{place}: vary.{key}", f"there is no key {name!r}", nearest_key(name, known)
-                )
-            ]
+            return [input_error(f"{place}: vary.{key}", f"there is no key {name!r}", nearest_key(name, known))]
         content = content.get(name) if isinstance(content, Mapping) else None
     return []
 

@@ -108,9 +108,7 @@ class Cell:
             with suppress(Empty):
                 kind, content = self._said.get(timeout=EVERY)
                 if kind == "line":
-                    with suppress(
-                        OSError
-                    ):  # a closed terminal, of which this process's own lines tell
+                    with suppress(OSError):  # a closed terminal, of which this process's own lines tell
                         hear(logging.makeLogRecord(content))
                 elif kind == "done":
                     return content
@@ -134,9 +132,7 @@ class Cell:
             with suppress(OSError):
                 process.stdin.close()
 
-    def _look(
-        self, number: int, seconds: float, limits: Limits, stopped: Callable[[], bool]
-    ) -> None:
+    def _look(self, number: int, seconds: float, limits: Limits, stopped: Callable[[], bool]) -> None:
         """End the process where it has to be."""
         if stopped():
             self.close()
@@ -147,7 +143,7 @@ class Cell:
         taken = memory_gb(number) if limits.memory_gb < inf else 0.0
         if taken > limits.memory_gb:
             self.close()
-            raise Ended(f"took {taken:.2f} GB of memory, the limit of a job is {limits.memory_gb:g} GB")  # fmt: skip
+            raise Ended(f"took {taken:.2f} GB of memory, the limit of a job is {limits.memory_gb:g} GB")
 
     def started(self) -> subprocess.Popen[bytes]:
         """Return the process, which is started where there is none; it may be given work before it is ready."""

@@ -20,11 +20,7 @@ TRIAL = ".stickslip-trial"
 LONGEST_PATH = 512  # bytes of the path of an SQLite file
 LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # of such a file in a folder
 WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until they are whole
-OWN = (
-    *WHOLE,
-    *map(beside, WHOLE),
-    *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)),
-)
+OWN = (*WHOLE, *map(beside, WHOLE), *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)))
 LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
 SHARD_LOGS = "run-*-of-*.log"
 HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
@@ -170,9 +166,7 @@ def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connec
             return db
         db.close()
         if "locked" in str(error):
-            raise input_error(
-                str(folder), "another run is at work in it", "Wait for it, or stop it."
-            ) from None
+            raise input_error(str(folder), "another run is at work in it", "Wait for it, or stop it.") from None
         raise
     return db
 

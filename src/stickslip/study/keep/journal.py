@@ -73,10 +73,7 @@ class JobJournal:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._db.close()
 
@@ -211,9 +208,7 @@ def _check_mark(db: sqlite3.Connection, path: Path) -> None:
     row = db.execute("select value from meta where key = 'file'").fetchone()
     layout, _, key = str(row[0] if row else "").partition(":")
     if layout.isdecimal() and int(layout) != FORMAT and key == _key(path):
-        problem = (
-            f"was written by another version of stickslip (layout {layout}, this one has {FORMAT})"
-        )
+        problem = f"was written by another version of stickslip (layout {layout}, this one has {FORMAT})"
         raise input_error(str(path), problem, ANEW)
     if row is None or row[0] != _mark(path):
         raise input_error(str(path), "is the file of another job", FRESH)
@@ -222,10 +217,7 @@ def _check_mark(db: sqlite3.Connection, path: Path) -> None:
 def _checksum(db: sqlite3.Connection) -> str:
     """Return the checksum of all records and notes, each under its number or name."""
     found = sha256()
-    for rows in (
-        "select id, payload from record order by id",
-        "select name, payload from note order by name",
-    ):
+    for rows in ("select id, payload from record order by id", "select name, payload from note order by name"):
         for place, payload in db.execute(rows):
             found.update(f"{place} {len(payload)} ".encode() + payload)
     return found.hexdigest()
@@ -267,6 +259,4 @@ def _named(path: Path) -> Iterator[None]:
         refused = unwritable_database(path, error) if isinstance(error, sqlite3.Error) else None
         if refused is not None:
             raise refused from error
-        raise input_error(
-            str(path), f"the file of a job cannot be used ({error})", FRESH
-        ) from error
+        raise input_error(str(path), f"the file of a job cannot be used ({error})", FRESH) from error

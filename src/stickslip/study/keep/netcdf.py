@@ -58,9 +58,7 @@ def read_tree(path: Path) -> xr.DataTree:
         raise
     except Exception as error:  # noqa: BLE001  the libraries say it of wrong bytes in a dozen ways
         said = " ".join(str(error).split())
-        raise input_error(
-            str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN
-        ) from None
+        raise input_error(str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN) from None
 
 
 def attributes_there(path: Path) -> dict[str, Any]:
@@ -79,9 +77,7 @@ def attributes_there(path: Path) -> dict[str, Any]:
 
 def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
     """Return a variable over the dimensions named in `dims`, separated by spaces."""
-    return xr.Variable(
-        tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name}
-    )
+    return xr.Variable(tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name})
 
 
 def stacked(cases: Sequence[Mapping[str, xr.Variable]]) -> dict[str, xr.Variable]:

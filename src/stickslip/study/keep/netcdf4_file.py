@@ -35,9 +35,7 @@ def to_bytes(tree: xr.DataTree) -> bytes:
     return made.getvalue()
 
 
-def _write(
-    group: h5py.Group, node: xr.DataTree, known: Mapping[str, h5py.Dataset], number: list[int]
-) -> None:
+def _write(group: h5py.Group, node: xr.DataTree, known: Mapping[str, h5py.Dataset], number: list[int]) -> None:
     data = node.to_dataset(inherit=False)
     variables, attributes = cf_encoder(*encode_dataset_coordinates(data))
     scales = dict(known)
@@ -114,14 +112,10 @@ def root_attributes(path: Path) -> dict[str, Any]:
         return _shown(_said(file))
 
 
-def _read(
-    group: h5py.Group, path: str, known: Mapping[int, str]
-) -> Iterator[tuple[str, xr.Dataset]]:
+def _read(group: h5py.Group, path: str, known: Mapping[int, str]) -> Iterator[tuple[str, xr.Dataset]]:
     """Yield each group and its variables, from the root downward."""
     every = {name: (one, _said(one)) for name, one in group.items()}
-    dims = dict(known) | {
-        int(said[DIMID]): name for name, (_, said) in every.items() if DIMID in said
-    }
+    dims = dict(known) | {int(said[DIMID]): name for name, (_, said) in every.items() if DIMID in said}
     variables = {}
     for name, (one, said) in every.items():
         if isinstance(one, h5py.Group) or said.get("NAME", "").startswith(NO_VARIABLE):

@@ -17,12 +17,7 @@ from stickslip.study.keep.whole import unwritable
 
 LOG = logging.getLogger("stickslip")
 DONE = "done"  # what is told of a job at its end
-OF_RECORDS = (
-    "fraction",
-    "job",
-    "verdict",
-    "sums_up",
-)  # what records of ours carry beside their text
+OF_RECORDS = ("fraction", "job", "verdict", "sums_up")  # what records of ours carry beside their text
 _JOB = ContextVar("job", default="")
 
 

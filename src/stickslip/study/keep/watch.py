@@ -66,10 +66,7 @@ class Answer:
 
 
 def watched(
-    parcel: Parcel,
-    cell: Cell,
-    stopped: Callable[[], bool],
-    hear: Callable[[logging.LogRecord], object],
+    parcel: Parcel, cell: Cell, stopped: Callable[[], bool], hear: Callable[[logging.LogRecord], object]
 ) -> None:
     """Solve a job in a process of its own; set it aside where that takes too long, or ends twice at the same place."""
     while True:
@@ -115,9 +112,7 @@ def set_aside(parcel: Parcel, why: str) -> None:
     clear(parcel.sealed)
 
 
-def solve_far(
-    parcel: Parcel, token: Path, versions: dict[str, str], threads: dict[str, str]
-) -> Answer:
+def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: dict[str, str]) -> Answer:
     """Solve a job on another machine, in a file of this attempt alone; end when the run has ended."""
     lines: list[dict[str, Any]] = []
     host = socket.gethostname()

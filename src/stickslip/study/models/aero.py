@@ -28,9 +28,7 @@ def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[I
     table = tables.aero
     if table is None:
         if getattr(tables, "flutter", None) is not None:
-            yield input_error(
-                "flutter", "needs aerodynamic coefficients", "Add the table [aero] with their file."
-            )
+            yield input_error("flutter", "needs aerodynamic coefficients", "Add the table [aero] with their file.")
         return
     if sectors == 1:
         yield input_error(
@@ -99,7 +97,7 @@ def aerodynamics_of(
         over=table.over or "",
         contacts=table.contacts,
         points={name: (points[name], _direction(table, name)) for name in names} if of_points else {},
-    )  # fmt: skip
+    )
 
 
 def _direction(table: AeroTable, name: str) -> tuple[float, float, float] | None:
@@ -120,9 +118,7 @@ def _from_toml(path: Path) -> MeasuredColumns:
             raise input_error(f"{path}: {key}", "is no list", "Give a list of values for each key.")
         first = next(iter(sizes))
         if size != sizes[first]:
-            raise input_error(
-                f"{path}: {key}", f"has {size} entries, {first} {sizes[first]}", "Give as many."
-            )
+            raise input_error(f"{path}: {key}", f"has {size} entries, {first} {sizes[first]}", "Give as many.")
     if not raw:
         raise input_error(str(path), "holds no numbers", "Give keys with lists of values.")
     rows = tuple(tuple(str(v) for v in row) for row in zip(*raw.values(), strict=True))
@@ -153,9 +149,7 @@ def _check_names(columns: MeasuredColumns, table: AeroTable) -> None:
                 UNIT_MASS: "coefficients of modes of unit mass are in 1/s²; scaled ones in J need largest_displacement_m in [aero]",
                 SCALED: "coefficients of modes scaled to a largest displacement are in J",
             }[unit]
-            raise input_error(
-                place, f"has a column {name!r}, and {why}", f"Write {stem}_{unit}, in that unit."
-            )
+            raise input_error(place, f"has a column {name!r}, and {why}", f"Write {stem}_{unit}, in that unit.")
         between = f"{' and '.join(pair)}; frequency_hz, speed_rpm"
         values = f"{' and '.join(numbers[:2])}, or {' and '.join(numbers[2:])}"
         raise columns.unknown(name, known, f"one of {', '.join(WHO)}; {values}; {between}")
@@ -208,25 +202,16 @@ def _values(columns: MeasuredColumns, table: AeroTable) -> ComplexArray:
 
 
 def _influence(
-    columns: MeasuredColumns,
-    values: ComplexArray,
-    pairs: Sequence[tuple[int, int]],
-    size: int,
-    sectors: int,
+    columns: MeasuredColumns, values: ComplexArray, pairs: Sequence[tuple[int, int]], size: int, sectors: int
 ) -> InfluenceCoefficients:
     who = next(name for name in WHO if name in columns.names)
     given = columns.numbers(who) if who == "phase_angle_deg" else _whole(columns, who)
     if who == "recorded_on":
         given = -given
-    axes = {
-        "speed": _axis(columns, "speed_rpm", RPM),
-        "frequency": _axis(columns, "frequency_hz", HZ),
-    }
+    axes = {"speed": _axis(columns, "speed_rpm", RPM), "frequency": _axis(columns, "frequency_hz", HZ)}
     once, place = np.unique(given, return_inverse=True)
     (speeds, at_speed), (frequencies, at_frequency) = axes["speed"], axes["frequency"]
-    table = np.zeros(
-        (max(speeds.size, 1), max(frequencies.size, 1), once.size, size, size), dtype=complex
-    )
+    table = np.zeros((max(speeds.size, 1), max(frequencies.size, 1), once.size, size, size), dtype=complex)
     line = np.full(table.shape, -1)
     for i, (a, b) in enumerate(pairs):
         cell = (at_speed[i], at_frequency[i], place[i], a, b)
@@ -234,7 +219,7 @@ def _influence(
             first = columns.lines[line[cell]]
             raise input_error(
                 columns.place(i), f"says the same coefficient as {columns.word} {first}", "Leave one of them out."
-            )  # fmt: skip
+            )
         line[cell] = i
         table[cell] = values[i]
     _refuse_gaps(columns, line, who, once, speeds, frequencies)
@@ -273,12 +258,7 @@ def _whole(columns: MeasuredColumns, name: str, least: int | None = None) -> Flo
 
 
 def _refuse_gaps(
-    columns: MeasuredColumns,
-    line: IntArray,
-    who: str,
-    once: FloatArray,
-    speeds: FloatArray,
-    frequencies: FloatArray,
+    columns: MeasuredColumns, line: IntArray, who: str, once: FloatArray, speeds: FloatArray, frequencies: FloatArray
 ) -> None:
     """Refuse a table that lacks a coefficient which it has at another speed, frequency or neighbour."""
     there = (line >= 0).any(axis=(0, 1, 2))  # pairs that are nowhere are zero

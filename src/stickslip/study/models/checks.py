@@ -9,21 +9,8 @@ from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.assembly.forces import engine_order
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
 from stickslip.model.dofs import is_numbered
-from stickslip.study.file.bodies import (
-    BODIES,
-    Cylinder,
-    FlatCurved,
-    RigidBodyTable,
-    Wedge,
-)
-from stickslip.study.file.parts import (
-    BeamTable,
-    Copy,
-    FileModel,
-    Lumped,
-    PrismBlades,
-    Sector,
-)
+from stickslip.study.file.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
+from stickslip.study.file.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.section import Section
 from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables, original
@@ -124,11 +111,7 @@ def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
         if isinstance(table, PrismBlades | Sector | BeamTable) and not (
             table.material or tables.material  # type: ignore[attr-defined]
         ):
-            yield input_error(
-                f"part.{name}.material",
-                "is missing",
-                "Add the table [material], or one of the part.",
-            )
+            yield input_error(f"part.{name}.material", "is missing", "Add the table [material], or one of the part.")
 
 
 def _copied(tables: Tables, name: str, of: str) -> Iterator[InputError]:
@@ -144,9 +127,7 @@ def _copied(tables: Tables, name: str, of: str) -> Iterator[InputError]:
             return
         of = table.of
     if of == name:
-        yield input_error(
-            place, f"{' is a copy of '.join([*line, of])}", "Let one of them be no copy."
-        )
+        yield input_error(place, f"{' is a copy of '.join([*line, of])}", "Let one of them be no copy.")
 
 
 def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:
@@ -211,9 +192,7 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
     """Yield the complaint about a name that no part has, as far as that is known without a mesh."""
     head, _, rest = word.removeprefix(NEXT).partition(".")
     if head not in tables.part:
-        yield input_error(
-            place, f"there is no part {head!r}", did_you_mean(head, list(tables.part))
-        )
+        yield input_error(place, f"there is no part {head!r}", did_you_mean(head, list(tables.part)))
         return
     known = names_of(tables, head)
     if known is None or not rest or rest in known:
@@ -223,9 +202,7 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
         return
     ahead = NEXT if word.startswith(NEXT) else ""
     own = [f"{ahead}{head}.{name}" for name in known]
-    yield input_error(
-        place, f"there is no {' or '.join(what)} {word!r}", nearest_and_known(word, own)
-    )
+    yield input_error(place, f"there is no {' or '.join(what)} {word!r}", nearest_and_known(word, own))
 
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
@@ -268,9 +245,7 @@ def _loads(tables: Tables) -> Iterator[InputError]:
                 yield input_error(
                     f"{place}.ratio_of",
                     f"{table.ratio_of!r} {problem}",
-                    did_you_mean(table.ratio_of, known)
-                    if known
-                    else "Give a load force_n of its own.",
+                    did_you_mean(table.ratio_of, known) if known else "Give a load force_n of its own.",
                 )
         if table.engine_order is not None and sectors_of(tables) == 1:
             yield input_error(
@@ -284,9 +259,7 @@ def _loads(tables: Tables) -> Iterator[InputError]:
 def _driven(tables: Tables) -> Iterator[InputError]:
     """Yield the complaints about harmonics that loads act in and the response does not keep."""
     if any(table.harmonic and table.engine_order is None for table in tables.load.values()):
-        own = {
-            name: table.harmonic for name, table in tables.load.items()
-        }  # a wheel's are refused elsewhere
+        own = {name: table.harmonic for name, table in tables.load.items()}  # a wheel's are refused elsewhere
     else:
         try:
             _, own = engine_order(tables.load, wheel=True)
@@ -322,9 +295,7 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
         may_have = len(words) > 1 and (direction in COMPONENTS or is_numbered(direction))
         if direction not in words and not may_have:
             known = [f"{name}.{d}" for name, own in of.items() for d in own]
-            yield input_error(
-                "output.peak", f"there is no output {peak!r}", did_you_mean(peak, known)
-            )
+            yield input_error("output.peak", f"there is no output {peak!r}", did_you_mean(peak, known))
 
 
 def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
@@ -350,11 +321,7 @@ def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
     sectors = sectors_of(tables)
     if forced is not None and sectors is not None and sectors > 1:
         for name, table in tables.load.items():
-            if (
-                table.engine_order == 0
-                and table.harmonic > 0
-                and getattr(forced, "over", "") == "speed"
-            ):
+            if table.engine_order == 0 and table.harmonic > 0 and getattr(forced, "over", "") == "speed":
                 yield input_error(
                     f"load.{name}.engine_order",
                     'is 0, and with over = "speed" the frequency is the engine order times the speed',

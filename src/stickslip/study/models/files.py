@@ -38,9 +38,7 @@ COMPANIONS = (".mas", ".dof")  # what CalculiX writes beside a stiffness
 _KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
 
 
-def file_part(
-    key: str, table: FileModel, home: Path, material: Material | None, **others: Any
-) -> Part:
+def file_part(key: str, table: FileModel, home: Path, material: Material | None, **others: Any) -> Part:
     """Read a part from its files.
 
     Parameters
@@ -111,9 +109,7 @@ def _units(table: FileModel) -> Units:
     return Units.named(table.units)
 
 
-def _from_deck(
-    key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]
-) -> Part:
+def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]) -> Part:
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
@@ -139,9 +135,7 @@ def _materials(deck: Deck) -> Materials:
     return deck.material
 
 
-def _from_archive(
-    key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]
-) -> Part:
+def _from_archive(key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]) -> Part:
     mesh = read_ansys_archive(path, units=_units(table))
     if given is None:
         found = read_ansys_materials(path, units=_units(table), plausible=table.plausible)
@@ -214,14 +208,7 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     return solid_part(
-        free,
-        material,
-        axis,
-        sectors=sectors,
-        faces=faces,
-        cyclic=_tied(table),
-        clamped_sets=gone,
-        **others,
+        free, material, axis, sectors=sectors, faces=faces, cyclic=_tied(table), clamped_sets=gone, **others
     )
 
 
@@ -242,20 +229,12 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     mesh = None
     if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
         mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
-    if table.damping is None and dissipates(
-        structure
-    ):  # its own is meant, not that of the whole study
+    if table.damping is None and dissipates(structure):  # its own is meant, not that of the whole study
         others = {name: value for name, value in others.items() if name != "damping"}
     faces = _faces(key, table, structure.sets, sectors)
     others["warnings"] = negative_damping(structure, table.file)
     return structure_part(
-        structure,
-        mesh=mesh,
-        sectors=sectors,
-        faces=faces,
-        cyclic=_tied(table),
-        axis=table.axis() or Axis(),
-        **others,
+        structure, mesh=mesh, sectors=sectors, faces=faces, cyclic=_tied(table), axis=table.axis() or Axis(), **others
     )
 
 
@@ -267,9 +246,7 @@ def _matrices(key: str, table: FileModel, files: Mapping[str, Path]) -> Structur
     if isinstance(found, Structure):
         return found
     raise input_error(
-        f"{key}.file",
-        f"{table.file} holds results, not a model",
-        "Give a deck (.inp), an archive (.cdb), or matrices.",
+        f"{key}.file", f"{table.file} holds results, not a model", "Give a deck (.inp), an archive (.cdb), or matrices."
     )
 
 
@@ -284,9 +261,7 @@ def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
     return replace(mesh, node_sets={k: m for k, m in ({ROOT: root} | kept).items() if m.size})
 
 
-def _faces(
-    key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int
-) -> tuple[str, str]:
+def _faces(key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int) -> tuple[str, str]:
     """Return the names of the sets that are the cyclic faces."""
     if table.cyclic == "none":
         if set(FACES) & set(sets):
@@ -322,11 +297,7 @@ def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
     found = alike(name, sets)
     if found is not None:
         return found
-    raise input_error(
-        place,
-        f"the file has no set {name!r} of free nodes",
-        nearest_and_known(name, list(sets)),
-    )
+    raise input_error(place, f"the file has no set {name!r} of free nodes", nearest_and_known(name, list(sets)))
 
 
 def alike(name: str, known: Iterable[str]) -> str | None:

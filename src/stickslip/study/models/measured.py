@@ -101,7 +101,7 @@ def measured_peaks(file: StudyFile) -> MeasuredPeaks | None:
     path = file.home / table.file
     if not path.is_file():
         problem = f"there is no file {path}"
-        raise input_error(f"{file.path}: {PLACE}", problem, "Check the name; it is relative to the study's folder.")  # fmt: skip
+        raise input_error(f"{file.path}: {PLACE}", problem, "Check the name; it is relative to the study's folder.")
     columns = read_columns(path)
     others = [k for k in file.cases[0].values if k != key]
     _check_names(columns, key, others)
@@ -128,7 +128,9 @@ def _varied_number(file: StudyFile) -> str:
     if any(key.startswith("measured.") for key in file.cases[0].values):
         raise input_error(place, "is varied", "Leave it out of [vary]: it is of all cases.")
     if getattr(tables, "forced_response", None) is None:
-        raise input_error(place, "has peaks, and the study computes none", "Add the table [forced_response], or leave [measured] out.")  # fmt: skip
+        raise input_error(
+            place, "has peaks, and the study computes none", "Add the table [forced_response], or leave [measured] out."
+        )
     if tables.output.peak.endswith(TURNS):
         raise input_error(
             place,
@@ -164,13 +166,19 @@ def _check_names(columns: MeasuredColumns, key: str, others: Sequence[str]) -> N
         known += [f"{name}_{bar}_{unit}" for bar in ERRORS for unit in of]
     for name in columns.names:
         if name not in {k.lower() for k in known}:
-            told = [key, *others, f"{AMPLITUDE}_um", f"{FREQUENCY}_hz", f"{AMPLITUDE}_std_um", f"{FREQUENCY}_std_hz", EXCITATION]  # fmt: skip
+            told = [
+                key,
+                *others,
+                f"{AMPLITUDE}_um",
+                f"{FREQUENCY}_hz",
+                f"{AMPLITUDE}_std_um",
+                f"{FREQUENCY}_std_hz",
+                EXCITATION,
+            ]
             raise columns.unknown(name, known, ", ".join(told))
 
 
-def _quantity(
-    columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[str, float]]
-) -> Quantity:
+def _quantity(columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[str, float]]) -> Quantity:
     """Return a measured quantity with its error bars; NaN for all where the file has none."""
     unit, values = _column(columns, name, units)
     bars = {bar: _column(columns, f"{name}_{bar}", units) for bar in ERRORS}
@@ -192,9 +200,7 @@ def _quantity(
     return Quantity(values, np.full(values.size, np.nan), unit, "")
 
 
-def _column(
-    columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str, float]]
-) -> tuple[str, FloatArray]:
+def _column(columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, FloatArray]:
     """Return the unit of a column and its numbers in it; no unit where there is no such column."""
     found = [(unit, *columns.named(stem, names)) for unit, names in units.items()]
     there = [(unit, name, factor) for unit, name, factor in found if name]
@@ -205,9 +211,7 @@ def _column(
         return "", np.full(len(columns.rows), np.nan)
     unit, name, factor = there[0]
     values = columns.numbers(name, gaps=True)
-    bar = any(
-        name.startswith(f"{which}_{kind}") for which in (AMPLITUDE, FREQUENCY) for kind in ERRORS
-    )
+    bar = any(name.startswith(f"{which}_{kind}") for which in (AMPLITUDE, FREQUENCY) for kind in ERRORS)
     wrong = np.flatnonzero(values < 0 if bar else values <= 0)
     if wrong.size:
         problem = f"must {'not be negative' if bar else 'be above zero'}"
@@ -216,9 +220,7 @@ def _column(
     return unit, factor * values
 
 
-def _others(
-    columns: MeasuredColumns, keys: Sequence[str], cases: Sequence[TablesOfCase]
-) -> tuple[str, ...]:
+def _others(columns: MeasuredColumns, keys: Sequence[str], cases: Sequence[TablesOfCase]) -> tuple[str, ...]:
     """Return what the file says of the other varied keys, as labels of cases have it."""
     told: list[list[str]] = [[] for _ in columns.rows]
     for key in (k for k in keys if k.lower() in columns.names):
@@ -227,9 +229,7 @@ def _others(
         for i, row in enumerate(columns.rows):
             label = known.get(_plain(row[at]))
             if label is None:
-                raise columns.wrong(
-                    i, key.lower(), "is none of the values of [vary]", f"Known: {', '.join(known)}."
-                )
+                raise columns.wrong(i, key.lower(), "is none of the values of [vary]", f"Known: {', '.join(known)}.")
             told[i].append(label)
     return tuple(", ".join(labels) for labels in told)
 
@@ -254,14 +254,10 @@ def _refuse(columns: MeasuredColumns, found: MeasuredPeaks) -> None:
         )
     for i in np.flatnonzero(np.isnan(found.amplitude.values) & np.isnan(found.frequency.values)):
         raise input_error(
-            f"{columns.path}: line {columns.lines[i]}",
-            "has neither amplitude nor frequency",
-            "Leave the line out.",
+            f"{columns.path}: line {columns.lines[i]}", "has neither amplitude nor frequency", "Leave the line out."
         )
     for i in np.flatnonzero(found.excitation <= 0):
-        raise columns.wrong(
-            int(i), EXCITATION, "must be above zero", "Give the amplitude of the force in N."
-        )
+        raise columns.wrong(int(i), EXCITATION, "must be above zero", "Give the amplitude of the force in N.")
 
 
 def _with_forces(
@@ -277,15 +273,16 @@ def _with_forces(
     force = found.excitation.copy()
     untold = [k for k in others if k.lower() not in columns.names]
     for i in map(int, np.flatnonzero(np.isnan(force))):
-        of_case = [c for c in file.cases if set(filter(None, found.others[i].split(", "))) <= set(c.label.split(", "))]  # fmt: skip
+        of_case = [c for c in file.cases if set(filter(None, found.others[i].split(", "))) <= set(c.label.split(", "))]
         try:
-            forces = {
-                _force(file, {**c.values, found.key: float(found.values[i])}) for c in of_case
-            }
+            forces = {_force(file, {**c.values, found.key: float(found.values[i])}) for c in of_case}
         except ValidationError:
             raise columns.wrong(
-                i, found.key.lower(), "is no value that the study could have", f"Correct it, or add a column {EXCITATION}."
-            ) from None  # fmt: skip
+                i,
+                found.key.lower(),
+                "is no value that the study could have",
+                f"Correct it, or add a column {EXCITATION}.",
+            ) from None
         if len(forces) > 1:
             raise input_error(
                 f"{columns.path}: line {columns.lines[i]}",
@@ -300,9 +297,5 @@ def _force(file: StudyFile, values: Mapping[str, Any]) -> float:
     """Return the largest harmonic force of the study with these values of the varied keys, N."""
     raw = with_values(file.raw, values)
     tables = study_tables().model_validate(raw, context={"study": file.path})
-    forces = [
-        abs(newton(tables, load))
-        for load in tables.load.values()
-        if load.harmonic and load.pressure is None
-    ]
+    forces = [abs(newton(tables, load)) for load in tables.load.values() if load.harmonic and load.pressure is None]
     return max(forces, default=math.nan)

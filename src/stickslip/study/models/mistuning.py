@@ -8,13 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.deviations import blade_alone_hz
-from stickslip.assembly.mistuning import (
-    BladeMistuning,
-    ContactMistuning,
-    Mistuning,
-    OwnSector,
-    pattern,
-)
+from stickslip.assembly.mistuning import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
@@ -102,9 +96,7 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
     LOG.info(f"{key}: {_means(table, measured.mean(axis=0), alone)}")
     reference = alone if table.relative_to == "model" else measured.mean(axis=0)
     try:
-        return BladeMistuning(
-            of=of, deviations=measured / reference - 1.0, beyond_radius=table.beyond_radius_m
-        )
+        return BladeMistuning(of=of, deviations=measured / reference - 1.0, beyond_radius=table.beyond_radius_m)
     except InputError as error:
         raise error.at(f"{key}.file") from None
 
@@ -141,21 +133,15 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
     found = np.full((sectors, MOST_MODES), np.nan)
     for row, (b, m, f) in enumerate(zip(blade, mode, hertz, strict=True)):
         if b != int(b) or not 0 <= b < sectors:
-            raise columns.wrong(
-                row, "blade", f"is no blade of 0 to {sectors - 1}", f"{FROM_ZERO}{sectors - 1}."
-            )
+            raise columns.wrong(row, "blade", f"is no blade of 0 to {sectors - 1}", f"{FROM_ZERO}{sectors - 1}.")
         if m != int(m) or m < 1:
             raise columns.wrong(row, "mode", "is no number of a mode", "The lowest mode is 1.")
         if m > MOST_MODES:
-            raise columns.wrong(
-                row, "mode", f"is above {MOST_MODES}, the most that are read", "Mend the line."
-            )
+            raise columns.wrong(row, "mode", f"is above {MOST_MODES}, the most that are read", "Mend the line.")
         if f <= 0:
             raise columns.wrong(row, "frequency_hz", "is no frequency", "Mend the line.")
         if np.isfinite(found[int(b), int(m) - 1]):
-            raise columns.wrong(
-                row, "mode", f"stands there twice for blade {int(b)}", "Leave one out."
-            )
+            raise columns.wrong(row, "mode", f"stands there twice for blade {int(b)}", "Leave one out.")
         found[int(b), int(m) - 1] = f
     found = found[:, : int(mode.max())]
     lost = np.argwhere(np.isnan(found))

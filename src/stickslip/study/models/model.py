@@ -175,9 +175,7 @@ def _outputs(tables: Tables, parts: Mapping[str, Part]) -> tuple[Output, ...]:
         Output(
             name=name,
             on=_own_name(parts, point.on),
-            near=None
-            if point.near_m is None
-            else (point.near_m[0], point.near_m[1], point.near_m[2]),
+            near=None if point.near_m is None else (point.near_m[0], point.near_m[1], point.near_m[2]),
             directions=tuple(point.directions or usual or ()),
         )
         for name, point in tables.output.points.items()

@@ -22,38 +22,14 @@ from stickslip.model.mesh.blade_mesh import mesh_blade_pair
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_mesh import mesh_sector
-from stickslip.model.part import (
-    BodyPoints,
-    Part,
-    Place,
-    damper_part,
-    rigid_part,
-    solid_part,
-    structure_part,
-)
+from stickslip.model.part import BodyPoints, Part, Place, damper_part, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
 from stickslip.model.rigid.sides import ContactPoints
-from stickslip.study.file.bodies import (
-    AXES,
-    BODIES,
-    Cylinder,
-    FlatCurved,
-    Placed,
-    RigidBodyTable,
-    Surface,
-    Wedge,
-)
+from stickslip.study.file.bodies import AXES, BODIES, Cylinder, FlatCurved, Placed, RigidBodyTable, Surface, Wedge
 from stickslip.study.file.material import ReductionTable
-from stickslip.study.file.parts import (
-    BeamTable,
-    Copy,
-    FileModel,
-    Lumped,
-    PrismBlades,
-    Sector,
-)
+from stickslip.study.file.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
@@ -115,11 +91,7 @@ class Workshop:
     def _material(self, name: str, table: Any) -> Material:
         found = self.material(table)
         if found is None:
-            raise input_error(
-                f"part.{name}.material",
-                "is missing",
-                "Add the table [material], or one of the part.",
-            )
+            raise input_error(f"part.{name}.material", "is missing", "Add the table [material], or one of the part.")
         return found
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
@@ -157,9 +129,7 @@ class Workshop:
         """Make a structure of masses, springs and dashpots."""
         behind = _behind(table)
         labels = [*table.labels, *(NEXT + name for name in behind)]
-        stiffness, damping = (
-            _links(links, labels) for links in (table.springs_n_per_m, table.dashpots_n_s_per_m)
-        )
+        stiffness, damping = (_links(links, labels) for links in (table.springs_n_per_m, table.dashpots_n_s_per_m))
         if behind:
             structure = lumped_sector(table.masses_kg, stiffness, damping, table.labels, behind)
         else:
@@ -229,11 +199,7 @@ def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
     table: Any = tables.part[name]
     given: dict[str, Any] = {}
     for blades in _blades_at(tables, name):
-        given = {
-            "apex": blades.wedge_apex,
-            "flat_angle": blades.flat_angle,
-            "curved_angle": blades.curved_angle,
-        }
+        given = {"apex": blades.wedge_apex, "flat_angle": blades.flat_angle, "curved_angle": blades.curved_angle}
     keys = {"apex": "apex_m", "flat_angle": "flat_angle_deg", "curved_angle": "curved_angle_deg"}
     for field, key in keys.items():
         if getattr(table, key) is not None:
@@ -310,9 +276,7 @@ def digest_of(path: Path) -> str:
 def _behind(table: Lumped) -> list[str]:
     """Return the masses of the next sector that springs and dashpots lead to."""
     links = [*table.springs_n_per_m, *table.dashpots_n_s_per_m]
-    ends = {
-        end.removeprefix(NEXT) for link in links for end in link[:2] if str(end).startswith(NEXT)
-    }
+    ends = {end.removeprefix(NEXT) for link in links for end in link[:2] if str(end).startswith(NEXT)}
     return [name for name in table.labels if name in ends]
 
 

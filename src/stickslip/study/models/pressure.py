@@ -65,9 +65,7 @@ def read_pressure(path: Path, length_unit: str, *, static: bool) -> PressureFiel
 
 def _check_names(columns: MeasuredColumns) -> None:
     known = [f"{axis}_{unit}" for axis in "xyz" for unit in LENGTHS]
-    known += [
-        f"{part}_{unit}" for part in ("pressure", "real", "imag", "amplitude") for unit in PRESSURES
-    ]
+    known += [f"{part}_{unit}" for part in ("pressure", "real", "imag", "amplitude") for unit in PRESSURES]
     known += ["phase_deg", *(f"area_{unit}" for unit in AREAS), *NORMAL, *WORDS]
     for name in columns.names:
         if name not in known:
@@ -76,9 +74,7 @@ def _check_names(columns: MeasuredColumns) -> None:
 
 def _pressure(columns: MeasuredColumns, *, static: bool) -> ComplexArray:
     """Return the complex pressure in Pa."""
-    there = {
-        part: columns.named(part, PRESSURES) for part in ("pressure", "real", "imag", "amplitude")
-    }
+    there = {part: columns.named(part, PRESSURES) for part in ("pressure", "real", "imag", "amplitude")}
     given = {part for part, (name, _) in there.items() if name}
     phase = "phase_deg" in columns.names
     wanted = [{"pressure"}] if static else [{"real", "imag"}, {"amplitude"}]
@@ -88,7 +84,7 @@ def _pressure(columns: MeasuredColumns, *, static: bool) -> ComplexArray:
         kind = "A static load" if static else "A harmonic load"
         raise input_error(
             f"{columns.path}: line 1", f"has {found}{' and phase_deg' if phase else ''}", f"{kind} has {what}."
-        )  # fmt: skip
+        )
 
     def numbers(part: str) -> FloatArray:
         name, factor = there[part]
@@ -121,7 +117,7 @@ def _area(columns: MeasuredColumns) -> FloatArray | None:
     unit = np.column_stack([columns.numbers(n) for n in NORMAL])
     off = np.flatnonzero(np.abs(np.linalg.norm(unit, axis=1) - 1) > UNIT)
     if off.size:
-        raise columns.wrong(int(off[0]), NORMAL[0], "is of no vector of length 1", "Divide each normal by its length.")  # fmt: skip
+        raise columns.wrong(int(off[0]), NORMAL[0], "is of no vector of length 1", "Divide each normal by its length.")
     return np.asarray(factor * area[:, None] * unit)
 
 
@@ -135,7 +131,7 @@ def _of_vtk(path: Path, length: float, *, static: bool) -> PressureField:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001  it says it of wrong files in a dozen ways
         said = " ".join(str(error).split())
-        raise input_error(str(path), f"cannot be read as VTK ({said})", "Write it as .vtu, ASCII.") from None  # fmt: skip
+        raise input_error(str(path), f"cannot be read as VTK ({said})", "Write it as .vtu, ASCII.") from None
     points = length * np.asarray(mesh.points, dtype=float)
     triangles = []
     data: dict[str, list[Any]] = {name: [] for name in mesh.cell_data}
@@ -148,7 +144,7 @@ def _of_vtk(path: Path, length: float, *, static: bool) -> PressureField:
         for name, known in data.items():
             known.extend([np.asarray(mesh.cell_data[name][i])] * len(pieces))
     if not triangles:
-        raise input_error(str(path), "has no triangles or quadrilaterals", "Write the blade's surface.")  # fmt: skip
+        raise input_error(str(path), "has no triangles or quadrilaterals", "Write the blade's surface.")
     corners = np.concatenate(triangles)
     rule = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])
     a, b, c = points[corners].transpose(1, 0, 2)
@@ -185,4 +181,4 @@ def _vtk_values(
         return np.asarray(found["amplitude_pa"] * np.exp(1j * DEG * found["phase_deg"]))
     known = ", ".join([*nodal, *cells]) or "none"
     what = "pressure_pa" if static else "real_pa and imag_pa, or amplitude_pa and phase_deg"
-    raise input_error(str(path), f"has the data {known}", f"Name the data of points or cells {what}.")  # fmt: skip
+    raise input_error(str(path), f"has the data {known}", f"Name the data of points or cells {what}.")

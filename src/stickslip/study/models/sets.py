@@ -37,11 +37,7 @@ def with_sets(
     for name, table in tables.items():
         place = f"{key}.sets.{name}"
         if name.lower() in {own.lower() for own in known}:
-            raise input_error(
-                place,
-                "is the name of a set of the file",
-                "Choose a name that the file does not use.",
-            )
+            raise input_error(place, "is the name of a set of the file", "Choose a name that the file does not use.")
         members = np.flatnonzero(_picked(place, table, points, known))
         if not members.size:
             raise _nothing(place, table, points)
@@ -49,9 +45,7 @@ def with_sets(
     return found
 
 
-def _picked(
-    place: str, table: SetTable, points: FloatArray, known: Mapping[str, IntArray]
-) -> BoolArray:
+def _picked(place: str, table: SetTable, points: FloatArray, known: Mapping[str, IntArray]) -> BoolArray:
     inside = np.ones(len(points), dtype=bool)
     edge = EDGE * float(np.ptp(_placed(points), axis=0).max(initial=0.0))
     if table.pattern is not None:
@@ -70,9 +64,7 @@ def _picked(
         first, last = np.array(table.cylinder_m)
         length = float(np.linalg.norm(last - first))
         along = (points - first) @ (last - first) / length
-        from_axis = np.linalg.norm(
-            points - first - np.outer(along, (last - first) / length), axis=1
-        )
+        from_axis = np.linalg.norm(points - first - np.outer(along, (last - first) / length), axis=1)
         inner, outer = table.radius_m
         inside &= (along >= -edge) & (along <= length + edge)
         inside &= (from_axis >= inner - edge) & (from_axis <= outer + edge)
@@ -88,9 +80,7 @@ def _nothing(place: str, table: SetTable, points: FloatArray) -> InputError:
     if not placed.size:
         return input_error(place, "picks none: no node has a place", "Give matrices their nodes.")
     low, high = (", ".join(f"{v:.5g}" for v in c) for c in (placed.min(axis=0), placed.max(axis=0)))
-    keys = [
-        k for k in ("pattern", "box_m", "cylinder_m", "radius_m") if getattr(table, k) is not None
-    ]
+    keys = [k for k in ("pattern", "box_m", "cylinder_m", "radius_m") if getattr(table, k) is not None]
     got = ", ".join(f"{k} = {getattr(table, k)!r}" for k in keys)
     return input_error(
         place,

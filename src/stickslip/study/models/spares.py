@@ -29,9 +29,7 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
         if table.contact is not None and table.contact not in tables.contact:
             known = list(tables.contact)
             yield input_error(
-                f"{key}.contact",
-                f"there is no contact {table.contact!r}",
-                did_you_mean(table.contact, known),
+                f"{key}.contact", f"there is no contact {table.contact!r}", did_you_mean(table.contact, known)
             )
         yield from _own_refusals(tables, key, table)
         if table.of is not None and table.of.partition(".")[0] not in tables.part:
@@ -60,20 +58,14 @@ def _own_refusals(tables: Tables, key: str, table: MistuningTable) -> Iterator[I
         named = getattr(table, word)
         if named is not None and named not in tables.part:
             unknown = True
-            yield input_error(
-                f"{key}.{word}",
-                f"there is no part {named!r}",
-                did_you_mean(named, list(tables.part)),
-            )
+            yield input_error(f"{key}.{word}", f"there is no part {named!r}", did_you_mean(named, list(tables.part)))
     if table.part is None or table.by is None or unknown:
         return
     whole = {one.part for one in tables.mistuning.values() if one.part is not None}
     if table.by in whole:
         own = "the wheel's own part" if table.by == table.part else "a part of all sectors"
         yield input_error(
-            f"{key}.by",
-            f"is {table.by!r}, {own}",
-            "Name another [part.NAME], which stands in this sector alone.",
+            f"{key}.by", f"is {table.by!r}, {own}", "Name another [part.NAME], which stands in this sector alone."
         )
     old, new = original(tables, table.part), original(tables, table.by)
     before, after = getattr(old, "sectors", None), getattr(new, "sectors", None)

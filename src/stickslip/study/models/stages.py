@@ -23,12 +23,8 @@ def stage_refusals(tables: Tables) -> Iterator[InputError]:
             yield input_error(name, why, ALONE)
     for name, table in tables.join.items():
         if table.pairing != SPATIAL:
-            yield input_error(
-                f"join.{name}.pairing", f"is {table.pairing} beside joins by {SPATIAL}", ALONE
-            )
+            yield input_error(f"join.{name}.pairing", f"is {table.pairing} beside joins by {SPATIAL}", ALONE)
     for name in tables.contact:
         yield input_error(f"contact.{name}", "touches stages, which a join couples", ALONE)
     if tables.rotation.speed_rpm > 0:
-        yield input_error(
-            "rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE
-        )
+        yield input_error("rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE)

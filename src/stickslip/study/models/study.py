@@ -162,14 +162,14 @@ class OtherModel:
         """
         raw = {**self.raw, "vary": {key: [value]}}
         try:
-            return _checked(Study(StudyFile(self.path, "", raw, validated(self.path, raw)), self.memo))  # fmt: skip
+            return _checked(Study(StudyFile(self.path, "", raw, validated(self.path, raw)), self.memo))
         except InputError as error:
             raise self._refused(key, value, error) from None
 
     def _refused(self, key: str, value: float, error: InputError) -> InputError:
         told = str(error).replace(f"{self.path}: ", "").removeprefix(f"vary.{key}: ")
         remedy = "Name a key of the model as [vary] does, and values that it takes."
-        return input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy)  # fmt: skip
+        return input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy)
 
     def __getstate__(self) -> dict[str, Any]:
         return {"path": self.path, "raw": self.raw, "memo": {}}
@@ -213,19 +213,12 @@ def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
     """Return the hash of all that a model depends on, and of what is left of it without harmonic loads and outputs."""
     own = tables.model_dump(mode="json", include=set(OF_THE_MODEL) - {"load"})
     parts = [digest(tables, name, home) for name in tables.part]
-    loads = {
-        name: [load.model_dump(mode="json"), newton(tables, load)]
-        for name, load in tables.load.items()
-    }
+    loads = {name: [load.model_dump(mode="json"), newton(tables, load)] for name, load in tables.load.items()}
     if tables.aero is not None:
         parts.append(digest_of(home / tables.aero.file))
     files = [one.file for one in tables.mistuning.values() if one.file is not None]
     parts += [digest_of(home / file) for file in files]
-    fields = {
-        name: digest_of(home / load.pressure)
-        for name, load in tables.load.items()
-        if load.pressure is not None
-    }
+    fields = {name: digest_of(home / load.pressure) for name, load in tables.load.items() if load.pressure is not None}
     for name, content in fields.items():
         loads[name].append(content)
     static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}

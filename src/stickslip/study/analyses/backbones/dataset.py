@@ -25,7 +25,11 @@ ABOUT = {
     "accuracy": ("branch", "1", "relative change by more harmonics that was asked for"),
     "end": ("branch", "1", "how the mode ends"),
     "problem": ("branch", "1", "why there is none"),
-    "gross_slip_amplitude": ("branch", "m", "amplitude from which on all contacts, and all their sliders, slip or open at some time"),
+    "gross_slip_amplitude": (
+        "branch",
+        "m",
+        "amplitude from which on all contacts, and all their sliders, slip or open at some time",
+    ),
     "largest_damping_ratio": ("branch", "1", "largest damping ratio"),
     "largest_damping_amplitude": ("branch", "m", "amplitude there"),
     "amplitude": ("branch point", "m", "amplitude of the output in the first harmonic"),
@@ -35,18 +39,35 @@ ABOUT = {
     "energy": ("branch point", "J", "twice the mean kinetic energy of all harmonics, of a wheel of one sector"),
     "harmonics": ("branch point", "1", "highest harmonic"),
     "status": ("branch point", "1", "how the solver ended: 0 is a solution"),
-    "slipping": ("branch point", "1", "share of the contact points that slip or open at some time; of a contact of several sliders the share that slips"),
+    "slipping": (
+        "branch point",
+        "1",
+        "share of the contact points that slip or open at some time; of a contact of several sliders the share that slips",
+    ),
     "open_for": ("branch point", "1", "largest share of the period for which a contact point is open"),
-    "change": ("branch point", "1", "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone"),
+    "change": (
+        "branch point",
+        "1",
+        "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone",
+    ),
     **KEPT,
-    "retained_displacement": ("branch point harmonic coordinate part", "m", "the motion in each harmonic: the real and the imaginary part"),
+    "retained_displacement": (
+        "branch point harmonic coordinate part",
+        "m",
+        "the motion in each harmonic: the real and the imaginary part",
+    ),
     "output_displacement": ("branch point harmonic reported part", "m", "the same of the outputs"),
     "concept": ("", "1", "which motions the modes are made of"),
-}  # fmt: skip
+}
 POINTS = {
-    "amplitude": "amplitude", "damping_ratio": "motion_ratio", "modal_amplitude": "modal_amplitude", "energy": "energy",
-    "slipping": "slipping", "open_for": "open_for", "change": "change",
-}  # fmt: skip
+    "amplitude": "amplitude",
+    "damping_ratio": "motion_ratio",
+    "modal_amplitude": "modal_amplitude",
+    "energy": "energy",
+    "slipping": "slipping",
+    "open_for": "open_for",
+    "change": "change",
+}
 
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
@@ -100,11 +121,15 @@ def _of_branches(branches: Sequence[ModeBranch], sectors: int) -> dict[str, Any]
         "accuracy": each(branches, "tolerance"),
         "end": each(branches, "end"),
         "problem": each(branches, "problem"),
-        "gross_slip_amplitude": np.array([a[g][0] if np.any(g) else np.nan for a, g in zip(amplitudes, gross, strict=True)]),
+        "gross_slip_amplitude": np.array(
+            [a[g][0] if np.any(g) else np.nan for a, g in zip(amplitudes, gross, strict=True)]
+        ),
         "largest_damping_ratio": np.array([r[i] if i >= 0 else np.nan for r, i in zip(ratios, top, strict=True)]),
-        "largest_damping_amplitude": np.array([a[i] if i >= 0 else np.nan for a, i in zip(amplitudes, top, strict=True)]),
+        "largest_damping_amplitude": np.array(
+            [a[i] if i >= 0 else np.nan for a, i in zip(amplitudes, top, strict=True)]
+        ),
         "frequency_hz": rows(branches, "motion_omega") / HZ,
         "harmonics": rows(branches, "order", -1.0).astype(np.int64),
         "status": rows(branches, "status", -1.0).astype(np.int64),
         **{name: rows(branches, own) for name, own in POINTS.items()},
-    }  # fmt: skip
+    }

@@ -15,7 +15,7 @@ from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
 END = "end"  # kind of the record behind the last one of a mode
-NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")  # fmt: skip
+NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")
 
 
 def _nothing() -> FloatArray:
@@ -78,9 +78,7 @@ class ModeRecord:
         """What was found, as it was on the way."""
         kind: Kind = self.kind  # type: ignore[assignment]  # any but that of the end
         solution = Solution(self.x, self.status, self.iterations, self.residual_norm, 0.0, 0.0)
-        point = Point(
-            self.x, self.p, self.tangent, self.step, solution, self.orientation, bend=self.bend
-        )
+        point = Point(self.x, self.p, self.tangent, self.step, solution, self.orientation, bend=self.bend)
         return Followed(kind, self.index, self.level, point, Judged(self.bound), self.seconds)
 
 
@@ -93,11 +91,26 @@ def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> Mode
         told[:] = [getattr(motion, name) for name in NUMBERS]
         moved = np.stack([motion.coefficients.real, motion.coefficients.imag], axis=-1)
     return ModeRecord(
-        wave, mode.number, found.kind, found.index, found.level, found.seconds, found.judged.bound,
-        point.x, point.p, point.tangent, point.step, point.orientation, point.bend,
-        solution.status, solution.iterations, solution.residual_norm,
-        told, moved, way.curve.problems[found.level].balance.order,
-    )  # fmt: skip
+        wave,
+        mode.number,
+        found.kind,
+        found.index,
+        found.level,
+        found.seconds,
+        found.judged.bound,
+        point.x,
+        point.p,
+        point.tangent,
+        point.step,
+        point.orientation,
+        point.bend,
+        solution.status,
+        solution.iterations,
+        solution.residual_norm,
+        told,
+        moved,
+        way.curve.problems[found.level].balance.order,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +178,27 @@ def _branch(way: Sequence[ModeRecord], last: ModeRecord) -> ModeBranch:
     points = [] if last.problem else branch_of(way)
     told = np.array([r.told for r in points]).reshape(-1, len(NUMBERS)).T
     amplitude, omega, ratio, modal_amplitude, energy, slipping, open_for, change = told
-    order, status = (np.array([int(getattr(r, name)) for r in points], dtype=np.int64) for name in ("order", "status"))  # fmt: skip
+    order, status = (np.array([int(getattr(r, name)) for r in points], dtype=np.int64) for name in ("order", "status"))
     return ModeBranch(
-        last.wave_number, last.mode, last.mode_omega, last.mode_ratio,
-        amplitude, omega, ratio, modal_amplitude, energy, order, status, slipping, open_for, change, _motions(points),
-        last.tolerance, last.end, last.problem,
-    )  # fmt: skip
+        last.wave_number,
+        last.mode,
+        last.mode_omega,
+        last.mode_ratio,
+        amplitude,
+        omega,
+        ratio,
+        modal_amplitude,
+        energy,
+        order,
+        status,
+        slipping,
+        open_for,
+        change,
+        _motions(points),
+        last.tolerance,
+        last.end,
+        last.problem,
+    )
 
 
 def _motions(points: Sequence[ModeRecord]) -> FloatArray:

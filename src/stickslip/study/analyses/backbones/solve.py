@@ -31,9 +31,7 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
         advance((i + 1) / len(tasks), name)
 
 
-def follow_mode(
-    question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]
-) -> Iterator[ModeRecord]:
+def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]) -> Iterator[ModeRecord]:
     """Yield what is found along a mode and not done, and its end."""
     end, problem = "", ""
     every = [r.followed for r in done]

@@ -32,9 +32,7 @@ class NonlinearModeTable(Section):
         "out: from where nothing slips to 300 times where slip begins, or on to gross slip; springs that neither slip nor open need it",
     )
     points: int = Field(30, ge=5, le=1000, description="least number of points, 5 to 1000")
-    harmonics: int = Field(
-        5, ge=1, le=HIGHEST, description=f"least number of harmonics, 1 to {HIGHEST}"
-    )
+    harmonics: int = Field(5, ge=1, le=HIGHEST, description=f"least number of harmonics, 1 to {HIGHEST}")
     most_harmonics: int = Field(
         23,
         ge=1,
@@ -42,8 +40,7 @@ class NonlinearModeTable(Section):
         description=f"up to which harmonics are raised where frequency or damping ratio ask for it, 1 to {HIGHEST}",
     )
     accuracy_percent: Positive = Field(
-        0.1,
-        description="relative change of frequency or damping ratio by more harmonics below which these are enough",
+        0.1, description="relative change of frequency or damping ratio by more harmonics below which these are enough"
     )
     to_gross_slip: bool = Field(
         False,

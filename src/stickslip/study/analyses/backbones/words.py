@@ -31,7 +31,7 @@ def _followed(case: Mapping[str, xr.Variable], sound: Sequence[int]) -> str:
     most = sound[int(np.argmax(ratios))]
     ratio, at = (float(case[f"largest_damping_{n}"].values[most]) for n in ("ratio", "amplitude"))
     who = branch_name(case, most) if every == 1 else f"{len(sound)} of {every} modes"
-    damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"  # fmt: skip
+    damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"
     where = f" at {millimetres(at)}" if abs(ratio) > NONE else ""
     of = f", of {branch_name(case, most)}" if every > 1 and where else ""
     sizes = millimetres_between(float(np.nanmin(amplitude)), float(np.nanmax(amplitude)))
@@ -42,20 +42,21 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     name = branch_name(case, i)
     problem, end = str(case["problem"].values[i]), str(case["end"].values[i])
     if problem:
-        return [
-            Verdict(
-                "doubtful",
-                label,
-                None,
-                f"{name}: {problem.removesuffix('.').removeprefix(f'{name}: ')}",
-            )
-        ]
+        return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.').removeprefix(f'{name}: ')}")]
     found = []
     if end.startswith(LIFTS):
         why = f"{name}: {end}"
-        found.append(Verdict("trusted", label, None, why, "Beyond it contacts hold nothing together that vibrates periodically in this mode."))  # fmt: skip
+        found.append(
+            Verdict(
+                "trusted",
+                label,
+                None,
+                why,
+                "Beyond it contacts hold nothing together that vibrates periodically in this mode.",
+            )
+        )
     elif not end.startswith(("amplitude reached", "gross slip")):
-        found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))  # fmt: skip
+        found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))
     found += _of_resonances(label, name, end)
     status = case["status"].values[i]
     gaps = int(np.count_nonzero(status > 0))
@@ -93,7 +94,11 @@ def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int
     most = float(above[np.isfinite(above)].max(initial=0.0))
     by = f"by up to {100 * most:.2g} %" if most else "by an unknown amount"
     why = f"{name}: frequency or damping ratio of {above.size} of its {change.size} motions still change {by} with the last harmonics"
-    return [Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics, or nonlinear_mode.accuracy_percent.")]  # fmt: skip
+    return [
+        Verdict(
+            "doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics, or nonlinear_mode.accuracy_percent."
+        )
+    ]
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
@@ -118,4 +123,6 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
             )
         )
     columns = ("mode", "Hz, stuck", "Hz", "damping %, stuck", "most damping %", "at mm", "end")
-    return TextTable(f"{head}Nonlinear modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))  # fmt: skip
+    return TextTable(
+        f"{head}Nonlinear modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows)
+    )

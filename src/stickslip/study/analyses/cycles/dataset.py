@@ -37,7 +37,11 @@ ABOUT = {
     "cycle_branch": ("cycle", "1", "index of the branch of a limit cycle"),
     "cycle_amplitude": ("cycle", "m", "its amplitude"),
     "cycle_frequency_hz": ("cycle", "Hz", "its frequency"),
-    "cycle_slope": ("cycle", "1", "growth of the damping ratio with the logarithm of the amplitude; positive: attracting"),
+    "cycle_slope": (
+        "cycle",
+        "1",
+        "growth of the damping ratio with the logarithm of the amplitude; positive: attracting",
+    ),
     "cycle_harmonics": ("cycle", "1", "its highest harmonic"),
     "cycle_change": ("cycle", "1", "relative change by the last raise of the harmonics"),
     "cycle_enough": ("cycle", "1", "1 where the harmonics are enough"),
@@ -51,13 +55,17 @@ ABOUT = {
     "cycle_time_amplitude": ("cycle", "m", "amplitude that time integration goes to"),
     "cycle_time_frequency_hz": ("cycle", "Hz", "its frequency"),
     **KEPT,
-    "retained_displacement": ("cycle harmonic coordinate part", "m", "its motion in each harmonic: the real and the imaginary part"),
+    "retained_displacement": (
+        "cycle harmonic coordinate part",
+        "m",
+        "its motion in each harmonic: the real and the imaginary part",
+    ),
     "output_displacement": ("cycle harmonic reported part", "m", "the same of the outputs"),
     "time": ("window", "s", "time since the mixed start of all unstable waves"),
     "wave_amplitude": ("window wave", "m", "amplitude of each wave number at the output"),
     "outcome": ("", "1", "what became of the mixed start"),
     "outcome_missing": ("", "1", "why there is no mixed start; empty where there is one or it was not asked for"),
-}  # fmt: skip
+}
 
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
@@ -103,7 +111,7 @@ def _of_branches(branches: Sequence[CycleBranch], sectors: int) -> dict[str, Any
         "amplitude": rows(branches, "amplitude"),
         "frequency_hz": rows(branches, "motion_omega") / HZ,
         "damping_ratio": rows(branches, "motion_ratio"),
-    }  # fmt: skip
+    }
 
 
 def _of_cycles(branches: Sequence[CycleBranch]) -> dict[str, Any]:
@@ -145,16 +153,11 @@ def _motions(branches: Sequence[CycleBranch]) -> FloatArray:
     return out
 
 
-def _in_time(
-    branches: Sequence[CycleBranch], notes: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Any]:
+def _in_time(branches: Sequence[CycleBranch], notes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     found = [notes.get(f"in_time.{i}") for i in range(len(branches))]
     values: dict[str, Any] = {}
     if all(own is not None for own in found):
-        for name, key, unit in (
-            ("cycle_time_amplitude", "amplitude", 1.0),
-            ("cycle_time_frequency_hz", "omega", HZ),
-        ):
+        for name, key, unit in (("cycle_time_amplitude", "amplitude", 1.0), ("cycle_time_frequency_hz", "omega", HZ)):
             values[name] = np.concatenate([np.atleast_1d(own[key]) / unit for own in found if own])
     if "competition" in notes:
         own = notes["competition"]

@@ -8,17 +8,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
-from stickslip.response.self_excited.curve import (
-    AmplitudePoint,
-    damping_over_amplitude,
-    slip_amplitude,
-)
-from stickslip.response.self_excited.cycles import (
-    LimitCycle,
-    crossings,
-    limit_cycles,
-    with_extremes,
-)
+from stickslip.response.self_excited.curve import AmplitudePoint, damping_over_amplitude, slip_amplitude
+from stickslip.response.self_excited.cycles import LimitCycle, crossings, limit_cycles, with_extremes
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import CycleStability, cycle_stability
@@ -67,9 +58,7 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
     """Return what is found of a mode."""
     system = as_wave(question.model.system, wave)
     try:
-        problem = self_excited_motions(
-            system, question.model.load, mode, coordinate(system), question.discretisation
-        )
+        problem = self_excited_motions(system, question.model.load, mode, coordinate(system), question.discretisation)
         slips = slip_amplitude(problem)
     except StickslipError as error:
         return _without(wave, mode, str(error))
@@ -91,17 +80,13 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
 
 
 def _branch(
-    wave: int,
-    problem: SelfExcited,
-    slips: float,
-    points: Sequence[AmplitudePoint],
-    cycles: Sequence[LimitCycle],
+    wave: int, problem: SelfExcited, slips: float, points: Sequence[AmplitudePoint], cycles: Sequence[LimitCycle]
 ) -> CycleBranch:
     mode = problem.mode
     known = [p for p in points if p.converged]
     top = max(known, key=lambda p: p.level, default=None)
     examined = [_examined(problem.with_order(c.order), c) for c in cycles]
-    stable = [e.stability.verdict if isinstance(e, CycleStability) else NOT_EXAMINED for e in examined]  # fmt: skip
+    stable = [e.stability.verdict if isinstance(e, CycleStability) else NOT_EXAMINED for e in examined]
     reason = [e.stability.reason if isinstance(e, CycleStability) else e for e in examined]
 
     def of_each(function: object, missing: float) -> FloatArray:
@@ -161,9 +146,32 @@ def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
 def _without(wave: int, mode: StuckMode, problem: str) -> CycleBranch:
     none, no_numbers = np.zeros(0), np.zeros(0, dtype=np.int64)
     return CycleBranch(
-        wave, mode.number, mode.omega, mode.ratio, np.nan, none, none, none, np.nan, np.nan, none, none, none, no_numbers,
-        none, no_numbers, np.zeros((0, 1, 0, 2)), "[]", "[]", none, none, none, no_numbers, none, problem,
-    )  # fmt: skip
+        wave,
+        mode.number,
+        mode.omega,
+        mode.ratio,
+        np.nan,
+        none,
+        none,
+        none,
+        np.nan,
+        np.nan,
+        none,
+        none,
+        none,
+        no_numbers,
+        none,
+        no_numbers,
+        np.zeros((0, 1, 0, 2)),
+        "[]",
+        "[]",
+        none,
+        none,
+        none,
+        no_numbers,
+        none,
+        problem,
+    )
 
 
 def _linear(modes: dict[int, list[StuckMode]]) -> dict[str, object]:
@@ -188,5 +196,5 @@ def _told(branch: CycleBranch) -> str:
     each = [
         f"{millimetres(a, 5)} at {w / HZ:.4f} Hz ({word})"
         for a, w, word in zip(branch.cycle_amplitude, branch.cycle_omega, json.loads(branch.stable), strict=True)
-    ]  # fmt: skip
+    ]
     return f"limit cycles: {', '.join(each) or 'none'}"

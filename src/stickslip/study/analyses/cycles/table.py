@@ -34,14 +34,9 @@ class LimitCycleTable(Section):
         description="the range [lowest, highest] of the amplitude of the peak output; left out: from where nothing slips to 300 times "
         "where slip begins",
     )
-    points: int = Field(
-        30, ge=5, le=1000, description="least number of amplitudes in the range, 5 to 1000"
-    )
+    points: int = Field(30, ge=5, le=1000, description="least number of amplitudes in the range, 5 to 1000")
     harmonics: int = Field(
-        5,
-        ge=1,
-        le=HIGHEST,
-        description=f"harmonics of the curve over the amplitude, 1 to {HIGHEST}",
+        5, ge=1, le=HIGHEST, description=f"harmonics of the curve over the amplitude, 1 to {HIGHEST}"
     )
     most_harmonics: int = Field(
         41,
@@ -50,17 +45,14 @@ class LimitCycleTable(Section):
         description=f"up to which harmonics of each limit cycle are raised until it stays, 1 to {HIGHEST}",
     )
     accuracy_percent: Positive = Field(
-        0.001,
-        description="change of amplitude and frequency by twice the harmonics below which these are enough",
+        0.001, description="change of amplitude and frequency by twice the harmonics below which these are enough"
     )
     in_time: bool = Field(
         False,
         description="whether stable limit cycles are compared with time integration, and that of all unstable waves together says which "
         "one wins; --verify does the same",
     )
-    periods: int = Field(
-        400, ge=50, le=100_000, description="most periods of a time integration, 50 to 100000"
-    )
+    periods: int = Field(400, ge=50, le=100_000, description="most periods of a time integration, 50 to 100000")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

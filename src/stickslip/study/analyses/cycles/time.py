@@ -13,12 +13,7 @@ from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.self_excited.in_time import (
-    Marched,
-    march_periods,
-    mixed_start,
-    wave_history,
-)
+from stickslip.response.self_excited.in_time import Marched, march_periods, mixed_start, wave_history
 from stickslip.response.system import System
 from stickslip.response.time.sectors import whole_wheel
 from stickslip.response.time.start import TransientStart, start_from_harmonics
@@ -63,14 +58,16 @@ def _unconfirmed(branch: CycleBranch, i: int, marched: Marched) -> str:
     """Say that to stay near an unstable cycle for so many periods does not confirm it."""
     if json.loads(branch.stable)[i] != "unstable":
         return ""
-    return f"; that confirms nothing: the cycle is unstable, and {len(marched.first)} periods may be too few to leave it"
+    return (
+        f"; that confirms nothing: the cycle is unstable, and {len(marched.first)} periods may be too few to leave it"
+    )
 
 
 def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
     """Return what becomes of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
     there = [b for b in branches if b.wave_number != ONE and (b.ratio < 0.0 or _attracts(b))]
     own = {"waves": np.array([b.wave_number for b in there], dtype=np.int64)}
-    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}  # fmt: skip
+    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}
     if len({b.wave_number for b in there}) < 2:
         return own | nothing
     try:
@@ -83,10 +80,10 @@ def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, An
     rest = np.zeros((2, structure.n), dtype=complex)
     like = start_from_harmonics(rest, omega, contacts.gap_operator, contacts.laws)
     start = _kicked(mixed_start(motions, like), motions)
-    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, FEW_STEPS)  # fmt: skip
+    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, FEW_STEPS)
     history = wave_history(marched)
     if not history.time.size:
-        return own | nothing | {"left_out": f"it grew beyond all numbers in {len(marched.first)} periods"}  # fmt: skip
+        return own | nothing | {"left_out": f"it grew beyond all numbers in {len(marched.first)} periods"}
     return own | {
         "time": history.time,
         "amplitude": history.amplitude,
@@ -100,9 +97,7 @@ def _attracts(branch: CycleBranch) -> bool:
     return bool(np.any(branch.slope > 0.0))
 
 
-def _beginnings(
-    question: Question, branches: Sequence[CycleBranch]
-) -> list[tuple[ComplexArray, float]]:
+def _beginnings(question: Question, branches: Sequence[CycleBranch]) -> list[tuple[ComplexArray, float]]:
     """Return amplitudes (n,) of all sectors and frequencies, rad/s, with which waves begin: a share of their attracting cycle.
 
     Where none was found the mode itself begins, with the amplitude at which it slips; where it never does, with the least of the others.
@@ -125,9 +120,7 @@ def _beginnings(
     return found
 
 
-def in_time(
-    system: System, question: Question
-) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
+def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
     """Return what is marched, and the peak output of each sector.
 
     Raises
@@ -158,7 +151,7 @@ def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
     start = _kicked(start, [(motion[1], omega)])
     return march_periods(
         structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS, settles=SETTLED
-    )  # fmt: skip
+    )
 
 
 def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:

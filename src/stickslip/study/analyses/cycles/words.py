@@ -22,7 +22,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if "wave_number" not in case:
         least = float(np.nanmin(case["linear_damping_ratio"].values))
         why = f"no mode that was looked at grows with contacts stuck: the least damping ratio is {100 * least:.3g} %"
-        return [Verdict("trusted", label, None, why, "There is no limit cycle that begins with a linear instability.")]  # fmt: skip
+        return [Verdict("trusted", label, None, why, "There is no limit cycle that begins with a linear instability.")]
     found = _not_followed(label, case)
     for i in range(case["wave_number"].size):
         found += _of_branch(label, case, i)
@@ -70,7 +70,7 @@ def _not_followed(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         f"{left} of {grows} modes that grow with contacts stuck were not followed; the least damping ratio is {100 * ratios[worst]:.3g} % "
         f"at {hertz[worst]:.5g} Hz"
     )
-    return [Verdict("trusted", label, None, why, "Leave limit_cycle.modes out: then all that grow are followed.")]  # fmt: skip
+    return [Verdict("trusted", label, None, why, "Leave limit_cycle.modes out: then all that grow are followed.")]
 
 
 def branch_name(case: Mapping[str, xr.Variable] | xr.Dataset, i: int) -> str:
@@ -89,14 +89,23 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     found = [v for c in own for v in _of_cycle(label, name, case, c)]
     if lost := int(case["lost_cycles"].values[i]):
         why = f"{name}: the damping has {lost} more zeros than there are limit cycles here"
-        found.append(Verdict("doubtful", label, None, why, "Raise limit_cycle.points or limit_cycle.harmonics."))  # fmt: skip
+        found.append(Verdict("doubtful", label, None, why, "Raise limit_cycle.points or limit_cycle.harmonics."))
     most = 100 * float(case["largest_damping_ratio"].values[i])
     if ratio < 0.0 and not most > 0.0:
         why = (
             f"{name}: friction cannot bound it: its damping ratio is {100 * ratio:.3g} % with contacts stuck and {most:.3g} % at most "
             "over the amplitudes looked at"
         )
-        found.append(Verdict("trusted", label, None, why, "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm).", warns=True))  # fmt: skip
+        found.append(
+            Verdict(
+                "trusted",
+                label,
+                None,
+                why,
+                "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm).",
+                warns=True,
+            )
+        )
     return found
 
 
@@ -106,7 +115,11 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     found = []
     if not case["cycle_enough"].values[c]:
         change = float(case["cycle_change"].values[c])
-        by = "was solved with one set of harmonics alone" if np.isnan(change) else f"still moves by {100 * change:.2g} % with twice the harmonics"  # fmt: skip
+        by = (
+            "was solved with one set of harmonics alone"
+            if np.isnan(change)
+            else f"still moves by {100 * change:.2g} % with twice the harmonics"
+        )
         found.append(Verdict("doubtful", label, hertz, f"{what} {by}", MORE))
     word, reason = (str(case[n].values[c]) for n in ("cycle_stability", "cycle_reason"))
     attracting = float(case["cycle_slope"].values[c]) > 0.0
@@ -114,7 +127,7 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     if attracting and word == "unstable":
         by = _named_disturbance(case, c, wave)
         why = f"{what} is stable in its own amplitude, but {by} grows: {reason}"
-        found.append(Verdict("trusted", label, hertz, why, f"The machine leaves it; {_what_tells(case)}."))  # fmt: skip
+        found.append(Verdict("trusted", label, hertz, why, f"The machine leaves it; {_what_tells(case)}."))
     elif attracting and word != "stable":
         why = f"{what} is stable in its own amplitude; other disturbances are {word}: {reason}"
         found.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))
@@ -129,7 +142,11 @@ def _named_disturbance(case: Mapping[str, xr.Variable], c: int, wave: int) -> st
         return "another motion"
     own = int(case["wave_number"].values[int(case["cycle_branch"].values[c])])
     hertz = float(case["cycle_growing_frequency_hz"].values[c])
-    return f"a modulation of it, by wave {wave} itself at {hertz:.5g} Hz," if wave == own else f"wave {wave} at {hertz:.5g} Hz"  # fmt: skip
+    return (
+        f"a modulation of it, by wave {wave} itself at {hertz:.5g} Hz,"
+        if wave == own
+        else f"wave {wave} at {hertz:.5g} Hz"
+    )
 
 
 def _what_tells(case: Mapping[str, xr.Variable]) -> str:
@@ -149,7 +166,7 @@ def _of_time(label: str, what: str, case: Mapping[str, xr.Variable], c: int) -> 
     if not np.isfinite(away) or away <= CLOSE:
         return []
     why = f"{what} is {100 * away:.2g} % off where time integration was at its end"
-    return [Verdict("doubtful", label, hertz, why, "Give it more limit_cycle.periods, or look at its stability.")]  # fmt: skip
+    return [Verdict("doubtful", label, hertz, why, "Give it more limit_cycle.periods, or look at its stability.")]
 
 
 def _cycles(case: Mapping[str, xr.Variable]) -> range:
@@ -175,13 +192,13 @@ def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
         for i in range(case.sizes["branch"])
     ]
     columns = ("mode", "Hz, stuck", "damping %", "slips from mm", "most damping %")
-    found = [TextTable(f"{head}Modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))]  # fmt: skip
+    found = [TextTable(f"{head}Modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))]
     if "cycle_amplitude" not in case:
         return found
     cycles = []
     for c in range(case.sizes["cycle"]):
         wave = int(case["cycle_growing_wave"][c])
-        grows = f", wave {wave}" if wave >= 0 and str(case["cycle_stability"][c].values) == "unstable" else ""  # fmt: skip
+        grows = f", wave {wave}" if wave >= 0 and str(case["cycle_stability"][c].values) == "unstable" else ""
         cycles.append(
             (
                 branch_name(case, int(case["cycle_branch"][c])),

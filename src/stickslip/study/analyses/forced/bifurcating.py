@@ -15,12 +15,7 @@ from stickslip.response.stability import Stability, hill_stability, stability
 from stickslip.response.time.floquet import Floquet
 from stickslip.study.analyses.analysis import Notes, Pieces
 from stickslip.study.analyses.forced.curve import branch_length
-from stickslip.study.analyses.forced.examination import (
-    FLOPS,
-    by_hill,
-    examination_work,
-    hill_work,
-)
+from stickslip.study.analyses.forced.examination import FLOPS, by_hill, examination_work, hill_work
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.quantities import MOTION
 from stickslip.study.analyses.forced.question import Question
@@ -34,9 +29,7 @@ LEAVES = ("period doubling", "branch point")  # kinds from which a periodic bran
 MOST_FOLLOWED = 6  # bifurcations of a case from which branches are followed
 FEWEST = 40  # motions of a wheel that Hill's method looks at, however long it takes,
 HILL_SECONDS = 1800.0  # and in how long, by its estimate, it looks at more
-NOT_FOLLOWED = (
-    "what leaves there is not followed: every sector of so large a wheel would count for itself"
-)
+NOT_FOLLOWED = "what leaves there is not followed: every sector of so large a wheel would count for itself"
 
 
 @dataclass(eq=False)
@@ -135,9 +128,7 @@ def of_bifurcations(
     return {
         "bifurcation_frequency_hz": np.array([b.omega / HZ for b in own]),
         "bifurcation_frequency_error_hz": np.array([b.omega_error / HZ for b in own]),
-        "bifurcation_amplitude": np.array(
-            [problem.amplitude_of(b.omega, b.point.coefficients, output) for b in own]
-        ),
+        "bifurcation_amplitude": np.array([problem.amplitude_of(b.omega, b.point.coefficients, output) for b in own]),
         "bifurcation_kind": texts(b.kind for b in own),
         "bifurcation_multiplier": np.array([[b.multiplier.real, b.multiplier.imag] for b in own]).reshape(-1, 2),
         "bifurcation_multiplier_error": np.array([b.multiplier_error for b in own]),
@@ -154,7 +145,7 @@ def of_bifurcations(
         "side_point_amplitude": np.array([s.amplitude(p, output) for _, s, p in points]),
         "side_point_subharmonic": np.array([s.subharmonic(p, output) for _, s, p in points]),
         "side_point_localisation": np.array([s.localisation(p) for _, s, p in points]),
-    }  # fmt: skip
+    }
 
 
 def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
@@ -164,9 +155,7 @@ def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
     hill = by_hill(question.model.system)
     way = ["they are those of Hill's method"] * bool(hill and found.examined)
     count = len([b for b in found.found if b.kind in LEAVES][_most_followed(question) :])
-    more = [f"branches of {count} bifurcations were not followed"] * bool(
-        count and question.bifurcations == "branches"
-    )
+    more = [f"branches of {count} bifurcations were not followed"] * bool(count and question.bifurcations == "branches")
     return (*found.none_met, *alone, *found.limits, *way, *more)
 
 

@@ -111,9 +111,7 @@ class Chooser:
             return [f"harmonics {named(self.first)} at every frequency ({self.name})"]
         if self.auto:
             of = ", ".join(map(str, self.harmonics))
-            most = f"up to {self.high[-1]}" + (
-                "" if self.high[-1] >= RUNGS[-1] else ", which the study's [limits] set"
-            )
+            most = f"up to {self.high[-1]}" + ("" if self.high[-1] >= RUNGS[-1] else ", which the study's [limits] set")
             return [
                 (
                     f"raised along the branch from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below "
@@ -182,9 +180,7 @@ def _audited(response: Response) -> str:
     if exact:
         told.append(f"{_points(exact)} exact, as no force acts on the harmonics left out")
     if alone:
-        told.append(
-            f"{_points(len(alone))} judged by prediction alone, of at most {error_text(max(alone))}"
-        )
+        told.append(f"{_points(len(alone))} judged by prediction alone, of at most {error_text(max(alone))}")
     return "".join(f"; {text}" for text in told)
 
 

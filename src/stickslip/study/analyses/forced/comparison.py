@@ -99,10 +99,7 @@ class Check:
     @property
     def _outputs(self) -> str:
         known = self.outputs_percent > LARGE
-        return (
-            f"largest difference of an output, with its phase, {self.outputs_percent:.2g} %; "
-            * known
-        )
+        return f"largest difference of an output, with its phase, {self.outputs_percent:.2g} %; " * known
 
     @property
     def _motion(self) -> str:

@@ -329,9 +329,7 @@ class Curve:
             # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
             told = MOTION.get(str(said.get("stability_verdict")), -1)
             other = self.floats("motion_stability") != told
-            for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[
-                :1
-            ]:
+            for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[:1]:
                 yield point, said
 
     def rows(self, word: str) -> Iterator[dict[str, Any]]:
@@ -352,9 +350,7 @@ class Curve:
     @cached_property
     def left_out(self) -> tuple[int, float, float] | None:
         """Of the peak the largest harmonic that its amplitude leaves out, the mean apart, its share of half of peak to peak, and that, m; None where none is."""
-        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has(
-            "output_displacement"
-        ):
+        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has("output_displacement"):
             return None
         parts = self.data["output_displacement"].values[self.at[self.peak]]
         column = peak_output(self.data, self.case)

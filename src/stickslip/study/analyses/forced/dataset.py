@@ -12,13 +12,7 @@ from stickslip.study.analyses.forced.values import Values
 from stickslip.study.analyses.forced.verdicts import with_levels
 from stickslip.study.analyses.verdict import said
 
-LABELLED = (
-    "output",
-    "retained",
-    "contact",
-    "driven",
-    "mistuned",
-)  # dimensions whose entries have names
+LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
 # dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
 ROWS = {
     "point": ("point_case", "frequency_hz"),
@@ -43,17 +37,8 @@ SOME = (
     "side_branch",
     "side_point",
 )  # dimensions of what some cases may lack
-COUNTED = (
-    "harmonic",
-    "sample",
-    "mode",
-)  # dimensions that may be longer in one case than in another
-AXES = {
-    "direction": ["t", "w", "n"],
-    "tangent": ["t", "w"],
-    "part": ["re", "im"],
-    "xyz": ["x", "y", "z"],
-}
+COUNTED = ("harmonic", "sample", "mode")  # dimensions that may be longer in one case than in another
+AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
 
 
 def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
@@ -93,10 +78,7 @@ def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any
     both = list(zip(labels, cases, strict=True))
     told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
     own: dict[str, Any] = json.loads(cases[0]["attributes"])
-    return own | {
-        "alert_explanation": " ".join(told),
-        "failed": sum(int(c["points_failed"]) for c in cases),
-    }
+    return own | {"alert_explanation": " ".join(told), "failed": sum(int(c["points_failed"]) for c in cases)}
 
 
 def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:

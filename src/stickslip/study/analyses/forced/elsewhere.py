@@ -10,9 +10,7 @@ from stickslip.study.analyses.forced.stable import examine
 from stickslip.study.analyses.forced.values import Values, texts
 from stickslip.units import HZ
 
-NEAR = (
-    0.005  # relative distance of frequencies within which a motion of the response is the same one
-)
+NEAR = 0.005  # relative distance of frequencies within which a motion of the response is the same one
 ALIKE = 0.03  # relative difference of its amplitude
 
 

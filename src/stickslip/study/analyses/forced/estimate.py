@@ -16,7 +16,9 @@ from stickslip.study.file.loads import Limits
 from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
-NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+NEWTON_A_POINT = (
+    6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+)
 FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
 AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
@@ -26,9 +28,7 @@ SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
 SECONDS_AN_UNKNOWN = 3e-5
 # where nothing is condensed, of a step with a new factor: 32 µs with 2000 contacts and 27 with 5000; 13 with a kept one in gross slip
 SECONDS_A_WHOLE_UNKNOWN = 4e-5
-BYTES_A_WHOLE_UNKNOWN = (
-    2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
-)
+BYTES_A_WHOLE_UNKNOWN = 2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 
 
@@ -71,13 +71,9 @@ class Estimate:
         return self.model_seconds + self.most_seconds
 
     def __str__(self) -> str:
-        least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))  # fmt: skip
+        least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))
         solving = f"{least} to {most} s"
-        many = (
-            f"contacts slip at every point, {self.most}"
-            if self.most
-            else "contacts slip at every point"
-        )
+        many = f"contacts slip at every point, {self.most}" if self.most else "contacts slip at every point"
         meant = f" (the least: hardly a contact slips; the most: {many})"
         return (
             f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {solving} to solve this case{meant}; stability and time "
@@ -91,9 +87,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     sectors = 1 if model.mistuning is None else model.sectors
     whole = kept_whole(model)
     nodes, coordinates = nodes_of(model), whole or sectors * retained_of(model)
-    low, high = (
-        (2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics)
-    )
+    low, high = ((2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics))
     grid = sweep.grid.size or (sweep.points if sweep.single else POINTS * sweep.points)
     points = grid + sweep.peak_points
     kept = always_kept(sweep.strategy)
@@ -104,17 +98,14 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
     of_low, of_high = (
-        (SECONDS_A_WHOLE_UNKNOWN * n if whole else _flops(n) / FLOPS) + SECONDS_A_STEP
-        for n in (low, high)
+        (SECONDS_A_WHOLE_UNKNOWN * n if whole else _flops(n) / FLOPS) + SECONDS_A_STEP for n in (low, high)
     )
     most_seconds = steps_low * of_low + (steps_high + judged) * of_high
     # without a budget strategies look at the larger space wherever they stand
     easy_low, easy_high = (SECONDS_AN_UNKNOWN * n + SECONDS_A_STEP for n in (low, high))
     easy = FEWEST_A_POINT * points * (easy_high if kept == "high" else easy_low)
     least_seconds = min(easy + (0 if sweep.auto else judged * easy_high), most_seconds)
-    harmonics = (
-        f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
-    )
+    harmonics = f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
     each = 1 if whole else 10  # numbers a harmonic and coordinate: contacts are few among all dofs
     stored = points * (sweep.high_harmonics[-1] + 1) * each * coordinates * 16 / 1e9
     solving = BYTES_A_WHOLE_UNKNOWN * high if whole else 8 * _numbers(sectors, coordinates, high)

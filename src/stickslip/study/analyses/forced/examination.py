@@ -13,9 +13,7 @@ INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of
 PRODUCTS = 20  # of matrices for each of these
 FLOPS = 2e10  # a second, of such products on one core
 MOST_WORK = 60 * FLOPS  # of one examination
-MOST_WHEEL = (
-    4 * FLOPS
-)  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
+MOST_WHEEL = 4 * FLOPS  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
 MOST_HILL = 300 * FLOPS  # of one examination by Hill's method, an upper bound: few contacts slip
 MOTIONS = 2.0  # that with more harmonics, and as it was solved
 

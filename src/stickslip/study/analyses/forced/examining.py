@@ -169,9 +169,14 @@ class _Search:
             "between them that it may pass the unit circle, the transitions in the cycle are the same and the branch does not turn"
         )
         return Examined(
-            self._omega(place), "stable", larger.multiplier, larger.error, said, basis="carried",
+            self._omega(place),
+            "stable",
+            larger.multiplier,
+            larger.error,
+            said,
+            basis="carried",
             position=self.course.order[place],
-        )  # fmt: skip
+        )
 
     def _by_sign(self, place: int) -> Examined:
         said = (
@@ -179,9 +184,8 @@ class _Search:
             "above 1"
         )
         return Examined(
-            self._omega(place), "unstable", np.nan, np.nan, said, basis="by sign",
-            position=self.course.order[place],
-        )  # fmt: skip
+            self._omega(place), "unstable", np.nan, np.nan, said, basis="by sign", position=self.course.order[place]
+        )
 
     def _opposed(self, place: int) -> bool:
         """Whether the determinant has another sign than at the nearest stable point of the branch, and examined points beside it with its sign are unstable."""
@@ -206,7 +210,7 @@ class _Search:
     def _stretches(self) -> IntArray:
         """(n,) number of the stretch of one sign that a point belongs to."""
         sign = self.course.sign
-        return np.concatenate([[0], np.cumsum((sign[1:] != sign[:-1]) | self.course.cut)]).astype(np.int64)  # fmt: skip
+        return np.concatenate([[0], np.cumsum((sign[1:] != sign[:-1]) | self.course.cut)]).astype(np.int64)
 
     def _omega(self, place: int) -> float:
         return self.response.accepted[self.course.order[place]].point.omega
@@ -257,9 +261,7 @@ def largest(response: Response, known: list[Examined]) -> int:
     """Return the position of the largest motion that is not known to be unstable; -1 where there is none."""
     off = {e.position for e in known if e.verdict == "unstable"}
     sizes = [
-        (response.amplitude(a), -i)
-        for i, a in enumerate(response.accepted)
-        if i not in off and a.fields is not None
+        (response.amplitude(a), -i) for i, a in enumerate(response.accepted) if i not in off and a.fields is not None
     ]
     return -max(sizes)[1] if sizes else -1
 

@@ -15,11 +15,7 @@ from stickslip.response.forced.response import ForcedPoint, ForcedProblem, force
 from stickslip.response.system import System
 from stickslip.response.time.sectors import all_sectors, sectors_in_time
 from stickslip.response.time.start import TransientStart, start_from_harmonics
-from stickslip.response.time.transient import (
-    TimeStepping,
-    TransientResult,
-    integrate,
-)
+from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 from stickslip.solve.newton_method import newton
 from stickslip.study.analyses.forced.comparison import LARGE, PATIENCE, STEPS, Check, Motion
 from stickslip.study.analyses.forced.points import Accepted, Response
@@ -52,12 +48,7 @@ def chosen(question: Question, response: Response) -> list[Accepted]:
     return sorted((response.top, *beside), key=lambda a: a.point.omega)
 
 
-def check_in_time(
-    question: Question,
-    response: Response,
-    accepted: Accepted,
-    multiplier: float | None = None,
-) -> Check:
+def check_in_time(question: Question, response: Response, accepted: Accepted, multiplier: float | None = None) -> Check:
     """Integrate in time at a point of the response, and compare.
 
     Parameters
@@ -159,9 +150,7 @@ def _known(found: TransientResult) -> ComplexArray:
     return found.harmonics if found.settled else found.averages
 
 
-def _compared(
-    question: Question, response: Response, point: ForcedPoint, found: TransientResult, steps: int
-) -> Check:
+def _compared(question: Question, response: Response, point: ForcedPoint, found: TransientResult, steps: int) -> Check:
     """Return the comparison with an integration."""
     every = _known(found)
     known = every[:, response.output]
@@ -191,19 +180,13 @@ def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray)
 
 
 def _with_steps_enough(
-    question: Question,
-    response: Response,
-    point: ForcedPoint,
-    found: TransientResult,
-    coarse: Check,
+    question: Question, response: Response, point: ForcedPoint, found: TransientResult, coarse: Check
 ) -> tuple[Check, TransientResult]:
     """Go on from a settled motion with twice the steps until these do not change it: too long a step is the first to suspect."""
     steps = STEPS
     while True:
         steps *= 2
-        finer = integrated(
-            question.problem, point, question.model.load, begin=found.final, steps=steps
-        )
+        finer = integrated(question.problem, point, question.model.load, begin=found.final, steps=steps)
         fine = _compared(question, response, point, finer, steps)
         moved = 100 * (fine.transient / coarse.transient - 1.0)
         if abs(moved) <= LARGE and coarse.steps == STEPS:
@@ -273,9 +256,7 @@ def integrated(
             steps_per_period=steps,
             max_periods=periods,
             min_periods=least,
-            harmonics=max(
-                REPORTED if problem.sweep.amplitude_of == "first" else WHOLE, *load.harmonics
-            ),
+            harmonics=max(REPORTED if problem.sweep.amplitude_of == "first" else WHOLE, *load.harmonics),
         ),
         weights=contacts.weights,
     )

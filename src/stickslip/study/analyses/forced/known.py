@@ -12,18 +12,12 @@ from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
 
-COULOMB = (
-    "elastic_coulomb",
-    "coupled_coulomb",
-    "regularised_coulomb",
-)  # friction under the normal force
+COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
 RIGID = 5e-3  # Hz that are printed as zero
 LISTED = 5  # natural frequencies that a line names
 
 
-def known(
-    question: Question, response: Response, shift: tuple[float, float]
-) -> tuple[Verdict, ...]:
+def known(question: Question, response: Response, shift: tuple[float, float]) -> tuple[Verdict, ...]:
     """Return the verdicts on a whole case that its numbers alone do not tell, without the case's label.
 
     Parameters
@@ -35,11 +29,7 @@ def known(
     """
     return (
         *(doubt(text) for text in doubts_of_model(question)),
-        *(
-            mixed_places(question.model.error_labels)
-            if question.sweep.relative_to == "each"
-            else ()
-        ),
+        *(mixed_places(question.model.error_labels) if question.sweep.relative_to == "each" else ()),
         *nothing_pressed(question),
         *off_engine_order(question),
         *_of_drift(question, response),
@@ -75,15 +65,13 @@ def inside(question: Question) -> list[str]:
     told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
     times, highest = question.driven[0], question.driven[0] * highest
     if times > 1:
-        told.append(
-            f"{question.driven_names[0]}, whose frequencies follow, acts at {times} times these frequencies"
-        )
+        told.append(f"{question.driven_names[0]}, whose frequencies follow, acts at {times} times these frequencies")
     for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
         rigid = int(np.count_nonzero(hertz < RIGID))
         near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
         near = [f"{rigid} of rigid motions"] * bool(rigid) + near
         beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
-        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)  # fmt: skip
+        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)
     if np.any(normal):
         pressed = np.count_nonzero(normal > 0)
         told.append(
@@ -168,9 +156,7 @@ def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:
             return
 
 
-def _of_retention(
-    question: Question, response: Response, shift: tuple[float, float]
-) -> Iterator[Verdict]:
+def _of_retention(question: Question, response: Response, shift: tuple[float, float]) -> Iterator[Verdict]:
     if question.model.retention > 0.0 and response.top is not None and math.isnan(shift[0]):
         why = (
             "no periodic motion was found at the peak with a tenth of the retention stiffness; the peak rests on the body being "

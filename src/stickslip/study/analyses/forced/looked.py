@@ -35,22 +35,18 @@ class Looked:
         """Return what is found of the stability of a point."""
         name, self.count = f"{STABLE}.{self.count}", self.count + 1
         known, pieces = self.notes.get(name), Pieces(self.notes, name)
-        one = (
-            from_note(known, accepted.point)
-            if known
-            else examine(self.question, accepted, pieces.keep)
-        )
+        one = from_note(known, accepted.point) if known else examine(self.question, accepted, pieces.keep)
         self.taken += bool(known)
         self.notes.put(name, as_note(one))
         pieces.give_up()
         if pieces.taken:
-            self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")  # fmt: skip
+            self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")
         return one
 
     def tell(self) -> None:
         """Say how many points were known."""
         if self.taken:
-            self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")  # fmt: skip
+            self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")
 
     def _say(self, text: str) -> None:
         LOG.info(f"stability: {self.question.said(text)}")

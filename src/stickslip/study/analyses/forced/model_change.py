@@ -30,9 +30,7 @@ UNKNOWN: Change = (float("nan"), float("nan"))
 BESIDE = 0.03  # half the width of a sweep about a peak, relative to its frequency,
 SWEPT_POINTS = 12  # and its points
 PEAK_POINTS = 4  # that resolve a peak found again
-AT_AN_END = (
-    1e-9  # relative distance from an end of the sweep: no resonance, compared at its own frequency
-)
+AT_AN_END = 1e-9  # relative distance from an end of the sweep: no resonance, compared at its own frequency
 
 
 def model_changes(question: Question, response: Response) -> Values:
@@ -105,18 +103,14 @@ def _change(response: Response, own: Found, other: Found) -> Change:
     return after / before - 1.0, (other[1].omega - own[1].omega) / HZ
 
 
-def _swept(
-    system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint
-) -> ForcedPoint | None:
+def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> ForcedPoint | None:
     """Find a peak by a short sweep, where the solution at a point does not lead to that of another model; None where it is an end of that."""
     around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
     short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
     problem = forced_problem(system, load, short)
     found = [p for p in accepted_points(list(forced_response(system, load, short))) if p.converged]
     top = max(found, key=problem.amplitude, default=None)
-    inside = top is not None and min(p.omega for p in found) < top.omega < max(
-        p.omega for p in found
-    )
+    inside = top is not None and min(p.omega for p in found) < top.omega < max(p.omega for p in found)
     return top if inside else None
 
 

@@ -88,15 +88,11 @@ class ReferenceDoubt:
         left_out = [h for h in range(1, self.high[-1]) if h not in self.high]
         more = self.high[-1] if left_out else min(self.harmonics, HIGHEST)
         if left_out:
-            told = (
-                f"harmonics.high leaves out {', '.join(map(str, left_out))}: keep them, and compare"
-            )
+            told = f"harmonics.high leaves out {', '.join(map(str, left_out))}: keep them, and compare"
         elif more > self.high[-1]:
             told = f"Raise harmonics.high, for instance to {more}, and compare"
         else:
-            return (
-                f"No study keeps more than {HIGHEST} harmonics: judge the result with that in mind."
-            )
+            return f"No study keeps more than {HIGHEST} harmonics: judge the result with that in mind."
         return (
             f"{told}; a solution then has up to {2 * more + 1} unknowns a coordinate instead of up to {2 * len(self.high) - 1}, and its "
             "cost grows at least as much."
@@ -125,8 +121,5 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
     worst = max(checks, key=lambda c: c.error)
     place = problem.measure.dofs.tolist().index(worst.dof)
     return replace(
-        doubt,
-        frequency_hz=float(worst.omega / HZ),
-        kept=named(worst.kept),
-        label=question.model.error_labels[place],
+        doubt, frequency_hz=float(worst.omega / HZ), kept=named(worst.kept), label=question.model.error_labels[place]
     )

@@ -9,15 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.quasi_periodic.in_time import (
-    KEPT,
-    LEAST,
-    MOST,
-    PEAKS,
-    Course,
-    course,
-    statistics,
-)
+from stickslip.response.quasi_periodic.in_time import KEPT, LEAST, MOST, PEAKS, Course, course, statistics
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.study.analyses.forced.in_time import GOLDEN, KICK
@@ -103,19 +95,14 @@ def without_periodic(
 ) -> list[tuple[float, str, float]]:
     """Return where no balance stands for the motion (rad/s), why, and the modulus of its multiplier: the peak first, then the nearest to it."""
     found = {
-        a.point.omega: ("no periodic motion was found", np.nan)
-        for a in response.accepted
-        if not a.point.converged
+        a.point.omega: ("no periodic motion was found", np.nan) for a in response.accepted if not a.point.converged
     }
     for one in examined:
         if one.verdict == "unstable" and _alone(response, examined, one):
             found[one.omega] = "the periodic motion is unstable", one.multiplier
         elif one.verdict == "undecided" and not one.motion and not np.isfinite(one.error):
-            found[one.omega] = (
-                "no motion with more harmonics was found near the balance",
-                one.multiplier,
-            )
-    middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega  # fmt: skip
+            found[one.omega] = ("no motion with more harmonics was found near the balance", one.multiplier)
+    middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega
     nearest = sorted(found, key=lambda omega: abs(omega - middle))
     return [(omega, *found[omega]) for omega in nearest[: question.not_periodic_points]]
 
@@ -136,7 +123,7 @@ def _alone(response: Response, examined: Sequence[Examined], one: Examined) -> b
 
 def in_time_instead(
     question: Question, response: Response, omega: float, why: str, work: float, multiplier: float = np.nan
-) -> Answer:  # fmt: skip
+) -> Answer:
     """March at a frequency and say what the motion is like.
 
     Parameters
@@ -162,9 +149,7 @@ def in_time_instead(
     return _told(question, response, omega, why, found)
 
 
-def _marched(
-    question: Question, response: Response, omega: float, work: float, multiplier: float
-) -> _March:
+def _marched(question: Question, response: Response, omega: float, work: float, multiplier: float) -> _March:
     system, load = question.problem.system, question.model.load
     structure, contacts = system.structure, system.interface
     known = [a for a in response.accepted if a.point.converged]
@@ -222,9 +207,11 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
     of, own = statistics(found), response.output
     if found.overflowed or not np.isfinite(of.spread):
         count = question.problem.system.outputs.size
-        said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else (
-            f"the time was too short: {found.periods} of at least {LEAST} periods"
-        )  # fmt: skip
+        said = (
+            f"in time it grew beyond all numbers in {found.periods} periods"
+            if found.overflowed
+            else (f"the time was too short: {found.periods} of at least {LEAST} periods")
+        )
         return _nothing(omega, why, count, said)
     last = found.amplitude[-TURNS:, own]
     amplitudes = np.full(TURNS, np.nan)
@@ -253,9 +240,23 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
         body += _settledness(of.spread, of.settled)
     body += doubt
     return Answer(
-        omega, why, of.largest, of.least, of.mean, of.rms, of.extreme, of.spread, found.periods, found.seconds,
-        settled, alike and settled, lines, of.peaks[own], amplitudes, f"{head} {body}",
-    )  # fmt: skip
+        omega,
+        why,
+        of.largest,
+        of.least,
+        of.mean,
+        of.rms,
+        of.extreme,
+        of.spread,
+        found.periods,
+        found.seconds,
+        settled,
+        alike and settled,
+        lines,
+        of.peaks[own],
+        amplitudes,
+        f"{head} {body}",
+    )
 
 
 def _patience(march: _March) -> str:
@@ -280,9 +281,7 @@ def _of_the_step(march: _March, own: int) -> str:
         return f"; a contact that opens is too stiff for {march.finer.steps} steps a period"
     rms, fine = (float(statistics(c).rms[own]) for c in (march.course, march.finer))
     if not np.isfinite(fine):
-        return (
-            "; there was no time to look at it with half the step (forced_response.not_periodic_s)"
-        )
+        return "; there was no time to look at it with half the step (forced_response.not_periodic_s)"
     if abs(fine - rms) <= AGREE * max(fine, rms):
         return ""
     return f"; with half the step the root mean square is {millimetres(fine)}: too few steps, or too few periods"
@@ -297,19 +296,41 @@ def _off(hertz: float, own: float) -> bool:
 def _nothing(omega: float, why: str, count: int, said: str) -> Answer:
     none, lines = np.full(count, np.nan), np.full(PEAKS, np.nan)
     return Answer(
-        omega, why, none, none, none, none, none, np.nan, 0, 0.0, False, False, lines, lines,
-        np.full(TURNS, np.nan), f"{omega / HZ:.3f} Hz: {why}; {said}",
-    )  # fmt: skip
+        omega,
+        why,
+        none,
+        none,
+        none,
+        none,
+        none,
+        np.nan,
+        0,
+        0.0,
+        False,
+        False,
+        lines,
+        lines,
+        np.full(TURNS, np.nan),
+        f"{omega / HZ:.3f} Hz: {why}; {said}",
+    )
 
 
 def of_answers(answers: Sequence[Answer]) -> dict[str, object]:
     """Return the values of the dataset."""
     named = (
-        "largest", "least", "mean", "rms", "extreme", "spread", "periods", "seconds", "line_hz", "line_amplitude", "amplitudes",
-    )  # fmt: skip
-    found: dict[str, object] = {
-        f"not_periodic_{name}": np.array([getattr(a, name) for a in answers]) for name in named
-    }
+        "largest",
+        "least",
+        "mean",
+        "rms",
+        "extreme",
+        "spread",
+        "periods",
+        "seconds",
+        "line_hz",
+        "line_amplitude",
+        "amplitudes",
+    )
+    found: dict[str, object] = {f"not_periodic_{name}": np.array([getattr(a, name) for a in answers]) for name in named}
     return found | {
         "not_periodic_frequency_hz": np.array([a.omega / HZ for a in answers]),
         "not_periodic_settled": np.array([a.settled for a in answers], dtype=np.int64),

@@ -10,13 +10,7 @@ from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.response.at_rest import pressed_by
 from stickslip.response.physics.damper import DampedMode, damped_modes
 from stickslip.response.physics.friction import Friction, friction_of
-from stickslip.response.physics.modes import (
-    UNDAMPED_RATIO,
-    Range,
-    RangeMode,
-    range_modes,
-    springs_of,
-)
+from stickslip.response.physics.modes import UNDAMPED_RATIO, Range, RangeMode, range_modes, springs_of
 from stickslip.response.recovery import damped_share, equivalent_damping, signals
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question
@@ -26,7 +20,9 @@ from stickslip.units import HZ
 
 PHYSICS = "physics"  # the note of a job
 BESIDE = 0.01  # of a frequency: a resonance stands so near to the mode that it belongs to
-STEADY = 0.5  # half the range of a normal force over its mean above which the estimate of what friction can do does not hold
+STEADY = (
+    0.5  # half the range of a normal force over its mean above which the estimate of what friction can do does not hold
+)
 NAMED_MODES = 3  # that a sentence lists
 GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
 
@@ -158,9 +154,7 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
             f"nothing damps {_modes(physics.undamped)} while contacts stick, and at the peak nothing slips enough to (equivalent damping "
             f"{_plain(known)} of critical): the peak has no finite value, the number tells how near to it a frequency was solved"
         )
-        yield Verdict(
-            "doubtful" if question.sweep.grid.size else "wrong", why=why, remedy=GIVE_DAMPING
-        )
+        yield Verdict("doubtful" if question.sweep.grid.size else "wrong", why=why, remedy=GIVE_DAMPING)
         return
     for mode in physics.undamped:
         low, high = sorted((physics.ends(mode), mode.omega))
@@ -173,9 +167,7 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
         if missed and _damping(question, most) < UNDAMPED_RATIO:
             why = f"nothing damps the mode at {mode.hz:.2f} Hz while contacts stick, and nothing slips where it was solved: a larger peak may stand there"
-            remedy = (
-                f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
-            )
+            remedy = f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
             yield Verdict("doubtful", why=why, remedy=remedy)
 
 
@@ -219,20 +211,14 @@ def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> 
         return
     if moving:
         why = f"what friction can do was not estimated: {moving}"
-        yield Verdict(
-            "trusted", why=why, remedy="stickslip check has the estimate for steady ones."
-        )
+        yield Verdict("trusted", why=why, remedy="stickslip check has the estimate for steady ones.")
         return
     shown = physics.damped[:NAMED_MODES]
     if np.isfinite(peak_hz):
         shown = (min(physics.damped, key=lambda d: d.apart(peak_hz * HZ)),)
     told = "; ".join(str(d) for d in shown)
     why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for steady normal loads and one slip ratio of all contacts"
-    yield Verdict(
-        "trusted",
-        why=why,
-        remedy="That is at one amplitude: smaller and larger motions are damped less.",
-    )
+    yield Verdict("trusted", why=why, remedy="That is at one amplitude: smaller and larger motions are damped less.")
 
 
 def _loads_move(question: Question, response: Response) -> str:
@@ -253,11 +239,7 @@ def _loads_move(question: Question, response: Response) -> str:
     if opened.any():
         return f"{opened.sum()} of {len(pressed)} contact points open at the peak"
     most = float(np.average(swing, weights=pressed.mean(axis=1)))
-    return (
-        f"normal forces at the peak swing by {100 * most:.0f} % of their mean"
-        if most > STEADY
-        else ""
-    )
+    return f"normal forces at the peak swing by {100 * most:.0f} % of their mean" if most > STEADY else ""
 
 
 def _modes(every: list[RangeMode]) -> str:

@@ -165,10 +165,7 @@ class Response:
         if self.top is None:
             return ()
         here, wanted = self.top.point.omega, FLANK * self.peak_amplitude
-        sides = (
-            [a for a in self.accepted if a.fields and side * (a.point.omega - here) > 0]
-            for side in (-1, 1)
-        )
+        sides = ([a for a in self.accepted if a.fields and side * (a.point.omega - here) > 0] for side in (-1, 1))
         return tuple(min(s, key=lambda a: abs(self.amplitude(a) - wanted)) for s in sides if s)
 
 
@@ -251,9 +248,7 @@ def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None)
     return Accepted(point, low, found, fields(problem, low), error)
 
 
-def _amplitudes(
-    found: Fields | None, n_outputs: int, driven: Harmonics, of: AmplitudeOf
-) -> FloatArray:
+def _amplitudes(found: Fields | None, n_outputs: int, driven: Harmonics, of: AmplitudeOf) -> FloatArray:
     if found is None:
         return np.full(n_outputs, np.nan)
     return amplitudes(found.outputs[:, :n_outputs], driven, of)

@@ -62,8 +62,5 @@ def _vector(values: ComplexArray) -> str:
     if not np.any(values.imag):
         return f"({', '.join(f'{v:.5g}' for v in values.real)})"
     size = np.abs(values).max()
-    told = [
-        f"{abs(v):.5g} at {np.degrees(np.angle(v)) if abs(v) > 1e-9 * size else 0:.1f} deg"
-        for v in values
-    ]
+    told = [f"{abs(v):.5g} at {np.degrees(np.angle(v)) if abs(v) > 1e-9 * size else 0:.1f} deg" for v in values]
     return f"({', '.join(told)})"

@@ -41,9 +41,7 @@ RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
 ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
-MORE_THAN_LOW = (
-    'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
-)
+MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +118,7 @@ class Question:
     def driven_names(self) -> tuple[str, ...]:
         """What these harmonics are called: engine orders on a wheel."""
         orders = self.model.orders
-        return tuple(
-            f"engine order {orders[h]}" if h in orders else f"harmonic {h}" for h in self.driven
-        )
+        return tuple(f"engine order {orders[h]}" if h in orders else f"harmonic {h}" for h in self.driven)
 
     @property
     def orders_lines(self) -> tuple[str, ...]:
@@ -131,11 +127,7 @@ class Question:
         if len(orders) < 2 or not base:
             return ()
         waves = [f"{m} in harmonic {h} as wave {m % self.model.sectors}" for h, m in orders.items()]
-        range_of = (
-            "speeds are those of the wheel"
-            if self.over_speed
-            else f"{self.key} is {base} times the speed"
-        )
+        range_of = "speeds are those of the wheel" if self.over_speed else f"{self.key} is {base} times the speed"
         return (f"engine orders: {', '.join(waves)}; {range_of}",)
 
     @property
@@ -157,9 +149,7 @@ def too_large(question: Question) -> str:
     size, kept = sectors * system.structure.n, sectors * len(system.retained_labels)
     if size <= MOST_IN_TIME:
         return ""
-    return f"{size} coordinates {TOO_MANY} {MOST_IN_TIME}" + f", {kept} {ALONE}" * (
-        kept > MOST_IN_TIME
-    )
+    return f"{size} coordinates {TOO_MANY} {MOST_IN_TIME}" + f", {kept} {ALONE}" * (kept > MOST_IN_TIME)
 
 
 def peak_first(model: Assembled) -> Assembled:
@@ -192,9 +182,7 @@ def question_of(case: Case, model: Model) -> Question:
         exceeds the study's limits.
     """
     settings = case.settings
-    sweep = within_limits(
-        model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits
-    )
+    sweep = within_limits(model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits)
     sweep = measured(sweep, model)
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
@@ -234,9 +222,7 @@ def question_of(case: Case, model: Model) -> Question:
         examine=settings.forced_response.stability,
         bifurcations=settings.forced_response.bifurcations,
         not_periodic_s=(
-            settings.forced_response.not_periodic_s
-            if settings.forced_response.not_periodic == "in_time"
-            else 0.0
+            settings.forced_response.not_periodic_s if settings.forced_response.not_periodic == "in_time" else 0.0
         ),
         not_periodic_points=settings.forced_response.not_periodic_points,
         rpm=model.speed / RPM,

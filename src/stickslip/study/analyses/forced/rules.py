@@ -11,20 +11,10 @@ from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
-from stickslip.study.analyses.forced.finding import (
-    Finding,
-    Rule,
-    in_time_there,
-    without_place,
-)
+from stickslip.study.analyses.forced.finding import Finding, Rule, in_time_there, without_place
 from stickslip.study.analyses.forced.jumps import jumps
 from stickslip.study.analyses.forced.question import MORE_THAN_LOW
-from stickslip.study.analyses.forced.stable_rules import (
-    bifurcated,
-    fewer,
-    stability,
-    unstable_stretches,
-)
+from stickslip.study.analyses.forced.stable_rules import bifurcated, fewer, stability, unstable_stretches
 from stickslip.study.analyses.verdict import from_json
 from stickslip.units import LARGEST_PERCENT, millimetres
 
@@ -81,7 +71,9 @@ def _more(case: Curve, point: int) -> str:
             "no solution was near"
         )
     if case.cap < RUNGS[-1]:
-        return f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
+        return (
+            f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
+        )
     return f"There are no more than {case.cap} harmonics to be had"
 
 
@@ -96,7 +88,9 @@ def _of_selection(selection: str) -> str:
 
 def _examination(case: Curve) -> str:
     if case.rigid:
-        return "A contact is rigid, of which no error is predicted: compare with a larger harmonics.high, or see --verify"
+        return (
+            "A contact is rigid, of which no error is predicted: compare with a larger harmonics.high, or see --verify"
+        )
     return "--verify-harmonics predicts at every point what more would change, --verify integrates in time at the peak"
 
 
@@ -150,9 +144,7 @@ def on_other_motions(case: Curve) -> Iterator[Finding]:
     for jump in jumps(case.amplitude[at], case.dissipation[at], case.few[at], case.elastic):
         i, j = int(at[jump.step]), int(at[jump.step + 1])
         kept = case.kept[i], case.kept[j]
-        unlike = (
-            "" if kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
-        )
+        unlike = "" if kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
         why = (
             f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): more than one periodic motion "
             f"exists near there, and which one a machine takes depends on its history{unlike}"
@@ -187,7 +179,9 @@ def in_time(case: Curve) -> Iterator[Finding]:
         motion, off = motion_of(said), float(said["verify_difference_percent"])
         wanders = 100 * float(said.get("verify_scatter", np.inf))
         if motion == "not periodic" and max(wanders, abs(off)) <= ATTAINED:
-            why = f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
+            why = (
+                f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
+            )
             yield Finding("doubtful", why, "Believe the amplitude to as much.", (point,))
         elif point in case.unstable and point != case.peak:
             continue  # an answer: `unstable_stretches` tells of it
@@ -282,9 +276,7 @@ def retention(case: Curve) -> Iterator[Finding]:
             f"the peak changes by {100 * shift:.3g} % when the retention stiffness of rigid bodies is ten times smaller: it "
             "depends on a stiffness that is not physical"
         )
-        remedy = (
-            "Lower retention.stiffness_n_per_m until the peak stays, or find what holds the body."
-        )
+        remedy = "Lower retention.stiffness_n_per_m until the peak stays, or find what holds the body."
         yield Finding("doubtful", why, remedy)
 
 

@@ -14,12 +14,10 @@ RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
 class ForcedResponse(Section):
     """Where the steady vibration under harmonic loads is computed."""
 
-    frequency_hz: Range | None = Field(
-        None, description="the range [lowest, highest] in Hz, the lower frequency first"
-    )
+    frequency_hz: Range | None = Field(None, description="the range [lowest, highest] in Hz, the lower frequency first")
     frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=10_000)] | None = Field(
         None, description="frequencies of your own in Hz instead of a range, growing"
-    )  # fmt: skip
+    )
     over: Literal["frequency", "speed"] = Field(
         "frequency",
         description="frequency: at the one speed of [rotation]; speed: along speed_rpm, the frequency being the engine order times "
@@ -32,15 +30,8 @@ class ForcedResponse(Section):
         "up",
         description="up: from the lowest frequency to the highest; down: back, which finds other motions beside folds",
     )
-    points: int = Field(
-        40,
-        ge=2,
-        le=10_000,
-        description="smallest number of points of the first passage, 2 to 10000",
-    )
-    peak_points: int = Field(
-        8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100"
-    )
+    points: int = Field(40, ge=2, le=10_000, description="smallest number of points of the first passage, 2 to 10000")
+    peak_points: int = Field(8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100")
     frequencies: int | None = Field(
         None,
         ge=2,
@@ -96,16 +87,10 @@ class ForcedResponse(Section):
         wanted = ("speed_rpm",) if self.over == "speed" else RANGES[:2]
         strange = [key for key in given if key not in wanted]
         if strange:
-            raise custom_error(
-                f"is not for over = {self.over!r}",
-                f"Give {' or '.join(wanted)} instead.",
-                strange[0],
-            )
+            raise custom_error(f"is not for over = {self.over!r}", f"Give {' or '.join(wanted)} instead.", strange[0])
         if len(given) != 1:
             problem = "is missing" if not given else f"cannot stand beside {given[0]}"
-            raise custom_error(
-                problem, f"Give one of {' and '.join(wanted)}.", (given or wanted)[-1]
-            )
+            raise custom_error(problem, f"Give one of {' and '.join(wanted)}.", (given or wanted)[-1])
         rising_pair(self.frequency_hz or [], "frequency_hz")
         rising_pair(self.speed_rpm or [], "speed_rpm", "speed")
         _check_list(self.frequencies_hz, self.frequencies)
@@ -116,8 +101,6 @@ def _check_list(own: list[float] | None, count: int | None) -> None:
     if own is None:
         return
     if count is not None:
-        raise custom_error(
-            "cannot stand beside frequencies_hz", "Remove one of them.", "frequencies"
-        )
+        raise custom_error("cannot stand beside frequencies_hz", "Remove one of them.", "frequencies")
     if any(b <= a for a, b in pairwise(own)):
         raise custom_error("must grow", "Sort them, and give each once.", "frequencies_hz")

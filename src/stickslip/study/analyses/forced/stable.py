@@ -15,19 +15,9 @@ from stickslip.response.stability import Stability, hill_stability, settled_stab
 from stickslip.response.stability.hill_segment import Keep, not_kept
 from stickslip.response.stability.missing_harmonics import with_more
 from stickslip.response.stability.modulus import modulus_text
-from stickslip.response.stability.waves import (
-    WaveDisturbance,
-    growing_wave,
-    point_disturbances,
-)
+from stickslip.response.stability.waves import WaveDisturbance, growing_wave, point_disturbances
 from stickslip.study.analyses.forced.comparison import Check
-from stickslip.study.analyses.forced.examination import (
-    FLOPS,
-    by_hill,
-    examination_work,
-    hill_work,
-    too_long,
-)
+from stickslip.study.analyses.forced.examination import FLOPS, by_hill, examination_work, hill_work, too_long
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question, too_large
@@ -37,9 +27,7 @@ Word = Literal["stable", "unstable", "neutral", "undecided", "not examined"]
 Basis = Literal["not examined", "examined", "carried", "by sign"]
 MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
 FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
-ONE_SECTOR = (
-    "what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
-)
+ONE_SECTOR = "what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
 BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not periodic": "unstable"}
 
 
@@ -250,10 +238,7 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
     return (
         top is not None
         and question.model.system.structure.of_harmonic(1).loss is None
-        and any(
-            e.position == response.peak and e.verdict == "undecided" and not e.motion
-            for e in examined
-        )
+        and any(e.position == response.peak and e.verdict == "undecided" and not e.motion for e in examined)
         and seconds_in_time(question.model.system) < MOST_IN_TIME
     )
 

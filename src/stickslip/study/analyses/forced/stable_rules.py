@@ -13,14 +13,11 @@ from stickslip.units import millimetres
 UNDECIDED = MOTION["undecided"]
 LEFT = "unstable: a machine does not stay there"
 LEAVING = dict.fromkeys(
-    ("period doubling", "branch point"),
-    'forced_response.bifurcations = "branches" follows what leaves there.',
+    ("period doubling", "branch point"), 'forced_response.bifurcations = "branches" follows what leaves there.'
 )
 FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
 OPEN = "No more time helps, and no fewer modes: it stays open. More harmonics make the errors of multipliers smaller."
-IN_TIME_TELLS = (
-    "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
-)
+IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
 
 
 def stability(case: Curve) -> Iterator[Finding]:
@@ -58,9 +55,7 @@ def unstable_stretches(case: Curve) -> Iterator[Finding]:
     elif off.size:
         low, high = case.hz[off].min(), case.hz[off].max()
         why = f"{off.size} of {case.hz.size} points, {low:.4g} to {high:.4g} Hz, are unstable: a machine does not stay there"
-        yield Finding(
-            "trusted", why, 'forced_response.bifurcations = "all" locates where that begins.'
-        )
+        yield Finding("trusted", why, 'forced_response.bifurcations = "all" locates where that begins.')
 
 
 def bifurcated(case: Curve) -> Iterator[Finding]:

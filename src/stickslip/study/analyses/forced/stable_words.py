@@ -14,12 +14,7 @@ from stickslip.study.analyses.verdict import said
 from stickslip.units import HZ
 
 FEW = 6  # points of a case that are told one by one
-BASES = (
-    "not examined",
-    "examined",
-    "carried",
-    "by sign",
-)  # in the order of their numbers in the dataset
+BASES = ("not examined", "examined", "carried", "by sign")  # in the order of their numbers in the dataset
 MOST_RUNS = 12
 MOST_SENTENCES = 10
 
@@ -63,7 +58,11 @@ def peak_word(response: Response, examined: Sequence[Examined]) -> str:
 
 def said_of(verdict: str) -> str:
     """Return a verdict on the stability as it stands beside a peak."""
-    return {"undecided": "stability undecided"}.get(verdict, verdict) if verdict not in ("", "not examined") else "stability not examined"  # fmt: skip
+    return (
+        {"undecided": "stability undecided"}.get(verdict, verdict)
+        if verdict not in ("", "not examined")
+        else "stability not examined"
+    )
 
 
 def stability_log(points: Sequence[Point]) -> list[str]:

@@ -52,9 +52,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _lines("Against more harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", all_lines(data, labels), detail=True),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
-        _lines(
-            "In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)
-        ),
+        _lines("In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)),
         _lines("Against time integration", _along(data, "verify", labels)),
     ]
     return tuple(table for table in found if table.rows or table.lines)
@@ -73,11 +71,7 @@ def amplitude_name(data: xr.Dataset) -> str:
         return f"norm of engine orders {', '.join(map(str, orders))}"
     if driven == [1]:
         return FIRST
-    return (
-        f"harmonic {driven[0]}"
-        if len(driven) == 1
-        else f"norm of harmonics {', '.join(map(str, driven))}"
-    )
+    return f"harmonic {driven[0]}" if len(driven) == 1 else f"norm of harmonics {', '.join(map(str, driven))}"
 
 
 def several_orders(data: xr.Dataset) -> list[int]:
@@ -104,9 +98,7 @@ def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
                 at = int(np.nanargmax(size))
                 hertz = float(own["frequency_hz"][at])
                 times = m / int(data.attrs["engine_order"])
-                rows.append(
-                    (label, str(m), f"{1e3 * size[at]:.5g}", f"{hertz:.3f}", f"{times * hertz:.3f}")
-                )
+                rows.append((label, str(m), f"{1e3 * size[at]:.5g}", f"{hertz:.3f}", f"{times * hertz:.3f}"))
     lines = (orders_sentence(data),) if rows else ()
     return TextTable("Largest amplitude of each engine order", head, tuple(rows), lines)
 

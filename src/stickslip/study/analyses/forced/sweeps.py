@@ -41,9 +41,7 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
     return replace(sweep, at=own, frequencies=table.frequencies or 0)
 
 
-def sweep_through(
-    settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]
-) -> Sweep:
+def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]) -> Sweep:
     """Return the sweep of a table with ``direction``, ``points`` and ``peak_points``, harmonics and solver as the study says.
 
     Parameters

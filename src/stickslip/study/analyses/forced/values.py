@@ -92,15 +92,7 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
 
 def of_checks(checks: Sequence[Check]) -> Values:
     """Return comparisons with time integration."""
-    real = (
-        "frequency_hz",
-        "transient",
-        "balance",
-        "difference_percent",
-        "outputs_percent",
-        "scatter",
-        "refined",
-    )
+    real = ("frequency_hz", "transient", "balance", "difference_percent", "outputs_percent", "scatter", "refined")
     columns = {f"verify_{name}": np.array([getattr(c, name) for c in checks]) for name in real}
     return columns | {
         "verify_settled": _whole(int(c.settled) for c in checks),
@@ -197,9 +189,7 @@ def _of_points(question: Question, response: Response) -> Values:
         "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
         "own_error_percent": 100 * np.array([a.own_error for a in response.accepted]),
         "audit_error_percent": 100 * np.array([a.audit_error for a in response.accepted]),
-        "audit_error_of": texts(
-            labels[a.audit_place] if a.audit_place >= 0 else "" for a in response.accepted
-        ),
+        "audit_error_of": texts(labels[a.audit_place] if a.audit_place >= 0 else "" for a in response.accepted),
         "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
         "newton_iterations": _whole(p.iterations for p in points),
         "seconds": np.array([p.seconds_total for p in points]),
@@ -217,7 +207,7 @@ def _of_fields(question: Question, response: Response) -> Values:
         rows = [_padded(getattr(a.fields, name, None), high, shape) for a in every]
         return _parts(rows, (high + 1, *shape))
 
-    retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]  # fmt: skip
+    retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]
     lost = np.full(n_contacts, np.nan)
     return {
         "harmonic_kept": _kept([a.point for a in every], high),
@@ -229,7 +219,7 @@ def _of_fields(question: Question, response: Response) -> Values:
         "gap": block("gaps", n_contacts, 3),
         "contact_force": block("forces", n_contacts, 3),
         "dissipated_energy": _stacked([getattr(a.fields, "energy", lost) for a in every], n_contacts),
-    }  # fmt: skip
+    }
 
 
 def _of_peak(question: Question, response: Response) -> Values:
@@ -239,23 +229,14 @@ def _of_peak(question: Question, response: Response) -> Values:
         state = np.full((n, 2, samples), -1)
         return {"peak_time": lost[0, 0], "peak_gap": lost, "peak_force": lost, "peak_state": state}
     period = signals(question.problem, response.top.point)
-    return {
-        "peak_time": period.time,
-        "peak_gap": period.gap,
-        "peak_force": period.force,
-        "peak_state": period.state,
-    }
+    return {"peak_time": period.time, "peak_gap": period.gap, "peak_force": period.force, "peak_state": period.state}
 
 
 def _of_attempts(question: Question, response: Response) -> Values:
     points = response.solved
     # the accepted points do not tell it all: a branch with many harmonics takes the place of points that the alert spoke of
     alert = question.chooser.is_error
-    asked = [
-        p
-        for p in points
-        if alert and p.stage in ("low", "point") and not np.isnan(p.predicted_error)
-    ]
+    asked = [p for p in points if alert and p.stage in ("low", "point") and not np.isnan(p.predicted_error)]
     return {
         "attempt_frequency_hz": np.array([p.omega / HZ for p in points]),
         "attempt_stage": _whole(STAGES.index(p.stage) for p in points),

@@ -16,16 +16,7 @@ from stickslip.study.analyses.forced.physics_rules import PHYSICS_RULES, told_of
 from stickslip.study.analyses.forced.rules import RULES
 from stickslip.study.analyses.forced.stable_rules import LEFT
 from stickslip.study.analyses.forced.stable_words import said_of
-from stickslip.study.analyses.verdict import (
-    ALIKE,
-    LEVELS,
-    POINT_LEVELS,
-    UNSTABLE,
-    Level,
-    Verdict,
-    of_all_cases,
-    worst,
-)
+from stickslip.study.analyses.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level, Verdict, of_all_cases, worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +89,7 @@ def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
     told: list[Verdict] = []
     for v in verdicts:
         known = [before.why for before in told if len(before.why) >= ALIKE]
-        told.append(replace(v, why=reduce(lambda why, own: why.replace(f"; {own}", ""), known, v.why)))  # fmt: skip
+        told.append(replace(v, why=reduce(lambda why, own: why.replace(f"; {own}", ""), known, v.why)))
     return tuple(told)
 
 

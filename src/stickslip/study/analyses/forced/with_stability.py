@@ -11,12 +11,7 @@ from stickslip.study.analyses.forced.in_time import check_in_time
 from stickslip.study.analyses.forced.looked import Looked
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
 from stickslip.study.analyses.forced.question import IN_TIME, Question
-from stickslip.study.analyses.forced.stable import (
-    Examined,
-    to_integrate,
-    with_motion,
-    with_raised,
-)
+from stickslip.study.analyses.forced.stable import Examined, to_integrate, with_motion, with_raised
 from stickslip.study.keep.progress import LOG
 
 MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
@@ -57,11 +52,7 @@ def _examined(question: Question, response: Response, notes: Notes) -> list[Exam
 
 
 def integrated(
-    question: Question,
-    response: Response,
-    accepted: Accepted,
-    examined: Sequence[Examined],
-    notes: Notes,
+    question: Question, response: Response, accepted: Accepted, examined: Sequence[Examined], notes: Notes
 ) -> Check:
     """Integrate in time; what an interrupted run has integrated is not done again."""
     omega = accepted.point.omega

@@ -24,14 +24,26 @@ REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a da
 HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
 FEWEST = 3  # peaks of a curve
 HELD_BY = (
-    "ratio", "friction_coefficient", "slip_limit_n", "slip_limit_pa", "preload_n", "preload_pa", "interference_m",
-)  # the more of them, the longer contacts stick; ratio: pull over excitation  # fmt: skip
+    "ratio",
+    "friction_coefficient",
+    "slip_limit_n",
+    "slip_limit_pa",
+    "preload_n",
+    "preload_pa",
+    "interference_m",
+)  # the more of them, the longer contacts stick; ratio: pull over excitation
 FORCE = "force_n"  # of a load
 APART = 0.25  # of the cycle: by so much more an end sticks that is told by its contacts
 SLIDES_MORE = 2.0  # times the loss over the amplitude at the other end
 SETTINGS = (
-    "forced_response", "harmonics", "limits", "output", "reduction", "retention", "solver",
-)  # tables of how things are computed: over them no joint goes from stick to slip  # fmt: skip
+    "forced_response",
+    "harmonics",
+    "limits",
+    "output",
+    "reduction",
+    "retention",
+    "solver",
+)  # tables of how things are computed: over them no joint goes from stick to slip
 
 
 @dataclass(frozen=True)
@@ -250,7 +262,7 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
         families.setdefault(others, []).append(case)
     found = []
     for others, cases in families.items():
-        known = {c: _peak(data, c, float(values[c]), float(force[c]), per_force=per_force) for c in cases}  # fmt: skip
+        known = {c: _peak(data, c, float(values[c]), float(force[c]), per_force=per_force) for c in cases}
         own = working_range([p for p in known.values() if p is not None], key)
         if own is not None:
             out = tuple(labels[c] for c, p in known.items() if p is None)
@@ -258,9 +270,7 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
     return tuple(found)
 
 
-def _peak(
-    data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool
-) -> CurvePeak | None:
+def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool) -> CurvePeak | None:
     """Return the peak of a case; None where it is not known, no resonance, or wrong."""
     curve = Curve(data, case)
     wrong = curve.number("case_verdict") == LEVELS.index("wrong")
@@ -295,9 +305,6 @@ def with_regimes(data: xr.Dataset) -> xr.Dataset:
         for p, regime in zip(own.peaks, own.regimes, strict=True):
             number[p.case] = REGIMES.index(regime)
     about = "what friction does at the peak, -1 where it was not judged"
-    flags = {
-        "flag_values": np.arange(len(REGIMES)),
-        "flag_meanings": " ".join(r.replace(" ", "_") for r in REGIMES),
-    }
+    flags = {"flag_values": np.arange(len(REGIMES)), "flag_meanings": " ".join(r.replace(" ", "_") for r in REGIMES)}
     named = xr.Variable("case", number, {"units": "1", "long_name": about} | flags)
     return data.assign(friction_regime=named)

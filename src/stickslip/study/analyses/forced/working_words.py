@@ -4,12 +4,7 @@ from collections.abc import Sequence
 
 import xarray as xr
 
-from stickslip.study.analyses.forced.working_range import (
-    HALF_POWER,
-    CurvePeak,
-    WorkingRange,
-    working_ranges,
-)
+from stickslip.study.analyses.forced.working_range import HALF_POWER, CurvePeak, WorkingRange, working_ranges
 from stickslip.study.analyses.verdict import said
 
 TITLE = "Where friction works"
@@ -17,9 +12,7 @@ TITLE = "Where friction works"
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:
     """Say of each curve of a forced response where friction works; nothing where nothing can be judged."""
-    return tuple(
-        said(own.others, text) for own in working_ranges(data) for text in range_sentences(own)
-    )
+    return tuple(said(own.others, text) for own in working_ranges(data) for text in range_sentences(own))
 
 
 def range_sentences(own: WorkingRange) -> tuple[str, ...]:
@@ -54,11 +47,7 @@ def _stuck_end(own: WorkingRange) -> str:
     shut = all(p.contacts.sticking == 1.0 for p in own.of("stuck"))
     still = "all contacts stick" if shut else "no contact slips, opens or closes"
     first = own.stuck is own.peaks[0]
-    where = (
-        f"At {_of(own, own.stuck)}, the first value,"
-        if first
-        else f"From {_of(own, own.stuck)} {side}"
-    )
+    where = f"At {_of(own, own.stuck)}, the first value," if first else f"From {_of(own, own.stuck)} {side}"
     return (
         f"{where} {still} at the peak: friction dissipates nothing, and the resonance is that of the stuck "
         f"system, at {own.stuck.hertz:.5g} Hz."
@@ -71,7 +60,9 @@ def _middle(own: WorkingRange) -> str:
         return "" if stuck is None else _hardly(own, stuck)
     where = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
     if stuck is None:
-        return f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {best.value:g}."
+        return (
+            f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {best.value:g}."
+        )
     return (
         f"Friction works {where}: there the {_size(own)} lies 3 dB or more below that of the stuck system. It is smallest at "
         f"{best.value:g}, {_percent(best.size / stuck.size)} of the stuck one, at {best.hertz:.5g} Hz."
@@ -110,7 +101,7 @@ def _loose_end(own: WorkingRange) -> str:
         return f"Out of the working range {side} {_of(own, held)}: {_gone(own, gone)}{_saturated(best, last)}."
     if not own.of("works"):
         return ""
-    risen = f"{last.size / best.size:.3g} times the smallest" if last is not best else "the smallest computed"  # fmt: skip
+    risen = f"{last.size / best.size:.3g} times the smallest" if last is not best else "the smallest computed"
     return f"The other end was not reached: at {_of(own, last)}, the last value, the {_size(own)} is {risen}."
 
 

@@ -28,7 +28,9 @@ def _of_case(solved: Solved) -> Variables:
     variables = told(model) | {
         "output": variable("", str(model.get("output", "")), "1", "output whose amplitude is given")
     }
-    return variables | {name: variable(dims, found[name], *about) for name, (dims, *about) in ABOUT.items() if name in found}  # fmt: skip
+    return variables | {
+        name: variable(dims, found[name], *about) for name, (dims, *about) in ABOUT.items() if name in found
+    }
 
 
 ABOUT = {
@@ -43,7 +45,11 @@ ABOUT = {
     "highest_hz": ("branch", "Hz", "its highest frequency"),
     "searched_hz": ("searched", "Hz", "frequencies that were searched"),
     "starts": ("searched", "1", "random states that were integrated in time"),
-    "aperiodic": ("searched", "1", "those that end on no motion of the load's period, or on none in the periods allowed"),
+    "aperiodic": (
+        "searched",
+        "1",
+        "those that end on no motion of the load's period, or on none in the periods allowed",
+    ),
     "diverged": ("searched", "1", "those that grow without bound"),
     "searched_tries": ("searched", "1", "deflated solves at the frequency"),
     "searched_spent": ("searched", "1", "1: the budget ended the deflation or the starts there"),
@@ -53,7 +59,11 @@ ABOUT = {
     "motion_stability": ("searched motion", "1", "stable, unstable, undecided or not examined"),
     "motion_multiplier": ("searched motion", "1", "modulus of the multiplier that decides"),
     "motion_multiplier_error": ("searched motion", "1", "its error"),
-    "motion_change": ("searched motion", "1", "what more harmonics would change in it, relative to its vibration; infinite where no motion with more is near"),
+    "motion_change": (
+        "searched motion",
+        "1",
+        "what more harmonics would change in it, relative to its vibration; infinite where no motion with more is near",
+    ),
     "motion_count": ("searched motion", "1", "starts that end on it; -1 where there is no motion"),
     "motion_share": ("searched motion", "1", "share of the starts that ends on it"),
     "motion_share_low": ("searched motion", "1", "lower end of its 95 % interval (Clopper and Pearson)"),
@@ -64,7 +74,7 @@ ABOUT = {
     "budget_solves": ("", "1", "most of them"),
     "unmarched": ("", "1", "why nothing was started in time; empty where it was"),
     "spent": ("", "1", "1: the budget ended the search before all was tried that was asked for"),
-}  # fmt: skip
+}
 
 
 def noted(found: AllMotions, budget: int) -> dict[str, Any]:
@@ -93,7 +103,7 @@ def noted(found: AllMotions, budget: int) -> dict[str, Any]:
 def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
     """Return what was found at the frequencies that were searched."""
     shape = (len(places), max((len(at.motions) for at in places), default=0))
-    numbers = ("amplitude", "multiplier", "multiplier_error", "change", "share", "share_low", "share_high")  # fmt: skip
+    numbers = ("amplitude", "multiplier", "multiplier_error", "change", "share", "share_low", "share_high")
     out: dict[str, Any] = {f"motion_{n}": np.full(shape, np.nan) for n in numbers}
     out |= {"motion_branch": np.full(shape, -1), "motion_count": np.full(shape, -1)}
     words = [[""] * shape[1] for _ in places]
@@ -102,10 +112,16 @@ def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
             words[i][k] = motion.stability
             low, high = at.basins.interval(k)
             told_of = {
-                "branch": motion.branch, "amplitude": motion.amplitude, "multiplier": motion.multiplier,
-                "multiplier_error": motion.error, "change": motion.change, "count": at.basins.count(k), "share": at.basins.share(k),
-                "share_low": low, "share_high": high,
-            }  # fmt: skip
+                "branch": motion.branch,
+                "amplitude": motion.amplitude,
+                "multiplier": motion.multiplier,
+                "multiplier_error": motion.error,
+                "change": motion.change,
+                "count": at.basins.count(k),
+                "share": at.basins.share(k),
+                "share_low": low,
+                "share_high": high,
+            }
             for name, value in told_of.items():
                 out[f"motion_{name}"][i, k] = value
     return {

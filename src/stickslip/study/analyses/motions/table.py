@@ -20,18 +20,14 @@ class AllMotionsTable(Section):
         max_length=200,
         description="frequencies in Hz that are searched; left out: `frequencies` of them, in the middle of equal parts of the range",
     )
-    frequencies: int = Field(
-        5, ge=1, le=200, description="number of frequencies that are searched, 1 to 200"
-    )
+    frequencies: int = Field(5, ge=1, le=200, description="number of frequencies that are searched, 1 to 200")
     solves: int = Field(
         10_000,
         ge=1,
         le=10_000_000,
         description="budget of deflated solves, starts in time and points of branches together: nothing new begins after it, branches end; deflation leaves half of it to time integration",
     )
-    harmonics: int = Field(
-        7, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}"
-    )
+    harmonics: int = Field(7, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}")
     points: int = Field(40, ge=5, le=1000, description="least number of points of the sweep")
     tries: int = Field(
         12,
@@ -62,15 +58,10 @@ class AllMotionsTable(Section):
         description="periods of the loads in one of the motion, 1 to 20: 3 to search motions of a third of the frequency, too",
     )
     most_periods: int = Field(
-        1000,
-        ge=10,
-        le=1_000_000,
-        description="periods after which a start that does not settle is given up",
+        1000, ge=10, le=1_000_000, description="periods after which a start that does not settle is given up"
     )
     steps: int = Field(512, ge=32, le=100_000, description="time steps in a period of the motion")
-    seed: int = Field(
-        0, ge=0, description="a whole number that the random states and starts are made from"
-    )
+    seed: int = Field(0, ge=0, description="a whole number that the random states and starts are made from")
 
     @model_validator(mode="before")
     @classmethod
@@ -99,8 +90,6 @@ class AllMotionsTable(Section):
         if least >= self.steps:
             over = f" over periods = {self.periods}" if self.periods > 1 else ""
             raise custom_error(
-                f"is {self.steps}, too few for {self.harmonics} harmonics{over}",
-                f"Give more than {least}.",
-                "steps",
+                f"is {self.steps}, too few for {self.harmonics} harmonics{over}", f"Give more than {least}.", "steps"
             )
         return self

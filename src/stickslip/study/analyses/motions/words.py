@@ -34,7 +34,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     unmarched = str(case["unmarched"].values)
     if unmarched:
         why = f"what attracts is not known: {unmarched}"
-        found.append(Verdict("doubtful", label, None, why, "Read the branches as motions that may be unstable."))  # fmt: skip
+        found.append(Verdict("doubtful", label, None, why, "Read the branches as motions that may be unstable."))
     unsolved = int(np.sum(case["unsolved"].values))
     if unsolved:
         why = f"{unsolved} starts end on a periodic motion that is no solution with the harmonics kept"
@@ -62,12 +62,22 @@ def _unfinished(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     for i, end in enumerate(case["end"].values):
         if str(end) not in (CLOSES, LEAVES, WHOLE) and SPENT not in str(end):
             why = f"branch {i + 1} ({case['origin'].values[i]}) is not known to its end: {end}"
-            found.append(Verdict("doubtful", label, None, why, "Give all_motions.points more of them, or another range."))  # fmt: skip
+            found.append(
+                Verdict("doubtful", label, None, why, "Give all_motions.points more of them, or another range.")
+            )
     none = np.zeros((case["searched_hz"].size, 0))
     known = case["motion_branch"].values if "motion_branch" in case else none
     for place in np.flatnonzero(~np.any(known >= 0, axis=1) & (case["searched_spent"].values == 0)):
         why = "no motion is known: nothing was started in time"
-        found.append(Verdict("doubtful", label, float(case["searched_hz"].values[place]), why, "Raise all_motions.tries, or change harmonics."))  # fmt: skip
+        found.append(
+            Verdict(
+                "doubtful",
+                label,
+                float(case["searched_hz"].values[place]),
+                why,
+                "Raise all_motions.tries, or change harmonics.",
+            )
+        )
     return found
 
 
@@ -115,11 +125,29 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         aperiodic = int(case["aperiodic"].values[i])
         if aperiodic > 0:
             why = f"{aperiodic} of {starts} starts end on no motion of the load's period within the periods allowed"
-            found.append(Verdict("trusted", label, float(hertz[i]), why, "Ask for all_motions.periods = 2 or 3, or raise all_motions.most_periods.", warns=True))  # fmt: skip
+            found.append(
+                Verdict(
+                    "trusted",
+                    label,
+                    float(hertz[i]),
+                    why,
+                    "Ask for all_motions.periods = 2 or 3, or raise all_motions.most_periods.",
+                    warns=True,
+                )
+            )
         diverged = int(case["diverged"].values[i])
         if diverged > 0:
             why = f"{diverged} of {starts} starts grow without bound"
-            found.append(Verdict("trusted", label, float(hertz[i]), why, "Look for negative damping or stiffness, or lower all_motions.spread.", warns=True))  # fmt: skip
+            found.append(
+                Verdict(
+                    "trusted",
+                    label,
+                    float(hertz[i]),
+                    why,
+                    "Look for negative damping or stiffness, or lower all_motions.spread.",
+                    warns=True,
+                )
+            )
         found += _not_reached(label, case, i)
         if not np.any(np.isfinite(share[i])):
             continue
@@ -131,13 +159,22 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
                 f"most starts end on a branch that no sweep meets: {100 * share[i, most]:.3g} % ({low:.3g} to {high:.3g} %), amplitude "
                 f"{millimetres(case['motion_amplitude'].values[i, most])}"
             )
-            found.append(Verdict("trusted", label, float(hertz[i]), why, "The branch of the sweep is not what the machine is most likely to do.", warns=True))  # fmt: skip
+            found.append(
+                Verdict(
+                    "trusted",
+                    label,
+                    float(hertz[i]),
+                    why,
+                    "The branch of the sweep is not what the machine is most likely to do.",
+                    warns=True,
+                )
+            )
     return found
 
 
 def _not_reached(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
     """Return the largest stable motion at a frequency where no start ends on it."""
-    height = np.where(case["motion_stability"].values[i] == "stable", case["motion_amplitude"].values[i], np.nan)  # fmt: skip
+    height = np.where(case["motion_stability"].values[i] == "stable", case["motion_amplitude"].values[i], np.nan)
     if not np.any(np.isfinite(height)):
         return []
     k = int(np.nanargmax(height))
@@ -148,9 +185,7 @@ def _not_reached(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Ve
         f"the largest stable motion, {millimetres(height[k])}, was reached by none of {int(case['starts'].values[i])} starts: its share "
         f"of such starts is below {high:.2g} % with 95 % confidence, not zero"
     )
-    remedy = (
-        "Count on its amplitude all the same, or raise all_motions.starts and all_motions.spread."
-    )
+    remedy = "Count on its amplitude all the same, or raise all_motions.starts and all_motions.spread."
     return [Verdict("trusted", label, float(case["searched_hz"].values[i]), why, remedy)]
 
 
@@ -164,7 +199,10 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
     branch = case["motion_branch"].values if "motion_branch" in case else np.zeros((0, 0), int)
     for i, own in enumerate(branch):
         for k in np.flatnonzero(own >= 0):
-            of = {n: case[f"motion_{n}"].values[i, k] for n in ("amplitude", "stability", "count", "share", "share_low", "share_high")}  # fmt: skip
+            of = {
+                n: case[f"motion_{n}"].values[i, k]
+                for n in ("amplitude", "stability", "count", "share", "share_low", "share_high")
+            }
             starts = int(case["starts"].values[i])
             share = f"{100 * of['share']:.3g} ({100 * of['share_low']:.3g} to {100 * of['share_high']:.3g})"
             rows.append(

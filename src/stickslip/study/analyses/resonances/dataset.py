@@ -76,13 +76,9 @@ def _lowest(noted: Mapping[str, Any], found: Variables, least: float) -> Variabl
     """Return where the highest peak is lowest: in the valley of one peak, or where one overtakes another; nothing if a visited value is lower than both."""
     places = []
     if "value" in noted:
-        places.append(
-            (float(noted["amplitude"]), float(noted["value"]), float(noted["omega"]) / HZ)
-        )
+        places.append((float(noted["amplitude"]), float(noted["value"]), float(noted["omega"]) / HZ))
     if "overtaking_value" in found:
-        met = zip(
-            found["overtaking_amplitude"].values, found["overtaking_value"].values, strict=True
-        )
+        met = zip(found["overtaking_amplitude"].values, found["overtaking_value"].values, strict=True)
         places += [(float(a), float(v), np.nan) for a, v in met]
     if not places or not min(places)[0] <= least:
         return {}
@@ -91,7 +87,7 @@ def _lowest(noted: Mapping[str, Any], found: Variables, least: float) -> Variabl
         "smallest_value": variable("", value, "1", "value of the parameter at which the highest peak is lowest"),
         "smallest_amplitude": variable("", amplitude, "m", "amplitude there"),
         "smallest_frequency_hz": variable("", hertz, "Hz", "frequency there; NaN where two peaks are equally high"),
-    }  # fmt: skip
+    }
 
 
 def _curves(points: Sequence[PeakPoint], values: Sequence[float] | None) -> dict[str, FloatArray]:

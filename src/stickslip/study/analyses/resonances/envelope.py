@@ -58,7 +58,7 @@ def _before_fold(curve: Sequence[PeakPoint]) -> list[PeakPoint]:
     for point in curve:
         if not (point.converged and point.is_maximum):
             continue
-        if len(found) > 1 and (point.value - found[-1].value) * (found[1].value - found[0].value) <= 0.0:  # fmt: skip
+        if len(found) > 1 and (point.value - found[-1].value) * (found[1].value - found[0].value) <= 0.0:
             break
         found.append(point)
     return found
@@ -96,14 +96,12 @@ def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaki
     return found
 
 
-def valley(
-    points: Sequence[PeakPoint], amplitude: FloatArray, values: Sequence[float]
-) -> tuple[float, float] | None:
+def valley(points: Sequence[PeakPoint], amplitude: FloatArray, values: Sequence[float]) -> tuple[float, float] | None:
     """Return two visited values between which the highest peak is lowest and one and the same peak, whose slope changes its sign; None without."""
     top = highest(amplitude)
     if not np.any(top >= 0):
         return None
-    envelope = np.where(top >= 0, np.nanmax(np.where(np.isnan(amplitude), -np.inf, amplitude), axis=0), np.inf)  # fmt: skip
+    envelope = np.where(top >= 0, np.nanmax(np.where(np.isnan(amplitude), -np.inf, amplitude), axis=0), np.inf)
     lowest = int(np.argmin(envelope))
     slopes = {(p.peak, p.value): p.slope for p in points if p.converged}
     for i, j in ((lowest - 1, lowest), (lowest, lowest + 1)):

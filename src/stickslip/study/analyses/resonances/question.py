@@ -115,7 +115,7 @@ def question_of(case: Case, model: Model) -> Question:
     lowest, highest = (HZ * f for f in asked.frequency_hz)
     search = PeakSearch(
         assembled.system, assembled.load, parameter, (lowest, highest), asked.by, 0, how, asked.harmonic, asked.periods
-    )  # fmt: skip
+    )
     if parameter == "static_load" and not np.any(assembled.load.static):
         raise input_error(
             "resonance.parameter",
@@ -130,9 +130,7 @@ def question_of(case: Case, model: Model) -> Question:
     except InputError as error:
         raise error.inside("resonance") from None
     facts = facts_of(model, model.speed / RPM)
-    return Question(
-        case.label, asked, search, assembled.output_labels[0], facts, tuple(assembled.warnings)
-    )
+    return Question(case.label, asked, search, assembled.output_labels[0], facts, tuple(assembled.warnings))
 
 
 def _accepted(case: Case, asked: ResonanceTable, parameter: Parameter) -> None:

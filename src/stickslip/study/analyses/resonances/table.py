@@ -33,17 +33,13 @@ class ResonanceTable(Section):
         description="in place of values: first and last value of the parameter; the curve is followed by arc length, round folds, over a key of the model "
         "for minutes where a contact begins to slip at the peak",
     )
-    points: int = Field(
-        30, ge=2, le=1000, description="least number of points of a span, 2 to 1000"
-    )
+    points: int = Field(30, ge=2, le=1000, description="least number of points of a span, 2 to 1000")
     by: Literal["horizontal_tangent", "phase_quadrature", "variable_phase"] = Field(
         "horizontal_tangent",
         description="what makes a peak: horizontal_tangent (the largest amplitude), phase_quadrature (90° behind the force) or variable_phase (with the "
         "phase of the largest amplitude beside the last peak)",
     )
-    peaks: int = Field(
-        3, ge=1, le=20, description="most peaks that are followed, the highest first, 1 to 20"
-    )
+    peaks: int = Field(3, ge=1, le=20, description="most peaks that are followed, the highest first, 1 to 20")
     harmonic: int | None = Field(
         None,
         ge=1,
@@ -56,9 +52,7 @@ class ResonanceTable(Section):
         le=20,
         description="periods of the loads after which the motion repeats itself, 1 to 20: 2 or more are subharmonic resonances, whose lowest harmonic peaks",
     )
-    harmonics: int = Field(
-        5, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}"
-    )
+    harmonics: int = Field(5, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -71,9 +65,7 @@ class ResonanceTable(Section):
         self._vibrates()
         if self.harmonic is not None and self.harmonic > self.harmonics:
             raise custom_error(
-                f"is {self.harmonic}, above harmonics = {self.harmonics}",
-                "Raise harmonics.",
-                "harmonic",
+                f"is {self.harmonic}, above harmonics = {self.harmonics}", "Raise harmonics.", "harmonic"
             )
         if self.periods > self.harmonics:
             raise custom_error(

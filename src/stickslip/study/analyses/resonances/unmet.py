@@ -42,7 +42,7 @@ def unmet_peaks(
         after = min((j for j in swept if j >= i), default=len(values) - 1)
         return met.get((peak, before), False) and met.get((peak, after), False)
 
-    unmet = [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]  # fmt: skip
+    unmet = [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]
     return {
         "peak": np.array([peak for peak, _ in unmet], dtype=float),
         "value": np.array([v for _, v in unmet], dtype=float),

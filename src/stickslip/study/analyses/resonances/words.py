@@ -17,10 +17,7 @@ SPARSE = 12  # values that the terminal prints of each peak
 
 
 def case_verdicts(
-    label: str,
-    case: Mapping[str, xr.Variable],
-    notes: Mapping[str, Mapping[str, Any]],
-    values: Sequence[float],
+    label: str, case: Mapping[str, xr.Variable], notes: Mapping[str, Mapping[str, Any]], values: Sequence[float]
 ) -> list[Verdict]:
     """Return what is to be thought of a case from its variables and notes, and the values that were visited, if any."""
     found = list(from_json(str(notes.get("model", {}).get("verdicts", "[]"))))
@@ -54,10 +51,16 @@ def _of_points(label: str, kind: np.ndarray, value: np.ndarray) -> list[Verdict]
         lost, low = value[i][own == -1], value[i][own == 0]
         if lost.size:
             why = f"peak {i + 1} was not found at {_values(lost)}"
-            found.append(Verdict("doubtful", label, None, why, "Give values closer together, or resonance.span."))  # fmt: skip
+            found.append(Verdict("doubtful", label, None, why, "Give values closer together, or resonance.span."))
         if low.size:
-            why = f"peak {i + 1} is no maximum at {_values(low)}: it has met a minimum of the response and is gone there"
-            found.append(Verdict("doubtful", label, None, why, "Do not read these as peaks; where the curve folds, the peak ends."))  # fmt: skip
+            why = (
+                f"peak {i + 1} is no maximum at {_values(low)}: it has met a minimum of the response and is gone there"
+            )
+            found.append(
+                Verdict(
+                    "doubtful", label, None, why, "Do not read these as peaks; where the curve folds, the peak ends."
+                )
+            )
     return found
 
 
@@ -70,7 +73,11 @@ def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
         why = f"peak {int(peak) + 1} at {_values(own)} was followed back from the last value: a sweep at this value was not seen to reach it"
         if own.size > 1:
             why = why.replace("a sweep at this value was", "sweeps at these values were")
-        found.append(Verdict("doubtful", label, None, why, "The other peaks there are what a sweep meets; ask for [all_motions]."))  # fmt: skip
+        found.append(
+            Verdict(
+                "doubtful", label, None, why, "The other peaks there are what a sweep meets; ask for [all_motions]."
+            )
+        )
     return found
 
 
@@ -111,15 +118,22 @@ def _of_harmonics(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
         return [Verdict("doubtful", label, None, why, remedy)]
     if abs(change) <= ENOUGH:
         return []
-    return [Verdict("doubtful", label, None, f"{what} changes by {100 * change:+.2g} % with {order} harmonics", remedy)]  # fmt: skip
+    return [Verdict("doubtful", label, None, f"{what} changes by {100 * change:+.2g} % with {order} harmonics", remedy)]
 
 
 def _of_overtaking(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     each = zip(*(case[f"overtaking_{k}"].values for k in ("value", "before", "after")), strict=True)
     return [
-        Verdict("trusted", label, None, f"peak {b + 1} overtakes peak {a + 1} at {v:.4g}", "Beyond, the highest amplitude is that of another resonance.", warns=True)
+        Verdict(
+            "trusted",
+            label,
+            None,
+            f"peak {b + 1} overtakes peak {a + 1} at {v:.4g}",
+            "Beyond, the highest amplitude is that of another resonance.",
+            warns=True,
+        )
         for v, a, b in each
-    ]  # fmt: skip
+    ]
 
 
 def _values(values: np.ndarray) -> str:
@@ -136,19 +150,15 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
     rows = []
     for i in range(case.sizes["peak"]):
         there = np.flatnonzero(case["maximum"].values[i] > -2)
-        few = there if there.size <= SPARSE else there[np.linspace(0, there.size - 1, SPARSE).astype(int)]  # fmt: skip
+        few = there if there.size <= SPARSE else there[np.linspace(0, there.size - 1, SPARSE).astype(int)]
         rows += [_row(case, i, int(k)) for k in few]
     columns = ("peak", "value", "Hz", "amplitude mm", "phase deg", "energy mJ", "of friction %")
     lines = []
     if np.isfinite(float(case.attrs.get("smallest_value", np.nan))):
-        value, amplitude, hertz = (float(case.attrs[f"smallest_{k}"]) for k in ("value", "amplitude", "frequency_hz"))  # fmt: skip
+        value, amplitude, hertz = (float(case.attrs[f"smallest_{k}"]) for k in ("value", "amplitude", "frequency_hz"))
         where = f"at {hertz:.6g} Hz" if np.isfinite(hertz) else "where two peaks are equally high"
-        lines.append(
-            f"The highest peak is lowest at {value:.6g}: {millimetres(amplitude, 6)} {where}."
-        )
-    title = (
-        f"{head}Resonances of {case.attrs.get('output', '')} over {case.attrs.get('parameter', '')}"
-    )
+        lines.append(f"The highest peak is lowest at {value:.6g}: {millimetres(amplitude, 6)} {where}.")
+    title = f"{head}Resonances of {case.attrs.get('output', '')} over {case.attrs.get('parameter', '')}"
     return TextTable(title, columns, tuple(rows), tuple(lines))
 
 

@@ -22,25 +22,12 @@ class RunUpTable(Section):
         description="engine orders, a list of whole numbers from 1; each is that of all harmonic loads in turn. Left out: the loads "
         "act together, with their own",
     )
-    points: int = Field(
-        40,
-        ge=2,
-        le=10_000,
-        description="smallest number of points of each engine order, 2 to 10000",
-    )
-    peak_points: int = Field(
-        8, ge=0, le=100, description="most points added to resolve the peak of each, 0 to 100"
-    )
+    points: int = Field(40, ge=2, le=10_000, description="smallest number of points of each engine order, 2 to 10000")
+    peak_points: int = Field(8, ge=0, le=100, description="most points added to resolve the peak of each, 0 to 100")
     direction: Literal["up", "down"] = Field(
-        "up",
-        description="up: from the lowest speed to the highest; down: back, which finds other motions beside folds",
+        "up", description="up: from the lowest speed to the highest; down: back, which finds other motions beside folds"
     )
-    modes: int = Field(
-        4,
-        ge=1,
-        le=100,
-        description="number of natural frequencies shown beside the response, 1 to 100",
-    )
+    modes: int = Field(4, ge=1, le=100, description="number of natural frequencies shown beside the response, 1 to 100")
 
     rate_rpm_per_s: list[Positive] | None = Field(
         None,

@@ -28,12 +28,24 @@ NUMBERS = {
     "peak_inside": ("line", "1", "1 if the largest amplitude is not at an end of the range"),
     "failed": ("line", "1", "points without a solution"),
     "newton_steps": ("line", "1", "Newton steps of all points"),
-    "speed_error": ("line", "1", "relative error of squares of frequencies and of the static load between the speeds of the model"),
-    "common_modes": ("line", "1", "1 where what the modes of three speeds span is kept at all, because at some speed another mode would take the place of one kept"),
+    "speed_error": (
+        "line",
+        "1",
+        "relative error of squares of frequencies and of the static load between the speeds of the model",
+    ),
+    "common_modes": (
+        "line",
+        "1",
+        "1 where what the modes of three speeds span is kept at all, because at some speed another mode would take the place of one kept",
+    ),
     "points_order": ("point", "1", "engine order of the point"),
     "speed_rpm": ("point", "rpm", "speed"),
     "frequency_hz": ("point", "Hz", "frequency: engine order times speed"),
-    "amplitude": ("point output", "m", "amplitude of an output over the driven harmonics; NaN where there is no solution"),
+    "amplitude": (
+        "point output",
+        "m",
+        "amplitude of an output over the driven harmonics; NaN where there is no solution",
+    ),
     "converged": ("point", "1", "1 where there is a solution"),
     "harmonic": ("point", "1", "highest harmonic kept"),
     "error": ("point", "1", "bound of the relative error by missing harmonics; NaN where nobody can tell"),
@@ -41,10 +53,18 @@ NUMBERS = {
     "slipping": ("point", "1", "share of contact points that slip at some instant of the period"),
     "opening": ("point", "1", "share of contact points that are open at some instant of the period"),
     "line_speed_rpm": ("line_speed", "rpm", "speeds of the natural frequencies"),
-    "open_hz": ("line line_speed mode", "Hz", "natural frequencies of the wave that the engine order excites, contacts open"),
+    "open_hz": (
+        "line line_speed mode",
+        "Hz",
+        "natural frequencies of the wave that the engine order excites, contacts open",
+    ),
     "stuck_hz": ("line line_speed mode", "Hz", "the same with all contacts stuck"),
     "static_speed_rpm": ("static_speed", "rpm", "speeds at which the model was assembled"),
-    "static_normal_n": ("line static_speed", "N", "sum of the static normal forces of all contacts, pressure positive; of a wheel, of one sector"),
+    "static_normal_n": (
+        "line static_speed",
+        "N",
+        "sum of the static normal forces of all contacts, pressure positive; of a wheel, of one sector",
+    ),
     "fast_order": ("fast", "1", "engine order of a fast run-up"),
     "fast_rate_rpm_per_s": ("fast", "rpm/s", "rate of the speed of a fast run-up"),
     "fast_peak_amplitude": ("fast", "m", "largest amplitude of the reported output in a fast run-up"),
@@ -53,14 +73,18 @@ NUMBERS = {
     "fast_shift_rpm": ("fast", "rpm", "speed of the largest amplitude less that of the steady motion"),
     "fast_harmonic": ("fast", "1", "highest harmonic kept"),
     "fast_finished": ("fast", "1", "1 if the fast run-up was followed to its end"),
-    "fast_neglected": ("fast", "1", "second derivative of the amplitude over 2ω times the first around the peak: what slow amplitudes leave out"),
+    "fast_neglected": (
+        "fast",
+        "1",
+        "second derivative of the amplitude over 2ω times the first around the peak: what slow amplitudes leave out",
+    ),
     "fast_speed_rpm": ("fast fast_step", "rpm", "speed along a fast run-up"),
     "fast_amplitude": ("fast fast_step", "m", "amplitude of the reported output along a fast run-up"),
     "output_label": ("output", "1", "name of the output"),
     "report_output": ("", "1", "index of the output whose peak is resolved"),
     "sectors": ("", "1", "number of sectors of the wheel; 1 for a whole structure"),
     "rotation": ("", "1", "what of the rotation is in the numbers"),
-}  # fmt: skip
+}
 
 
 def values_of(question: Question, points: Sequence[RunUpPoint], notes: Notes) -> Values:
@@ -133,9 +157,7 @@ def _of_points(along: Along, response: Response) -> Values:
         "converged": np.array([int(a.point.converged) for a in every]),
         "harmonic": np.array([a.point.order for a in every]),
         # what was solved tells more than a prediction
-        "error": np.array(
-            [a.own_error if np.isnan(a.audit_error) else a.audit_error for a in every]
-        ),
+        "error": np.array([a.own_error if np.isnan(a.audit_error) else a.audit_error for a in every]),
         "dissipated_w": states[:, 0],
         "slipping": states[:, 1],
         "opening": states[:, 2],
@@ -189,21 +211,14 @@ def _of_fast(question: Question, each: Sequence[Values], notes: Notes) -> Values
     for one in found:
         for name in ("speed_rpm", "amplitude"):
             rest = longest - len(one[name])
-            one[name] = np.pad(
-                np.asarray(one[name], dtype=float), (0, rest), constant_values=np.nan
-            )
+            one[name] = np.pad(np.asarray(one[name], dtype=float), (0, rest), constant_values=np.nan)
     return {f"fast_{name}": np.array([one[name] for one in found]) for name in found[0]}
 
 
 def dataset(cases: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Return the dataset of all cases; what one has more of is NaN, -1 or empty in the others."""
     told = [
-        {
-            n: variable(dims, c[n], unit, about)
-            for n, (dims, unit, about) in NUMBERS.items()
-            if n in c
-        }
-        for c in cases
+        {n: variable(dims, c[n], unit, about) for n, (dims, unit, about) in NUMBERS.items() if n in c} for c in cases
     ]
     data = stacked(told)
     sizes = {dim: size for v in data.values() for dim, size in v.sizes.items()}

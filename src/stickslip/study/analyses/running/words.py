@@ -38,7 +38,9 @@ def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Ver
     failed, total = int(case["failed"].values[i]), int(own.sum())
     top = int(case["peak_point"].values[i])
     if top < 0:
-        yield Verdict("wrong", label, None, f"{name}: no point has a solution", "See the forced response at one of the speeds.")  # fmt: skip
+        yield Verdict(
+            "wrong", label, None, f"{name}: no point has a solution", "See the forced response at one of the speeds."
+        )
         return
     if failed:
         yield Verdict(
@@ -82,30 +84,35 @@ def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Ver
 
 def _of_fast(case: xr.Dataset, label: str) -> Iterator[Verdict]:
     for i in range(case.sizes.get("fast", 0)):
-        order, rate = (
-            int(case["fast_order"].values[i]),
-            float(case["fast_rate_rpm_per_s"].values[i]),
-        )
+        order, rate = (int(case["fast_order"].values[i]), float(case["fast_rate_rpm_per_s"].values[i]))
         name = f"engine order {order} at {rate:g} rpm/s"
         if not case["fast_finished"].values[i]:
             yield Verdict(
-                "doubtful", label, None, f"{name}: the fast run-up was not followed to its end",
+                "doubtful",
+                label,
+                None,
+                f"{name}: the fast run-up was not followed to its end",
                 "Take a smaller range of speeds, or another rate.",
-            )  # fmt: skip
+            )
         elif case["fast_peak_speed_rpm"].values[i] in _ends(case["fast_speed_rpm"].values[i]):
             # no peak was passed, whose error could be told
             yield Verdict(
-                "trusted", label, None, f"{name}: the largest amplitude is at an end of the range",
+                "trusted",
+                label,
+                None,
+                f"{name}: the largest amplitude is at an end of the range",
                 "Widen speeds_rpm to see the peak.",
-            )  # fmt: skip
+            )
             continue
         share = float(case["fast_neglected"].values[i])
         if share > TOO_FAST:
             yield Verdict(
-                "doubtful", label, None,
+                "doubtful",
+                label,
+                None,
                 f"{name}: the amplitude varies so fast that {100 * share:.2g} % of its change is left out, and the peak may be off by as much",
                 "Take a slower rate, or integrate in time.",
-            )  # fmt: skip
+            )
 
 
 def _ends(speeds: FloatArray) -> FloatArray:
@@ -147,12 +154,10 @@ def _peaks(case: xr.Dataset, head: str) -> TextTable:
                 "" if case["peak_inside"].values[i] else "end of the range",
             )
         )
-    names = ("engine order", "wave", "peak mm", "at rpm", "at Hz", "slipping", "points", "H", "failed", "Newton", "")  # fmt: skip
+    names = ("engine order", "wave", "peak mm", "at rpm", "at Hz", "slipping", "points", "H", "failed", "Newton", "")
     speeds = case["static_speed_rpm"].values
     errors = float(np.max(case["speed_error"].values))
-    lines = [
-        f"the model was assembled at {speeds.size} speeds; between them it is off by {errors:.1e} at most"
-    ]
+    lines = [f"the model was assembled at {speeds.size} speeds; between them it is off by {errors:.1e} at most"]
     if np.any(case["common_modes"].values == 1):
         lines.append(
             "what the modes of three speeds span is kept at all: at some speed another mode would take the place of one kept"
@@ -162,12 +167,30 @@ def _peaks(case: xr.Dataset, head: str) -> TextTable:
 
 def _fast(case: xr.Dataset, head: str) -> TextTable:
     """Return the fast run-ups beside the steady peaks."""
-    columns = ("order", "rate_rpm_per_s", "peak_amplitude", "ratio", "peak_speed_rpm", "shift_rpm", "harmonic", "neglected")  # fmt: skip
+    columns = (
+        "order",
+        "rate_rpm_per_s",
+        "peak_amplitude",
+        "ratio",
+        "peak_speed_rpm",
+        "shift_rpm",
+        "harmonic",
+        "neglected",
+    )
     rows = tuple(
-        (f"{m:.0f}", f"{rate:g}", f"{1e3 * peak:.5g}", f"{ratio:.4f}", f"{rpm:.6g}", f"{shift:+.4g}", f"{h:.0f}", f"{100 * off:.2g} %")
+        (
+            f"{m:.0f}",
+            f"{rate:g}",
+            f"{1e3 * peak:.5g}",
+            f"{ratio:.4f}",
+            f"{rpm:.6g}",
+            f"{shift:+.4g}",
+            f"{h:.0f}",
+            f"{100 * off:.2g} %",
+        )
         for m, rate, peak, ratio, rpm, shift, h, off in zip(
             *(case[f"fast_{name}"].values for name in columns), strict=True
         )
-    )  # fmt: skip
-    names = ("engine order", "rpm/s", "peak mm", "of the steady one", "at rpm", "shift rpm", "H", "left out")  # fmt: skip
+    )
+    names = ("engine order", "rpm/s", "peak mm", "of the steady one", "at rpm", "shift rpm", "H", "left out")
     return TextTable(f"{head}Fast run-up", names, rows)

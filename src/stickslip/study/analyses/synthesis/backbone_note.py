@@ -13,7 +13,7 @@ from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.synthesis.question import Question
 
 NOTE = "backbone"
-NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")  # fmt: skip
+NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")
 
 
 def backbone_of(question: Question, mode: StuckMode, notes: Notes) -> Backbone:
@@ -45,5 +45,7 @@ def _read(question: Question, mode: StuckMode, known: Mapping[str, Any]) -> Back
     for i, order in enumerate(known["order"]):
         own = known["motion"][i, : int(order) + 1]
         numbers = {name: float(known[name][i]) for name in NUMBERS}
-        points.append(ModePoint(coefficients=own[..., 0] + 1j * own[..., 1], order=int(order), status=Status.CONVERGED, **numbers))  # fmt: skip
-    return Backbone(question.model.system, question.rest, mode, question.dof, tuple(points), str(known["end"]))  # fmt: skip
+        points.append(
+            ModePoint(coefficients=own[..., 0] + 1j * own[..., 1], order=int(order), status=Status.CONVERGED, **numbers)
+        )
+    return Backbone(question.model.system, question.rest, mode, question.dof, tuple(points), str(known["end"]))

@@ -19,7 +19,11 @@ ABOUT = {
     "mode": ("", "1", "number of the mode, by frequency with contacts stuck"),
     "mode_frequency_hz": ("", "Hz", "its frequency with contacts stuck"),
     "mode_damping_ratio": ("", "1", "its damping ratio with contacts stuck"),
-    "homogeneous": ("", "1", "1 where all contact forces double with all displacements: static and vibration loads then scale together"),
+    "homogeneous": (
+        "",
+        "1",
+        "1 where all contact forces double with all displacements: static and vibration loads then scale together",
+    ),
     "mode_seconds": ("", "s", "time of the processor for the nonlinear mode"),
     "backbone_amplitude": ("place", "m", "amplitude of the output along the nonlinear mode"),
     "backbone_frequency_hz": ("place", "Hz", "its frequency"),
@@ -30,7 +34,11 @@ ABOUT = {
     "level": ("level", "1", "factor on the harmonic loads"),
     "answer": ("level", "1", "trusted, doubtful, refused or beyond"),
     "why": ("level", "1", "what that rests on"),
-    "peak_amplitude": ("level", "m", "largest amplitude of the output in the first harmonic, on the curve that a sweep meets"),
+    "peak_amplitude": (
+        "level",
+        "m",
+        "largest amplitude of the output in the first harmonic, on the curve that a sweep meets",
+    ),
     "detached_peak_amplitude": ("level", "m", "the same of the detached curves, which a sweep does not meet"),
     "detached_peak_frequency_hz": ("level", "Hz", "its frequency"),
     "peak_frequency_hz": ("level", "Hz", "its frequency"),
@@ -42,7 +50,11 @@ ABOUT = {
     "growth": ("level", "1", "relative growth of the peak with the level: 1 where nothing slips"),
     "higher_harmonics": ("level", "1", "higher harmonics over the first, at the output"),
     "resolved": ("level", "1", "relative change of the peak if every second point of the nonlinear mode is left out"),
-    "by_harmonics": ("level", "1", "relative change of frequency or damping ratio of the nonlinear mode at the peak that more harmonics are foretold to make"),
+    "by_harmonics": (
+        "level",
+        "1",
+        "relative change of frequency or damping ratio of the nonlinear mode at the peak that more harmonics are foretold to make",
+    ),
     "detached": ("level", "1", "number of curves that do not hang together with small amplitudes"),
     "seconds": ("level", "s", "time of the processor for the response"),
     "frequency_hz": ("level point", "Hz", "frequency of the response"),
@@ -50,15 +62,27 @@ ABOUT = {
     "curve": ("level point", "1", "0: hangs together with small amplitudes; others are detached"),
     "stable": ("level point", "1", "1 where slow changes of this mode die out"),
     "others": ("level point", "1", "motion of the other modes over that of the mode, at the output or in the gaps"),
-    "alone": ("level point", "1", "1 where the mode answers alone: nothing slips, or the others change motion and amplitude by at most 5 %"),
-    "alone_from_hz": ("level", "Hz", "lowest frequency around the peak at which the mode answers alone; NaN where it does not at the peak"),
+    "alone": (
+        "level point",
+        "1",
+        "1 where the mode answers alone: nothing slips, or the others change motion and amplitude by at most 5 %",
+    ),
+    "alone_from_hz": (
+        "level",
+        "Hz",
+        "lowest frequency around the peak at which the mode answers alone; NaN where it does not at the peak",
+    ),
     "alone_to_hz": ("level", "Hz", "highest such frequency"),
     "direct_frequency_hz": ("level direct_point", "Hz", "frequency of the direct solution"),
     "direct_amplitude": ("level direct_point", "m", "amplitude of the output in the first harmonic, solved directly"),
     "direct_peak_amplitude": ("level", "m", "peak of the direct solution"),
     "direct_peak_frequency_hz": ("level", "Hz", "its frequency"),
     "direct_error": ("level", "1", "synthesised peak over the direct one, less one"),
-    "along_error": ("level", "1", "largest difference of synthesised and direct curve, over the direct one, where the mode answers alone around the peak"),
+    "along_error": (
+        "level",
+        "1",
+        "largest difference of synthesised and direct curve, over the direct one, where the mode answers alone around the peak",
+    ),
     "along_error_hz": ("level", "Hz", "its frequency"),
     "direct_seconds": ("level", "s", "time of the processor for the direct solution"),
     "passage_hz_per_s": ("rate", "Hz/s", "rates of the passages"),
@@ -68,13 +92,29 @@ ABOUT = {
     "passage_peak_frequency_hz": ("level rate", "Hz", "frequency of the load then"),
     "passage_share": ("level rate", "1", "that amplitude over the steady peak"),
     "passage_finished": ("level rate", "1", "1 where a passage came to its end"),
-    "passage_change": ("level rate", "1", "relative change of the amplitude in a radian of the vibration, while it is above half its peak"),
-}  # fmt: skip
+    "passage_change": (
+        "level rate",
+        "1",
+        "relative change of the amplitude in a radian of the vibration, while it is above half its peak",
+    ),
+}
 PLAIN = {
-    "level": "level", "answer": "answer", "why": "why", "peak_amplitude": "peak", "foreign": "foreign", "others_in_output": "output",
-    "others_in_gaps": "gaps", "next_frequency": "distance", "overlap": "overlap", "growth": "growth", "higher_harmonics": "harmonics",
-    "resolved": "resolved", "by_harmonics": "changed", "detached": "detached", "seconds": "seconds",
-}  # fmt: skip
+    "level": "level",
+    "answer": "answer",
+    "why": "why",
+    "peak_amplitude": "peak",
+    "foreign": "foreign",
+    "others_in_output": "output",
+    "others_in_gaps": "gaps",
+    "next_frequency": "distance",
+    "overlap": "overlap",
+    "growth": "growth",
+    "higher_harmonics": "harmonics",
+    "resolved": "resolved",
+    "by_harmonics": "changed",
+    "detached": "detached",
+    "seconds": "seconds",
+}
 
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
@@ -102,7 +142,7 @@ def _of_case(solved: Solved) -> Variables:
             "cycle_amplitude": own["cycles"],
         }
     if levels:
-        values |= _of_levels(levels, np.asarray(solved.case.settings.modal_synthesis.passage_hz_per_s))  # fmt: skip
+        values |= _of_levels(levels, np.asarray(solved.case.settings.modal_synthesis.passage_hz_per_s))
     return described(ABOUT, values, model)
 
 
@@ -137,7 +177,7 @@ def _of_levels(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str,
 
 
 def _of_passages(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str, Any]:
-    omega, amplitude = (np.array([getattr(one, n) for one in levels]) for n in ("passage_omega", "passage_amplitude"))  # fmt: skip
+    omega, amplitude = (np.array([getattr(one, n) for one in levels]) for n in ("passage_omega", "passage_amplitude"))
     known = np.isfinite(amplitude)
     top = np.argmax(np.where(known, amplitude, -np.inf), axis=2)[:, :, None]
     peak, at = (np.take_along_axis(v, top, axis=2)[:, :, 0] for v in (amplitude, omega))

@@ -11,7 +11,7 @@ NOTHING = (np.nan, np.nan)
 def around_peak(level: SynthesisLevel) -> tuple[float, float]:
     """Return the first and last frequency, rad/s, around the peak between which the mode answers alone; NaN where it does not at the peak."""
     held = _around(level)
-    return (float(level.omega[held].min()), float(level.omega[held].max())) if held.any() else NOTHING  # fmt: skip
+    return (float(level.omega[held].min()), float(level.omega[held].max())) if held.any() else NOTHING
 
 
 def along_error(level: SynthesisLevel) -> tuple[float, float]:
@@ -28,7 +28,7 @@ def along_error(level: SynthesisLevel) -> tuple[float, float]:
         if not (at.size and amplitude > 0.0):
             continue
         share = (omega - low[at]) / (high[at] - low[at])
-        own = np.exp((1.0 - share) * np.log(level.amplitude[at]) + share * np.log(level.amplitude[at + 1]))  # fmt: skip
+        own = np.exp((1.0 - share) * np.log(level.amplitude[at]) + share * np.log(level.amplitude[at + 1]))
         off = own / amplitude - 1.0
         nearest = float(off[int(np.argmin(np.abs(off)))])
         if not abs(nearest) <= abs(worst):
@@ -53,5 +53,5 @@ def _around(level: SynthesisLevel) -> BoolArray:
 
 
 def _nearest(level: SynthesisLevel) -> int:
-    away: FloatArray = np.abs(np.log(level.amplitude / level.peak)) + np.abs(level.omega / level.peak_omega - 1.0)  # fmt: skip
+    away: FloatArray = np.abs(np.log(level.amplitude / level.peak)) + np.abs(level.omega / level.peak_omega - 1.0)
     return int(np.argmin(away))

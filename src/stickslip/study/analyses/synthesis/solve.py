@@ -16,22 +16,10 @@ from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
 from stickslip.response.nonlinear_modes.flanks import along
-from stickslip.response.nonlinear_modes.isolated import (
-    Isolation,
-    OtherModes,
-    isolation,
-    other_modes,
-    peak_with_others,
-)
+from stickslip.response.nonlinear_modes.isolated import Isolation, OtherModes, isolation, other_modes, peak_with_others
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
-from stickslip.response.nonlinear_modes.synthesis import (
-    Resonance,
-    Synthesised,
-    free_motions,
-    resonances,
-    synthesise,
-)
+from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, free_motions, resonances, synthesise
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.synthesis.backbone_note import backbone_of
 from stickslip.study.analyses.synthesis.percents import percent
@@ -62,9 +50,7 @@ class Synthesis:
     ends: tuple[float, float]
 
 
-def solve(
-    question: Question, done: Sequence[SynthesisLevel], notes: Notes
-) -> Iterator[SynthesisLevel]:
+def solve(question: Question, done: Sequence[SynthesisLevel], notes: Notes) -> Iterator[SynthesisLevel]:
     """Yield the levels that are not done."""
     began = process_time()
     notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
@@ -74,7 +60,16 @@ def solve(
     backbone = backbone_of(question, mode, notes)
     own = modal_oscillator(backbone, question.model.load)
     if notes.get("design") is None:
-        notes.put("design", _design(own, question) | {"seconds": process_time() - began, "mode": mode.number, "mode_omega": mode.omega, "mode_ratio": mode.ratio})  # fmt: skip
+        notes.put(
+            "design",
+            _design(own, question)
+            | {
+                "seconds": process_time() - began,
+                "mode": mode.number,
+                "mode_omega": mode.omega,
+                "mode_ratio": mode.ratio,
+            },
+        )
     shared = Synthesis(question, own, other_modes(own), own.coarser(), _ends(question, own))
     for i, level in enumerate(question.asked.levels):
         if i < len(done):
@@ -100,11 +95,20 @@ def judged(alone: Isolation, resolved: float, changed: float) -> tuple[str, str]
     more = "raise modal_synthesis.most_harmonics"
     doubts = (
         (alone.foreign > TRUSTED, f"{motion}, {near}: the peak may be off by about {off}"),
-        (resolved > COARSE, f"the nonlinear mode has too few points here: without every second one the peak moves by {percent(resolved)}"),
-        (alone.harmonics > HARMONICS, f"higher harmonics have {percent(alone.harmonics)} of the first, and the load works on that alone"),
+        (
+            resolved > COARSE,
+            f"the nonlinear mode has too few points here: without every second one the peak moves by {percent(resolved)}",
+        ),
+        (
+            alone.harmonics > HARMONICS,
+            f"higher harmonics have {percent(alone.harmonics)} of the first, and the load works on that alone",
+        ),
         (np.isnan(changed), f"the nonlinear mode was solved with one set of harmonics alone: {more}"),
-        (changed > TRUSTED, f"more harmonics change frequency or damping ratio of the nonlinear mode by {percent(changed)}: {more}"),
-    )  # fmt: skip
+        (
+            changed > TRUSTED,
+            f"more harmonics change frequency or damping ratio of the nonlinear mode by {percent(changed)}: {more}",
+        ),
+    )
     trusted = motion if not np.isfinite(alone.distance) else f"{motion}, {near}"
     return next((("doubtful", why) for doubted, why in doubts if doubted), ("trusted", trusted))
 
@@ -117,7 +121,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     curve = synthesise(own, known)
     tops = curve.peaks
     # every curve has one peak, and the first curve is the one that a sweep meets
-    peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]  # fmt: skip
+    peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]
     alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[0]) if peaks else np.nan
     changed = own.by_harmonics(tops[0].place) if peaks else np.nan
@@ -126,7 +130,10 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     shown = answer in ("trusted", "doubtful")
     if shown and len(peaks) > 1 and curve.resonances[0].top:
         swept = f"the highest peak that a sweep meets has {millimetres(peaks[0][0])} at {peaks[0][1] / HZ:.5g} Hz"
-        answer, why = "doubtful", f"{swept}, that of a detached curve {millimetres(detached[0])} at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
+        answer, why = (
+            "doubtful",
+            f"{swept}, that of a detached curve {millimetres(detached[0])} at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}",
+        )
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
     beside = along(shared.others, curve, question.dof)
     spent = process_time() - began
@@ -180,9 +187,7 @@ def _in_proportion(own: ModalOscillator, level: float) -> float:
     return faint
 
 
-def _answer(
-    shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tuple[float, float]
-) -> tuple[str, str]:
+def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tuple[float, float]) -> tuple[str, str]:
     """Say whether a level has an answer, of its peaks the one from small amplitudes, and why."""
     if not curve.place.size:
         return "beyond", "the nonlinear mode begins with more than the level reaches"
@@ -190,7 +195,10 @@ def _answer(
         return "beyond", "the nonlinear mode ends before it needs so much of the load"
     answer, why = judged(alone, *errors)
     if answer in ("trusted", "doubtful") and not curve.resonances[0].top:
-        return "doubtful", f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}"  # fmt: skip
+        return (
+            "doubtful",
+            f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}",
+        )
     return answer, why
 
 
@@ -218,13 +226,14 @@ def _direct(shared: Synthesis, level: float) -> tuple[FloatArray, FloatArray]:
     known = question.model.load
     load = HarmonicLoad(known.static, {h: level * f for h, f in known.harmonics.items()})
     how = question.discretisation
-    sweep = Sweep(omega_range=shared.ends, cap=max(question.asked.most_harmonics, 1), samples=how.samples, evaluator=how.evaluator)  # fmt: skip
+    sweep = Sweep(
+        omega_range=shared.ends, cap=max(question.asked.most_harmonics, 1), samples=how.samples, evaluator=how.evaluator
+    )
     problem = forced_problem(question.model.system, load, sweep)
     points = accepted_points(list(forced_response(question.model.system, load, sweep)))
     linear = problem.high.linear
     amplitude = [
-        abs(linear.recover(p.omega, p.coefficients)[1, question.dof]) if p.converged else np.nan
-        for p in points
+        abs(linear.recover(p.omega, p.coefficients)[1, question.dof]) if p.converged else np.nan for p in points
     ]
     return np.array([p.omega for p in points]), np.array(amplitude)
 
@@ -239,11 +248,13 @@ def _passages(shared: Synthesis, level: float, *, shown: bool) -> tuple[Any, Any
     dof = np.array([shared.question.dof])
     for i, rate in enumerate(rates if shown else []):
         try:
-            found = passage_through_resonance(shared.oscillator, level, Swept(ends=ends, rate=rate * HZ))  # fmt: skip
+            found = passage_through_resonance(shared.oscillator, level, Swept(ends=ends, rate=rate * HZ))
         except StickslipError as error:
             LOG.info(f"level {level:g} at {rate:g} Hz/s: {error}")
             continue
-        kept = np.unique(np.append(np.linspace(0, found.time.size - 1, MOMENTS - 1).astype(int), int(np.argmax(found.amplitude))))  # fmt: skip
+        kept = np.unique(
+            np.append(np.linspace(0, found.time.size - 1, MOMENTS - 1).astype(int), int(np.argmax(found.amplitude)))
+        )
         size = np.abs(shared.oscillator.displacement(found.place[kept], dof)[:, 1, 0])
         omega[i, : kept.size], amplitude[i, : kept.size] = found.omega[kept], size
         finished[i], change[i] = found.finished, found.change
@@ -254,7 +265,11 @@ def _design(own: ModalOscillator, question: Question) -> dict[str, Any]:
     curve = peak_curve(own, question.dof)
     here = own.at(curve.place)
     return {
-        "level": curve.level, "amplitude": curve.amplitude, "omega": here.omega, "ratio": here.ratio, "peak_omega": curve.omega,
+        "level": curve.level,
+        "amplitude": curve.amplitude,
+        "omega": here.omega,
+        "ratio": here.ratio,
+        "peak_omega": curve.omega,
         "cycles": np.abs(own.displacement(free_motions(own), np.array([question.dof]))[:, 1, 0]),
         "homogeneous": int(is_homogeneous(own, question.discretisation)),
-    }  # fmt: skip
+    }

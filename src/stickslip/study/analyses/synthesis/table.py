@@ -11,14 +11,9 @@ from stickslip.study.file.section import Positive, Section, once, rising_pair
 class ModalSynthesisTable(Section):
     """The forced response at many levels of the loads from one nonlinear mode, as long as that mode answers alone."""
 
-    mode: int = Field(
-        1, ge=1, le=999, description="number of the mode, by frequency with contacts stuck, from 1"
-    )
+    mode: int = Field(1, ge=1, le=999, description="number of the mode, by frequency with contacts stuck, from 1")
     levels: list[Positive] = Field(
-        [1.0],
-        min_length=1,
-        max_length=1000,
-        description="factors on the harmonic loads, one response each",
+        [1.0], min_length=1, max_length=1000, description="factors on the harmonic loads, one response each"
     )
     frequency_hz: list[Positive] | None = Field(
         None,
@@ -43,12 +38,8 @@ class ModalSynthesisTable(Section):
         description="the range [lowest, highest] of the amplitude of the nonlinear mode at the peak output; left out: from where nothing slips to "
         "300 times where slip begins",
     )
-    points: int = Field(
-        30, ge=5, le=1000, description="least number of points of the nonlinear mode, 5 to 1000"
-    )
-    harmonics: int = Field(
-        5, ge=1, le=HIGHEST, description=f"harmonics of the nonlinear mode, 1 to {HIGHEST}"
-    )
+    points: int = Field(30, ge=5, le=1000, description="least number of points of the nonlinear mode, 5 to 1000")
+    harmonics: int = Field(5, ge=1, le=HIGHEST, description=f"harmonics of the nonlinear mode, 1 to {HIGHEST}")
     most_harmonics: int = Field(
         23,
         ge=1,
@@ -56,8 +47,7 @@ class ModalSynthesisTable(Section):
         description=f"up to which harmonics are raised where they change the nonlinear mode or the direct response, 1 to {HIGHEST}",
     )
     accuracy_percent: Positive = Field(
-        0.1,
-        description="relative change of frequency or damping ratio by more harmonics below which these are enough",
+        0.1, description="relative change of frequency or damping ratio by more harmonics below which these are enough"
     )
 
     @model_validator(mode="after")

@@ -45,9 +45,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     return [*found, *_of_direct(label, case), *_of_passages(label, case)]
 
 
-def _of_answer(
-    label: str, case: Mapping[str, xr.Variable], answer: str, own: IntArray, remedy: str
-) -> Verdict:
+def _of_answer(label: str, case: Mapping[str, xr.Variable], answer: str, own: IntArray, remedy: str) -> Verdict:
     """Return one verdict on all levels with the same answer and remedy: that of the worst of them."""
     foreign = np.nan_to_num(case["foreign"].values[own], nan=0.0)
     worst = int(own[int(np.argmax(foreign))])
@@ -95,14 +93,16 @@ def _of_direct(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     level = case["level"].values
     why = f"synthesised peaks differ from direct ones by up to {percent(error[worst])}, at level {level[worst]:g}"
     off = bool(error[worst] > WRONG)
-    found = [Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")]  # fmt: skip
+    found = [Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")]
     along = np.abs(case["along_error"].values)
     if np.any(np.isfinite(along)):
         worst = int(np.nanargmax(along))
         off = bool(along[worst] > ALONG)
         hertz = case["along_error_hz"].values[worst]
         why = f"where the other modes stay below {percent(ALONE)} synthesised curves differ from direct ones by up to {percent(along[worst])}, at level {level[worst]:g} and {hertz:.5g} Hz"
-        found.append(Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else ""))  # fmt: skip
+        found.append(
+            Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")
+        )
     return found
 
 
@@ -116,7 +116,7 @@ def _of_passages(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         rate = float(np.min(case["passage_hz_per_s"].values[np.any(fast, axis=0)]))
         levels = case["level"].values[np.any(fast, axis=1)]
         why = f"in passages from {rate:g} Hz/s on at {_levels(levels)} the amplitude changes by more than {percent(FAST)} in a radian of the vibration"
-        found.append(Verdict("doubtful", label, None, why, "Integrate in time where the peak counts."))  # fmt: skip
+        found.append(Verdict("doubtful", label, None, why, "Integrate in time where the peak counts."))
     left = known & (finished == 0)
     if np.any(left):
         why = f"a passage at {_levels(case['level'].values[np.any(left, axis=1)])} left the nonlinear mode at its end"
@@ -157,23 +157,24 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
             str(case["answer"][i].values),
         ]
         if direct:
-            row += [number(1e3 * float(case["direct_peak_amplitude"][i])), percent(float(case["direct_error"][i]), unit=False), percent(float(case["along_error"][i]), unit=False)]  # fmt: skip
+            row += [
+                number(1e3 * float(case["direct_peak_amplitude"][i])),
+                percent(float(case["direct_error"][i]), unit=False),
+                percent(float(case["along_error"][i]), unit=False),
+            ]
         rows.append(tuple(row))
     beside = ("direct mm", "error %", "along %") if direct else ()
-    lines = [f"others: motion of the other modes over that of the mode, at the peak; predicted error: that of the peak; alone: where around the peak the others stay below {percent(ALONE)}"]  # fmt: skip
+    lines = [
+        f"others: motion of the other modes over that of the mode, at the peak; predicted error: that of the peak; alone: where around the peak the others stay below {percent(ALONE)}"
+    ]
     if direct:
-        lines.append("error: of the peak against the direct one; along: the largest along the curve where the mode is alone")  # fmt: skip
-    columns = (
-        "level",
-        "peak mm",
-        "Hz",
-        "others %",
-        "predicted error %",
-        "alone Hz",
-        "answer",
-        *beside,
+        lines.append(
+            "error: of the peak against the direct one; along: the largest along the curve where the mode is alone"
+        )
+    columns = ("level", "peak mm", "Hz", "others %", "predicted error %", "alone Hz", "answer", *beside)
+    return TextTable(
+        f"{head}Responses of one nonlinear mode, {case.attrs.get('output', '')}", columns, tuple(rows), tuple(lines)
     )
-    return TextTable(f"{head}Responses of one nonlinear mode, {case.attrs.get('output', '')}", columns, tuple(rows), tuple(lines))  # fmt: skip
 
 
 def _range(case: xr.Dataset, i: int) -> str:
@@ -190,10 +191,19 @@ def _passages(case: xr.Dataset, head: str) -> list[TextTable]:
         for j in range(case.sizes["rate"]):
             peak = float(case["passage_peak_amplitude"][i, j])
             if np.isfinite(peak):
-                rows.append((
-                    f"{float(case['level'][i]):g}", f"{float(case['passage_hz_per_s'][j]):g}", number(1e3 * peak),
-                    number(float(case["passage_peak_frequency_hz"][i, j])), percent(float(case["passage_share"][i, j]), unit=False),
-                    percent(float(case["passage_change"][i, j]), unit=False),
-                ))  # fmt: skip
+                rows.append(
+                    (
+                        f"{float(case['level'][i]):g}",
+                        f"{float(case['passage_hz_per_s'][j]):g}",
+                        number(1e3 * peak),
+                        number(float(case["passage_peak_frequency_hz"][i, j])),
+                        percent(float(case["passage_share"][i, j]), unit=False),
+                        percent(float(case["passage_change"][i, j]), unit=False),
+                    )
+                )
     columns = ("level", "Hz/s", "peak mm", "at Hz", "of the steady one %", "change in a radian %")
-    return [TextTable(f"{head}Passages through resonance, {case.attrs.get('output', '')}", columns, tuple(rows))] if rows else []  # fmt: skip
+    return (
+        [TextTable(f"{head}Passages through resonance, {case.attrs.get('output', '')}", columns, tuple(rows))]
+        if rows
+        else []
+    )

@@ -21,22 +21,38 @@ ABOUT = {
     "reference_amplitude": ("traction_point", "m", "amplitude from the model's own start"),
     "least_amplitude": ("traction_point", "m", "smallest amplitude over all residual tractions"),
     "most_amplitude": ("traction_point", "m", "largest amplitude over all residual tractions"),
-    "stuck_springs": ("traction_point bound", "1", "tangential springs that stick all the time: own start, smallest, largest amplitude"),
+    "stuck_springs": (
+        "traction_point bound",
+        "1",
+        "tangential springs that stick all the time: own start, smallest, largest amplitude",
+    ),
     "solves": ("traction_point", "1", "motions that were solved for"),
     "failures": ("traction_point", "1", "starts from which no motion was found"),
-    "branches": ("traction_point", "1", "motions from the model's own start that sweeps up and down met; the bounds hold them all"),
+    "branches": (
+        "traction_point",
+        "1",
+        "motions from the model's own start that sweeps up and down met; the bounds hold them all",
+    ),
     "resonance_hz": ("bound", "Hz", "where the curve of each bound is highest: own start, smallest, largest amplitude"),
     "resonance_amplitude": ("bound", "m", "its height there"),
-    "harmonics_error": ("traction_point bound", "1", "relative change of the output that more harmonics are predicted to make, phase included; 0 where nothing acts on them, NaN where nobody can tell"),
+    "harmonics_error": (
+        "traction_point bound",
+        "1",
+        "relative change of the output that more harmonics are predicted to make, phase included; 0 where nothing acts on them, NaN where nobody can tell",
+    ),
     "resonance_harmonics_error": ("bound", "1", "the same at the resonance of each bound"),
     "resonance_inside": ("bound", "1", "1 where that is within the range, 0 at its ends"),
     "spring": ("traction_spring", "1", "contact of each spring that has a start"),
-    "multiplier": ("bound traction_spring tangent", "1", "traction at t = 0 over the friction limit there, at the resonance of each bound; NaN: it does not stick"),
+    "multiplier": (
+        "bound traction_spring tangent",
+        "1",
+        "traction at t = 0 over the friction limit there, at the resonance of each bound; NaN: it does not stick",
+    ),
     "resolved_amplitude": ("end", "m", "smallest and largest resonance solved again, forces marched over samples"),
     "time_amplitude": ("end", "m", "smallest and largest resonance followed in time from their tractions"),
     "time_status": ("end", "1", "how that ended; empty where it was not followed"),
     "confirmed": ("end", "1", "1 where both agree with the bound"),
-}  # fmt: skip
+}
 
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
@@ -52,9 +68,7 @@ def _lost(case: Variables) -> int:
 def _of_case(solved: Solved) -> Variables:
     records: Sequence[TractionRecord] = solved.records
     model = solved.notes.get("model", {})
-    values: dict[str, Any] = {
-        name: model[name] for name in ("output", "excitation_n", "harmonics") if name in model
-    }
+    values: dict[str, Any] = {name: model[name] for name in ("output", "excitation_n", "harmonics") if name in model}
     points = [r for r in records if r.stage == "point"]
     if points:
         # the resonances belong to the curves, or these would pass below them
@@ -84,9 +98,7 @@ def _of_points(points: Sequence[TractionRecord]) -> dict[str, Any]:
     }
 
 
-def _of_resonance(
-    points: Sequence[TractionRecord], by_stage: Mapping[Stage, TractionRecord]
-) -> dict[str, Any]:
+def _of_resonance(points: Sequence[TractionRecord], by_stage: Mapping[Stage, TractionRecord]) -> dict[str, Any]:
     known = [r for r in points if np.isfinite(r.amplitude[0])]
     every = [*known, by_stage["least"], by_stage["most"]]
     own = max(every, key=lambda r: float(r.amplitude[0]))

@@ -27,10 +27,7 @@ from stickslip.study.analyses.vibrating import represented
 from stickslip.study.models.cost import above
 from stickslip.units import HZ, RPM
 
-MOTIONS = (
-    20,
-    100,
-)  # solved at a frequency: where hardly a spring keeps a traction, and where many do
+MOTIONS = (20, 100)  # solved at a frequency: where hardly a spring keeps a traction, and where many do
 STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
 
 
@@ -82,15 +79,18 @@ def cost_of(model: Model, asked: ResidualTractionsTable) -> Estimate:
     """Return what a case is estimated to cost."""
     first, last = asked.frequency_hz
     sweep = Sweep(
-        omega_range=(HZ * first, HZ * last), low=max(asked.harmonics, 1), high=max(asked.harmonics, 1),
-        selection="always_high", frequencies=asked.points, points=asked.points, peak_points=0,
-    )  # fmt: skip
+        omega_range=(HZ * first, HZ * last),
+        low=max(asked.harmonics, 1),
+        high=max(asked.harmonics, 1),
+        selection="always_high",
+        frequencies=asked.points,
+        points=asked.points,
+        peak_points=0,
+    )
     once = estimate(model, sweep)
     least, most = MOTIONS
     return replace(
-        once,
-        least_seconds=STEPS * least * once.least_seconds,
-        most_seconds=STEPS * most * once.most_seconds,
+        once, least_seconds=STEPS * least * once.least_seconds, most_seconds=STEPS * most * once.most_seconds
     )
 
 
@@ -106,9 +106,7 @@ def question_of(case: Case, model: Model) -> Question:
     asked: ResidualTractionsTable = case.settings.residual_tractions
     driven = sorted(set(model.driven.values()))
     if not driven:
-        raise input_error(
-            "residual_tractions", "nothing vibrates: no load has a harmonic", "Add a harmonic load."
-        )
+        raise input_error("residual_tractions", "nothing vibrates: no load has a harmonic", "Add a harmonic load.")
     if driven[-1] > asked.harmonics:
         raise input_error(
             "residual_tractions.harmonics",

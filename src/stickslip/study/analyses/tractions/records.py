@@ -60,18 +60,31 @@ def to_record(bounds: TractionBounds, stage: Stage) -> TractionRecord:
         return np.array([getattr(one, name) for one in each])
 
     return TractionRecord(
-        stage, bounds.omega, every("amplitude"), np.array([one.coefficients for one in each]),
-        every("sliders"), every("multipliers"), json.dumps(bounds.springs), bounds.solves, bounds.failures, bounds.branches, every("error"),
-    )  # fmt: skip
+        stage,
+        bounds.omega,
+        every("amplitude"),
+        np.array([one.coefficients for one in each]),
+        every("sliders"),
+        every("multipliers"),
+        json.dumps(bounds.springs),
+        bounds.solves,
+        bounds.failures,
+        bounds.branches,
+        every("error"),
+    )
 
 
 def of_record(record: TractionRecord) -> TractionBounds:
     """Return the bounds of a record."""
     reference, least, most = (
-        Bound(float(record.amplitude[k]), record.coefficients[k], record.sliders[k], record.multipliers[k], float(record.errors[k]))
+        Bound(
+            float(record.amplitude[k]),
+            record.coefficients[k],
+            record.sliders[k],
+            record.multipliers[k],
+            float(record.errors[k]),
+        )
         for k in range(len(ENDS))
-    )  # fmt: skip
-    names = tuple(json.loads(record.springs))
-    return TractionBounds(
-        record.omega, reference, least, most, names, record.solves, record.failures, record.branches
     )
+    names = tuple(json.loads(record.springs))
+    return TractionBounds(record.omega, reference, least, most, names, record.solves, record.failures, record.branches)

@@ -17,9 +17,7 @@ class ResidualTractionsTable(Section):
         description="the range [lowest, highest] in which the bounds are computed, Hz; it should hold the resonance",
     )
     points: int = Field(25, ge=3, le=2000, description="frequencies in the range, 3 to 2000")
-    harmonics: int = Field(
-        5, ge=1, le=HIGHEST, description=f"harmonics of the motions, 1 to {HIGHEST}"
-    )
+    harmonics: int = Field(5, ge=1, le=HIGHEST, description=f"harmonics of the motions, 1 to {HIGHEST}")
     starts: int = Field(
         4,
         ge=0,

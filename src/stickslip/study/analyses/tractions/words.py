@@ -30,13 +30,15 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if failures:
         count = int(case["solves"].values.sum())
         why = f"from {failures} starts of tractions no motion was found ({count} were), so that the bounds may be wider"
-        found.append(Verdict("trusted", label, None, why, "Look at the figure: a bound that jumps back there is one that was missed."))  # fmt: skip
+        found.append(
+            Verdict(
+                "trusted", label, None, why, "Look at the figure: a bound that jumps back there is one that was missed."
+            )
+        )
     return [*found, *_of_ends(label, case)]
 
 
-def _of_width(
-    label: str, case: Mapping[str, xr.Variable], height: np.ndarray, hertz: np.ndarray
-) -> Verdict:
+def _of_width(label: str, case: Mapping[str, xr.Variable], height: np.ndarray, hertz: np.ndarray) -> Verdict:
     own, least, most = (float(h) for h in height)
     if most - least <= SMALL * most:
         because = (
@@ -46,16 +48,16 @@ def _of_width(
         )
         elsewhere = _widest(case)
         also = f"; elsewhere in the range {elsewhere}" if elsewhere else ""
-        why = f"residual tractions leave the resonance as it is, {millimetres(own)} at {hertz[0]:.5g} Hz: {because}{also}"
+        why = (
+            f"residual tractions leave the resonance as it is, {millimetres(own)} at {hertz[0]:.5g} Hz: {because}{also}"
+        )
         return Verdict("trusted", label, None, why)
     why = (
         f"the resonance is {millimetres(own)} from the model's own start, and by residual tractions alone anywhere from {millimetres(least)} at "
         f"{hertz[1]:.5g} Hz to {millimetres(most)} at {hertz[2]:.5g} Hz ({100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %): so far "
         "the answer of forced_response may be off because of them"
     )
-    return Verdict(
-        "trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least
-    )
+    return Verdict("trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least)
 
 
 def _of_harmonics(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -138,7 +140,11 @@ def _of_ends(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
             f"the {end} resonance, {millimetres(height[k])}, is a periodic motion that a machine leaves: in time, begun with its tractions, it "
             f"{went}"
         )
-        found.append(Verdict("trusted", label, float(hertz[k]), why, "The bound holds; it may be wider than what can be attained."))  # fmt: skip
+        found.append(
+            Verdict(
+                "trusted", label, float(hertz[k]), why, "The bound holds; it may be wider than what can be attained."
+            )
+        )
     return found
 
 
@@ -146,7 +152,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints."""
     if "resonance_amplitude" not in data:
         return ()
-    head = ("case", "own start mm", "at Hz", "smallest mm", "at Hz", "largest mm", "at Hz", "in time", "motions")  # fmt: skip
+    head = ("case", "own start mm", "at Hz", "smallest mm", "at Hz", "largest mm", "at Hz", "in time", "motions")
     labels = [str(x) for x in data["case_label"].values]
     rows = []
     for i, label in enumerate(labels):
@@ -154,7 +160,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         if "resonance_amplitude" not in case:
             continue
         height, hertz = case["resonance_amplitude"].values, case["resonance_hz"].values
-        each = [text for h, f in zip(height, hertz, strict=True) for text in (f"{1e3 * h:.5g}", f"{f:.3f}")]  # fmt: skip
+        each = [text for h, f in zip(height, hertz, strict=True) for text in (f"{1e3 * h:.5g}", f"{f:.3f}")]
         rows.append((label, *each, _in_time(case), str(int(case["solves"].sum()))))
     return (TextTable("Resonance over all residual tractions", head, tuple(rows)),)
 

@@ -127,7 +127,7 @@ def question_of(case: Case, model: Model) -> Question:
     if wheel and asked.in_time:
         raise input_error(f"{NAME}.in_time", "is for single structures", "Leave it out of a wheel.")
     orders = [_one_order(name, loads) for name, loads in (("first", first), ("second", second))]
-    together = replace(model, loads={n: _plain(load, wheel=model.sectors > 1) for n, load in model.loads.items()})  # fmt: skip
+    together = replace(model, loads={n: _plain(load, wheel=model.sectors > 1) for n, load in model.loads.items()})
     keys = [{n: together.driven[n] for n in loads} for loads in (first, second)]
     if set(keys[0].values()) & set(keys[1].values()):
         raise input_error(
@@ -163,7 +163,7 @@ def _check_second(asked: QuasiPeriodicTable, second: Mapping[str, Load]) -> None
     """Refuse second loads whose frequency is the first one or far above it, and a second tone beside them."""
     for name, load in second.items():
         given = "frequency_ratio" if load.omega is None else "frequency_hz"
-        each = [load.omega_ratio if load.omega is None else load.omega / (HZ * f) for f in asked.first_hz]  # fmt: skip
+        each = [load.omega_ratio if load.omega is None else load.omega / (HZ * f) for f in asked.first_hz]
         ratios = [r or 1.0 for r in each]
         if all(r == 1.0 for r in ratios):
             raise input_error(

@@ -25,9 +25,7 @@ GRID = 64  # phases of either frequency, over which the largest distance from th
 FAILED = (StickslipError, FloatingPointError, np.linalg.LinAlgError)
 
 
-def solve(
-    question: Question, done: Sequence[TwoFrequencies], notes: Notes
-) -> Iterator[TwoFrequencies]:
+def solve(question: Question, done: Sequence[TwoFrequencies], notes: Notes) -> Iterator[TwoFrequencies]:
     """Yield the motions that are not done."""
     own = {"output": list(question.model.output_labels)}
     asked = {"accuracy": 0.01 * question.asked.accuracy_percent}
@@ -61,11 +59,26 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
     none = np.full(outputs.size, np.nan)
     largest, least, off = (none, none, np.nan) if in_time is None else in_time
     return TwoFrequencies(
-        motion.omegas[0], np.nan if alone else motion.omegas[1], kind, why, unknown, np.array(motion.indices, dtype=np.int64),
-        _parts(motion.coefficients[:, outputs]), _parts(problem.balance.coefficients(motion.x)),
-        shown.largest, shown.least, shown.rms, _extreme(motion, outputs), shown.amplitude[:, 0],
-        motion.left_out, motion.slip, motion.iterations, largest, least, off,
-    )  # fmt: skip
+        motion.omegas[0],
+        np.nan if alone else motion.omegas[1],
+        kind,
+        why,
+        unknown,
+        np.array(motion.indices, dtype=np.int64),
+        _parts(motion.coefficients[:, outputs]),
+        _parts(problem.balance.coefficients(motion.x)),
+        shown.largest,
+        shown.least,
+        shown.rms,
+        _extreme(motion, outputs),
+        shown.amplitude[:, 0],
+        motion.left_out,
+        motion.slip,
+        motion.iterations,
+        largest,
+        least,
+        off,
+    )
 
 
 def _in_time(
@@ -125,10 +138,20 @@ def _of_tone(
         return problem, None, kind, "the forced motion was not found", ""
     alone = problem.with_indices(found.forced.indices)
     if np.isnan(found.ratio) and guesses:
-        return problem, None, kind, "no second tone converged near " + ", ".join(hertz(g) for g in guesses[:3]), ""  # fmt: skip
+        return problem, None, kind, "no second tone converged near " + ", ".join(hertz(g) for g in guesses[:3]), ""
     if found.ratio < 0.0:
-        return problem, None, kind, f"a tone near {hertz(found.near)} grows, and friction holds it at no amplitude that was found", ""  # fmt: skip
-    why = "nothing was found that grows" if not guesses else f"a second tone near {hertz(found.near)} decays, damping ratio {100 * found.ratio:.3g} %"  # fmt: skip
+        return (
+            problem,
+            None,
+            kind,
+            f"a tone near {hertz(found.near)} grows, and friction holds it at no amplitude that was found",
+            "",
+        )
+    why = (
+        "nothing was found that grows"
+        if not guesses
+        else f"a second tone near {hertz(found.near)} decays, damping ratio {100 * found.ratio:.3g} %"
+    )
     return alone, replace(found.forced, left_out=np.nan), "no second tone", why, unknown
 
 
@@ -150,7 +173,7 @@ def _enough(
     question: Question, problem: TwoTones, motion: TorusMotion, solving: Solving
 ) -> tuple[TwoTones, TorusMotion]:
     asked = question.asked
-    return with_enough(problem, motion, asked.most_harmonics, 0.01 * asked.accuracy_percent, solving)  # fmt: skip
+    return with_enough(problem, motion, asked.most_harmonics, 0.01 * asked.accuracy_percent, solving)
 
 
 def _free(motion: TorusMotion) -> Solving:
@@ -179,9 +202,26 @@ def _nothing(question: Question, omega: float, why: str) -> TwoFrequencies:
     n = len(question.model.system.outputs)
     none = np.full(n, np.nan)
     return TwoFrequencies(
-        omega, np.nan, "not found", why, "", np.zeros((0, 2), dtype=np.int64), np.zeros((0, n, 2)), np.zeros((0, 0, 2)),
-        none, none, none, none, np.full(PHASES, np.nan), np.nan, np.nan, 0, none, none, np.nan,
-    )  # fmt: skip
+        omega,
+        np.nan,
+        "not found",
+        why,
+        "",
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros((0, n, 2)),
+        np.zeros((0, 0, 2)),
+        none,
+        none,
+        none,
+        none,
+        np.full(PHASES, np.nan),
+        np.nan,
+        np.nan,
+        0,
+        none,
+        none,
+        np.nan,
+    )
 
 
 def _told(one: TwoFrequencies) -> str:

@@ -15,8 +15,9 @@ class QuasiPeriodicTable(Section):
     """Motions with two frequencies that are no multiples of each other."""
 
     frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="the range [lowest, highest] in Hz of the first frequency, that of the loads without one of their own"
-    )  # fmt: skip
+        None,
+        description="the range [lowest, highest] in Hz of the first frequency, that of the loads without one of their own",
+    )
     frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=1000)] | None = Field(
         None, description="first frequencies of your own in Hz instead of a range, growing"
     )
@@ -27,10 +28,7 @@ class QuasiPeriodicTable(Section):
         "with contacts stuck, and what multipliers of the forced motion say",
     )
     second_wave: int | None = Field(
-        None,
-        ge=0,
-        le=999,
-        description="of a tuned wheel: wave number of that tone; left out: the wave that grows most",
+        None, ge=0, le=999, description="of a tuned wheel: wave number of that tone; left out: the wave that grows most"
     )
     harmonics: int = Field(
         3,
@@ -67,7 +65,7 @@ class QuasiPeriodicTable(Section):
         given = [k for k in ("frequency_hz", "frequencies_hz") if getattr(self, k) is not None]
         if len(given) != 1:
             problem = "is missing" if not given else "cannot stand beside frequency_hz"
-            raise custom_error(problem, "Give one of frequency_hz and frequencies_hz.", (given or ["frequency_hz"])[-1])  # fmt: skip
+            raise custom_error(problem, "Give one of frequency_hz and frequencies_hz.", (given or ["frequency_hz"])[-1])
         rising_pair(self.frequency_hz or [], "frequency_hz")
         own = self.frequencies_hz or []
         if any(b <= a for a, b in pairwise(own)):

@@ -31,10 +31,9 @@ def compared(
     )
     found = statistics(
         course(
-            system.structure, contacts, question.first, motion.omegas[0], np.asarray(system.outputs), start,
-            steps=STEPS,
+            system.structure, contacts, question.first, motion.omegas[0], np.asarray(system.outputs), start, steps=STEPS
         )
-    )  # fmt: skip
+    )
     return found.largest, found.least, np.nan
 
 
@@ -76,11 +75,16 @@ def _two_loads(
     load = HarmonicLoad(question.first.static, forces)
     steps = STEPS * max(p, q)
     found = integrate(
-        system.structure, contacts.gap_operator, contacts.laws, load, base, outputs,
+        system.structure,
+        contacts.gap_operator,
+        contacts.laws,
+        load,
+        base,
+        outputs,
         start_from_harmonics(_folded(near), base, contacts.gap_operator, contacts.laws),
         TimeStepping(steps_per_period=steps, max_periods=LONG, harmonics=max(load.harmonics), tolerance=1e-4),
         weights=contacts.weights,
-    )  # fmt: skip
+    )
     times = 2.0 * np.pi / base * np.arange(1, steps + 1) / steps
     balance = near.at_times(outputs, times)
     vibrates = balance - balance.mean(axis=0)

@@ -32,25 +32,29 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
     hz, kind, why = number("first_hz"), str(case["kind"].values[i]), str(case["why"].values[i])
     if kind == "not found":
         remedy = "Give quasi_periodic.second_hz, more harmonics, or nearer frequencies_hz."
-        return [Verdict("wrong", label, hz, f"no motion was found: {why.removesuffix('.')}", remedy)]  # fmt: skip
+        return [Verdict("wrong", label, hz, f"no motion was found: {why.removesuffix('.')}", remedy)]
     if kind == "no second tone":
         return [_without(label, hz, why, str(case["unknown"].values[i]))]
     found = list(_unexamined(label, case, i))
     found += _left_out(label, hz, number("left_out"), float(case.get("accuracy", LARGE)))
     if number("slip") > SLIP:
         off = f"contacts were marched at a ratio by which the second phase is off by {number('slip'):.2g} rad a turn"
-        found.append(Verdict("doubtful", label, hz, off, "Take frequencies whose ratio is nearer to one of small numbers."))  # fmt: skip
+        found.append(
+            Verdict("doubtful", label, hz, off, "Take frequencies whose ratio is nearer to one of small numbers.")
+        )
     away = number("time_off") if "time_off" in case else np.nan
     if away > LARGE:
         told = f"time integration is {100 * away:.2g} % off"
-        found.append(Verdict("doubtful", label, hz, told, "Lower quasi_periodic.accuracy_percent, or look for another motion."))  # fmt: skip
+        found.append(
+            Verdict("doubtful", label, hz, told, "Lower quasi_periodic.accuracy_percent, or look for another motion.")
+        )
     if "time_largest" in case and not np.isfinite(away):
-        ends = [(float(case[n].values[i, 0]), float(case[f"time_{n}"].values[i, 0])) for n in ("largest", "least")]  # fmt: skip
+        ends = [(float(case[n].values[i, 0]), float(case[f"time_{n}"].values[i, 0])) for n in ("largest", "least")]
         size = ends[0][0]
         apart = max(abs(b - t) for b, t in ends) / size
         if apart > 2 * LARGE:
             told = f"in time the amplitude goes from {millimetres_between(ends[1][1], ends[0][1])}, the balance has {millimetres_between(ends[1][0], size)}"
-            found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))  # fmt: skip
+            found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))
     return found
 
 
@@ -104,6 +108,6 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
         )
         for i in range(case.sizes["point"])
     ]
-    columns = ("first Hz", "second Hz", "", "least mm", "largest mm", "rms mm", "combined", "left out %")  # fmt: skip
+    columns = ("first Hz", "second Hz", "", "least mm", "largest mm", "rms mm", "combined", "left out %")
     name = str(case["output_name"].values[0])
-    return TextTable(f"{head}Motions with two frequencies, amplitude of {name}", columns, tuple(rows))  # fmt: skip
+    return TextTable(f"{head}Motions with two frequencies, amplitude of {name}", columns, tuple(rows))

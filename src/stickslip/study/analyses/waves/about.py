@@ -45,11 +45,7 @@ NUMBERS = {
 
 
 def about(
-    model: Model,
-    contacts: ContactsAs,
-    rpm: float,
-    highest: float,
-    more: Sequence[Verdict] = (),
+    model: Model, contacts: ContactsAs, rpm: float, highest: float, more: Sequence[Verdict] = ()
 ) -> dict[str, Any]:
     """Return the note about a model.
 

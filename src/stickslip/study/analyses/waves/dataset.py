@@ -9,13 +9,7 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
-from stickslip.study.analyses.verdict import (
-    ATTRIBUTE,
-    Verdict,
-    from_json,
-    of_all_cases,
-    to_json,
-)
+from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, from_json, of_all_cases, to_json
 from stickslip.study.analyses.waves.about import ABOUT, told
 from stickslip.study.analyses.waves.numbers import wave_name
 from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
@@ -26,9 +20,7 @@ Waves = Sequence[WaveModes] | Sequence[WaveBranches] | Sequence[WaveFlutter]
 LABELS = {"xyz": ["x", "y", "z"], "part": ["re", "im"]}
 
 
-def dataset(
-    solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variables, list[Verdict]]]
-) -> xr.Dataset:
+def dataset(solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variables, list[Verdict]]]) -> xr.Dataset:
     """Return the dataset of all cases.
 
     Parameters
@@ -62,16 +54,18 @@ def frequencies(waves: Waves) -> FloatArray:
 def growth(waves: Sequence[WaveModes]) -> xr.Variable:
     """Return how the frequencies grow with the speed."""
     grown = np.array([w.growth for w in waves])
-    return variable(
-        "wave mode", grown, "1", "derivative of the squared frequency by the squared speed"
-    )
+    return variable("wave mode", grown, "1", "derivative of the squared frequency by the squared speed")
 
 
 def _of_waves(waves: Waves, sectors: int) -> Variables:
     named = [wave_name(w.wave_number, sectors) for w in waves]
     return {
-        "wave_number": variable("wave", np.array([w.wave_number for w in waves], dtype=np.int64), "1", "wave number of the travelling wave"),
+        "wave_number": variable(
+            "wave", np.array([w.wave_number for w in waves], dtype=np.int64), "1", "wave number of the travelling wave"
+        ),
         "nodal_diameter": variable("wave", np.array([d for d, _ in named], dtype=np.int64), "1", "nodal diameter"),
-        "wave_kind": variable("wave", np.array([kind for _, kind in named], dtype=str), "1", "standing, forward or backward"),
+        "wave_kind": variable(
+            "wave", np.array([kind for _, kind in named], dtype=str), "1", "standing, forward or backward"
+        ),
         "seconds": variable("wave", np.array([w.seconds for w in waves], dtype=float), "s", "time of the computation"),
-    }  # fmt: skip
+    }

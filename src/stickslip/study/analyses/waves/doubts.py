@@ -62,9 +62,7 @@ def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
 
 
 def campbell_doubts(
-    unfollowed: Sequence[tuple[int, float]],
-    unseen: Sequence[int],
-    waves: Sequence[WaveBranches],
+    unfollowed: Sequence[tuple[int, float]], unseen: Sequence[int], waves: Sequence[WaveBranches]
 ) -> tuple[Verdict, ...]:
     """Say which engine orders leave the followed modes below them, and which excite nodal diameters that are left out.
 

@@ -40,9 +40,7 @@ class Wheel:
         """Refuse nodal diameters that the wheel has not."""
         highest = self.sectors // 2
         if diameters and self.sectors == 1 and max(diameters) > 0:
-            raise input_error(
-                key, "are of a wheel, and no part is a sector of one", "Leave them out."
-            )
+            raise input_error(key, "are of a wheel, and no part is a sector of one", "Leave them out.")
         if diameters and max(diameters) > highest:
             raise input_error(
                 key,

@@ -20,20 +20,14 @@ def solved(question: Question) -> dict[str, Any]:
     """Return the modes of the wheel as named arrays: as many a blade as a wave has."""
     model = question.model
     found = wheel_modes(model, question.n_modes * model.sectors, question.contacts)
-    return {
-        "mistuned_hz": found.frequencies_hz,
-        "sector_share": found.sector_share,
-        "wave_share": found.wave_share,
-    }
+    return {"mistuned_hz": found.frequencies_hz, "sector_share": found.sector_share, "wave_share": found.wave_share}
 
 
 def variables(note: Mapping[str, Any] | None) -> Variables:
     """Return them as variables; none where the sectors are alike."""
     if not note:
         return {}
-    hertz, sectors, waves = (
-        np.asarray(note[n]) for n in ("mistuned_hz", "sector_share", "wave_share")
-    )
+    hertz, sectors, waves = (np.asarray(note[n]) for n in ("mistuned_hz", "sector_share", "wave_share"))
     factors = [localisation(np.sqrt(np.maximum(row, 0.0))) for row in sectors]
     about = "share of the kinetic energy of a mode of the wheel"
     return {
@@ -41,9 +35,12 @@ def variables(note: Mapping[str, Any] | None) -> Variables:
         "sector_share": variable("wheel_mode blade", sectors, "1", f"{about} in each sector"),
         "wave_share": variable("wheel_mode wave_of_wheel", waves, "1", f"{about} in each wave number"),
         "mode_localisation": variable(
-            "wheel_mode", np.array(factors), "1", "localisation factor: 0 where all blades move alike, 1 where one moves alone"
+            "wheel_mode",
+            np.array(factors),
+            "1",
+            "localisation factor: 0 where all blades move alike, 1 where one moves alone",
         ),
-    }  # fmt: skip
+    }
 
 
 def table(case: Any) -> list[TextTable]:
@@ -66,8 +63,6 @@ def table(case: Any) -> list[TextTable]:
             )
         )
     more = len(case["mistuned_hz"]) - len(rows)
-    title = "Modes of the wheel, its sectors as they differ" + (
-        f"; {more} more in the result" if more > 0 else ""
-    )
+    title = "Modes of the wheel, its sectors as they differ" + (f"; {more} more in the result" if more > 0 else "")
     head = ("mode", "Hz", "localisation", "largest blade", "nodal diameters")
     return [TextTable(title, head, tuple(rows))]

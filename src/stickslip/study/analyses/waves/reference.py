@@ -25,9 +25,7 @@ class Row(BaseModel):
     nodal_diameter: int = Field(ge=0, description="a whole number")
     mode: int = Field(ge=0, description="a whole number")
     frequency_hz: float = Field(gt=0, allow_inf_nan=False, description="a frequency above zero")
-    speed_rpm: float | None = Field(
-        None, ge=0, allow_inf_nan=False, description="a speed of zero or more, or nothing"
-    )
+    speed_rpm: float | None = Field(None, ge=0, allow_inf_nan=False, description="a speed of zero or more, or nothing")
 
 
 @dataclass(frozen=True)
@@ -64,9 +62,7 @@ class Reference:
         """
         diameters = [wave(k, sectors).nodal_diameter for k in numbers]
         modes = range(1, n_modes + 1)
-        out = np.array(
-            [[self.frequencies_hz.get((d, m), np.nan) for m in modes] for d in diameters]
-        )
+        out = np.array([[self.frequencies_hz.get((d, m), np.nan) for m in modes] for d in diameters])
         if not np.isfinite(out).any():
             raise input_error(
                 str(self.path),
@@ -86,9 +82,7 @@ def read_reference(path: Path, case: str | None) -> Reference:
     """
     if not path.is_file():
         raise input_error(
-            "modes.reference",
-            f"there is no file {path}",
-            "Check the name; it is relative to the study's folder.",
+            "modes.reference", f"there is no file {path}", "Check the name; it is relative to the study's folder."
         )
     found, speeds = _rows(path, case)
     named = _SPEED.search(case or "")
@@ -113,9 +107,7 @@ def _rows(path: Path, case: str | None) -> tuple[dict[tuple[int, int], float], s
                 found[key] = row.frequency_hz
                 speeds |= set() if row.speed_rpm is None else {row.speed_rpm}
     except (UnicodeDecodeError, csv.Error) as error:
-        raise input_error(
-            str(path), f"is not a CSV file in UTF-8 ({error})", "Save it as CSV."
-        ) from None
+        raise input_error(str(path), f"is not a CSV file in UTF-8 ({error})", "Save it as CSV.") from None
     return found, speeds
 
 
@@ -127,15 +119,11 @@ def _lines(path: Path, stream: TextIO, case: str | None) -> Iterator[tuple[int, 
     missing = [name for name in needed if name not in (reader.fieldnames or [])]
     if missing:
         raise input_error(
-            str(path),
-            f"has no column {', '.join(missing)}",
-            f"The first line names the columns: {','.join(needed)}.",
+            str(path), f"has no column {', '.join(missing)}", f"The first line names the columns: {','.join(needed)}."
         )
     for row in reader:
         if reader.line_num > MOST_ROWS:
-            raise input_error(
-                str(path), f"has more than {MOST_ROWS} lines", "Cut it to what is compared."
-            )
+            raise input_error(str(path), f"has more than {MOST_ROWS} lines", "Cut it to what is compared.")
         if case is None or row["case"] == case:
             yield reader.line_num, _row(f"{path}: line {reader.line_num}", row)
 

@@ -130,9 +130,7 @@ class Question:
         return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
 
 
-def each_wave(
-    solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes
-) -> Iterator[W]:
+def each_wave(solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes) -> Iterator[W]:
     """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
     if notes.get(ABOUT) is None:
         note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1], asked.left_out)
@@ -149,9 +147,7 @@ def each_wave(
 def _progress(wave: WaveModes | WaveBranches | WaveFlutter) -> str:
     low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
     basis = f", basis good to {wave.error:.0e}" if isinstance(wave, WaveBranches) else ""
-    return (
-        f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s{basis}"
-    )
+    return f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s{basis}"
 
 
 def solve_wave(asked: Question, wave_number: int) -> WaveModes:
@@ -181,9 +177,7 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     return found if flow is None else replace(found, in_flow=flow.damped)
 
 
-def _growth(
-    asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix
-) -> FloatArray:
+def _growth(asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix) -> FloatArray:
     """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
     x = asked.speeds[0] ** 2
     if x == 0 or not asked.model.rotates:

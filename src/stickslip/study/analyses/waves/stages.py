@@ -19,9 +19,7 @@ from stickslip.study.analyses.waves.about import ABOUT, STATIC
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.keep.progress import advance
 
-LEFT_OUT = (
-    0.01  # of a frequency: so much harmonics that are not coupled may change it without a doubt
-)
+LEFT_OUT = 0.01  # of a frequency: so much harmonics that are not coupled may change it without a doubt
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +63,7 @@ def stages_question(model: Model, diameters: Sequence[int] | None, n_modes: int)
     return StagesQuestion(model, tuple(sorted(diameters or assembly.nodal_diameters)), n_modes)
 
 
-def each_diameter(
-    asked: StagesQuestion, done: Sequence[WaveModes], notes: Notes
-) -> Iterator[WaveModes]:
+def each_diameter(asked: StagesQuestion, done: Sequence[WaveModes], notes: Notes) -> Iterator[WaveModes]:
     """Yield the modes of the nodal diameters that are not done; what is told of the model goes into the notes first."""
     if notes.get(ABOUT) is None:
         notes.put(ABOUT, _about(asked))
@@ -113,9 +109,7 @@ def unreached(assembly: Multistage) -> list[Verdict]:
     own = _in_words(assembly, assembly.unreached)
     if not own:
         return []
-    why = (
-        f"no kept harmonic of the flanges leads to the waves {own}: their modes are in no list here"
-    )
+    why = f"no kept harmonic of the flanges leads to the waves {own}: their modes are in no list here"
     lowest = sorted({k for _, k in assembly.unreached})
     remedy = f"Add the harmonics {', '.join(map(str, lowest))} to join.NAME.harmonics."
     return [Verdict("trusted", why=why, remedy=remedy)]

@@ -25,9 +25,7 @@ class WaveTable(Section):
 class ModesTable(WaveTable):
     """Natural frequencies and mode shapes for each nodal diameter."""
 
-    number: int = Field(
-        6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200"
-    )
+    number: int = Field(6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200")
     nodal_diameters: list[Diameter] | None = Field(
         None,
         min_length=1,
@@ -41,20 +39,14 @@ class ModesTable(WaveTable):
         "lowest), frequency_hz, and speed_rpm if it shall be told where that is another speed",
     )
     reference_case: str | None = Field(
-        None,
-        max_length=100,
-        description="keep only the rows of the reference whose column 'case' has this value",
+        None, max_length=100, description="keep only the rows of the reference whose column 'case' has this value"
     )
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         once(self.nodal_diameters or [], "nodal_diameters")
         if self.reference_case is not None and self.reference is None:
-            raise custom_error(
-                "is given without a reference",
-                "Name the CSV file, or leave it out.",
-                "reference_case",
-            )
+            raise custom_error("is given without a reference", "Name the CSV file, or leave it out.", "reference_case")
         return self
 
 
@@ -62,9 +54,7 @@ class CampbellTable(WaveTable):
     """Frequencies against rotor speed and their crossings with engine orders."""
 
     speeds_rpm: list[Speed] = Field(
-        min_length=2,
-        max_length=2,
-        description="the range [lowest, highest] of the speed in rpm, the lower first",
+        min_length=2, max_length=2, description="the range [lowest, highest] of the speed in rpm, the lower first"
     )
     points: int = Field(9, ge=2, le=1000, description="number of speeds in the range, 2 to 1000")
     engine_orders: list[Order] = Field(
@@ -72,10 +62,7 @@ class CampbellTable(WaveTable):
     )
     modes: int = Field(4, ge=1, le=100, description="number of modes that are followed, 1 to 100")
     nodal_diameters: list[Diameter] | None = Field(
-        None,
-        min_length=1,
-        max_length=501,
-        description="nodal diameters; left out: those that the engine orders excite",
+        None, min_length=1, max_length=501, description="nodal diameters; left out: those that the engine orders excite"
     )
 
     @model_validator(mode="after")
@@ -94,9 +81,7 @@ class CampbellTable(WaveTable):
 class SafeTable(WaveTable):
     """Which modes engine orders can excite at one speed (SAFE, interference diagram)."""
 
-    speed_rpm: Speed | None = Field(
-        None, description="speed in rpm, above zero; left out: that of [rotation]"
-    )
+    speed_rpm: Speed | None = Field(None, description="speed in rpm, above zero; left out: that of [rotation]")
     engine_orders: list[Order] = Field(
         min_length=1, max_length=200, description="engine orders, a list of whole numbers from 1"
     )
@@ -106,9 +91,7 @@ class SafeTable(WaveTable):
         lt=100,
         description="a mode that an engine order would meet within this change of speed is called a near resonance, in percent",
     )
-    modes: int = Field(
-        6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200"
-    )
+    modes: int = Field(6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200")
 
     @model_validator(mode="after")
     def _differ(self) -> Self:

@@ -15,9 +15,7 @@ MOST_PAIRS = 30  # of an interference table on the screen
 NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
 
 
-def of_cases(
-    data: xr.Dataset, tables: Callable[[xr.Dataset], Sequence[TextTable]]
-) -> tuple[TextTable, ...]:
+def of_cases(data: xr.Dataset, tables: Callable[[xr.Dataset], Sequence[TextTable]]) -> tuple[TextTable, ...]:
     """Return the tables of each case, and what the centrifugal load does; cases that are alike share theirs."""
     found = []
     for case, head in told_apart(data):
@@ -32,9 +30,7 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
     """Return the natural frequencies at a speed, and their differences from the reference."""
     names, hertz = _names(case), case["frequency_hz"].values
     head = ("wave", "kind", *(f"{m + 1}" for m in range(hertz.shape[1])))
-    rows = tuple(
-        (*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, hertz, strict=True)
-    )
+    rows = tuple((*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, hertz, strict=True))
     tables = [TextTable(f"Natural frequencies in Hz {_at(case.attrs['speed_rpm'])}", head, rows)]
     if "stage_share" in case:
         tables.append(_stiffest_table(case, names, head))
@@ -58,20 +54,15 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
     return tables
 
 
-def _stiffest_table(
-    case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]
-) -> TextTable:
+def _stiffest_table(case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]) -> TextTable:
     """Return the frequencies that the harmonics left out could make."""
     rows = tuple(
-        (*name, *(f"{f:.7g}" for f in own))
-        for name, own in zip(names, case["stiffest_hz"].values, strict=True)
+        (*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, case["stiffest_hz"].values, strict=True)
     )
     return TextTable("The same in Hz, all harmonics held that flanges do not couple", head, rows)
 
 
-def _stage_table(
-    case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]
-) -> TextTable:
+def _stage_table(case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]) -> TextTable:
     """Return the share of each stage in the energy of each mode."""
     counts = zip(case["stage_name"].values, case["stage_sectors"].values, strict=True)
     stages = [f"{name} ({count} sectors)" for name, count in counts]
@@ -80,9 +71,7 @@ def _stage_table(
         for (name, _), own in zip(names, case["stage_share"].values, strict=True)
         for stage, shares in zip(stages, own.T, strict=True)
     )
-    return TextTable(
-        "Share of each stage in the kinetic energy", (head[0], "stage", *head[2:]), rows
-    )
+    return TextTable("Share of each stage in the kinetic energy", (head[0], "stage", *head[2:]), rows)
 
 
 def flutter_tables(case: xr.Dataset) -> list[TextTable]:
@@ -95,17 +84,8 @@ def flutter_tables(case: xr.Dataset) -> list[TextTable]:
         _flutter_row(labels[w], float(case["phase_angle_deg"][w]), n, [float(case[c][w, n]) for c in columns], required)
         for n in range(total.shape[1])
         for w in np.argsort(case["phase_angle_deg"].values, kind="stable")
-    )  # fmt: skip
-    head = (
-        "wave",
-        "phase angle deg",
-        "mode",
-        "Hz",
-        "by energy %",
-        "by eigenvalue %",
-        "with structure %",
-        "",
     )
+    head = ("wave", "phase angle deg", "mode", "Hz", "by energy %", "by eigenvalue %", "with structure %", "")
     title = (
         f"Flutter margins {_at(case.attrs['speed_rpm'])}: the least stable is {labels[i]}, mode {m + 1}, with "
         f"{100 * (total[i, m] - required):.4g} %"
@@ -126,9 +106,7 @@ def _mistuned_flutter(case: xr.Dataset) -> list[TextTable]:
     return [TextTable(title, ("Hz", "with structure %", ""), rows)]
 
 
-def _flutter_row(
-    name: str, angle: float, mode: int, numbers: Sequence[float], required: float
-) -> tuple[str, ...]:
+def _flutter_row(name: str, angle: float, mode: int, numbers: Sequence[float], required: float) -> tuple[str, ...]:
     hertz, *damping = numbers
     told = "UNSTABLE" if damping[-1] < 0 else "below required" if damping[-1] < required else ""
     shares = (f"{100 * d:.4g}" for d in damping)
@@ -185,9 +163,7 @@ def safe_tables(case: xr.Dataset) -> list[TextTable]:
 
 
 def _pair(pair: xr.Dataset, labels: Sequence[str]) -> tuple[str, ...]:
-    verdict = (
-        "NEAR" if pair["pair_near"] else "clear" if pair["pair_judged"] else "order not judged"
-    )
+    verdict = "NEAR" if pair["pair_near"] else "clear" if pair["pair_judged"] else "order not judged"
     return (
         f"{int(pair['pair_engine_order'])}",
         labels[int(pair["pair_wave"])],
@@ -242,7 +218,4 @@ def _names(case: xr.Dataset) -> list[tuple[str, str]]:
     if sectors == 1:
         return [("whole", "")] * len(named)
     parted = _parted(case)
-    return [
-        (f"ND {diameter}", kind if parted or kind == "standing" else "both ways")
-        for diameter, kind in named
-    ]
+    return [(f"ND {diameter}", kind if parted or kind == "standing" else "both ways") for diameter, kind in named]
