@@ -12,7 +12,7 @@ ROOT = Path(stickslip.__file__).parent
 
 # task -> the modules whose public names serve it, the longest that fits; the order is that of the page
 TASKS = {
-    "Ask a question, look at the answer": ("front", "errors"),
+    "Ask a question, look at the answer": ("api", "errors"),
     "Make a model": ("assembly", "model.part", "model.fe.solid", "model.readers.units"),
     "Blades, sectors and beams of given shape": ("model.mesh", "model.fe.beam", "model.matrices"),
     "Dampers and other rigid bodies": ("model.rigid",),

@@ -23,11 +23,11 @@ from small_v2 import write_four_masses
 from test_readers_matrices import DATA
 
 from stickslip import cli
+from stickslip.api.result import Result
+from stickslip.api.study import Study
 from stickslip.errors import InputError
-from stickslip.front.result import Result
-from stickslip.front.study import Study
 from stickslip.study.file.example import example_text
-from stickslip.study.keep import folder as keep
+from stickslip.study.store import folder as keep
 
 FORCES = (5.0, 8.0)  # N, of the cases
 CHANGES = {

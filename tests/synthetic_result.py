@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.study.keep.netcdf import write_tree
+from stickslip.study.store.netcdf import write_tree
 
 CENTRIFUGAL = 400.0  # N
 MODAL_MASS = 2.0  # kg

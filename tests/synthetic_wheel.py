@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from stickslip.study.keep.netcdf import stacked
+from stickslip.study.store.netcdf import stacked
 
 SECTORS, MODES = 8, 3
 PITCH = 2 * np.pi / SECTORS

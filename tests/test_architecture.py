@@ -20,8 +20,9 @@ SOURCE = ROOT / "src" / "stickslip"
 MODULES = sorted(SOURCE.rglob("*.py"))
 STUBS = sorted(SOURCE.rglob("__init__.pyi"))
 MOST_NAMES = 45
-LONGEST_FUNCTION = 60  # lines of code without the docstring; the 90th percentile has its own, smaller limit
-USUAL_FUNCTION = 40
+USUAL_FUNCTION = (
+    25  # lines of code without the docstring, at the 90th percentile; ruff limits the statements of each function
+)
 
 
 def package_of(stub: Path) -> str:
@@ -90,17 +91,12 @@ def test_modules_import_each_other_in_no_circle():
 def test_type_checking_imports_do_not_hide_from_the_contracts():
     # import-linter leaves such imports out; the command line is on top of all layers, and `reading` names its own layer alone
     hidden = {str(path.relative_to(SOURCE)) for path in MODULES if "TYPE_CHECKING" in path.read_text()}
-    assert hidden <= {"cli.py", "front/reading.py"}
+    assert hidden <= {"cli.py", "api/reading.py"}
 
 
 def test_functions_are_short():
-    lengths = {
-        f"{path.relative_to(SOURCE)}:{node.name}": body_lines(node) for path in MODULES for node in functions(path)
-    }
-    too_long = {name: lines for name, lines in lengths.items() if lines > LONGEST_FUNCTION}
-    assert not too_long
-    usual = sorted(lengths.values())[int(0.9 * len(lengths))]
-    assert usual <= USUAL_FUNCTION
+    lengths = sorted(body_lines(node) for path in MODULES for node in functions(path))
+    assert lengths[int(0.9 * len(lengths))] <= USUAL_FUNCTION
 
 
 def test_no_module_for_leftovers():

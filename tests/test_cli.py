@@ -17,15 +17,15 @@ from small_v2 import write_example_deck, write_four_masses, write_shrouded_deck,
 from typer.testing import CliRunner, Result
 
 import stickslip
+from stickslip.api import result as front
+from stickslip.api.study import Study
 from stickslip.cli import app
 from stickslip.errors import InputError
-from stickslip.front import result as front
-from stickslip.front.study import Study
 from stickslip.model import blas_threads
 from stickslip.study.file.example import example_text
-from stickslip.study.keep import threads
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.progress import Interrupted
+from stickslip.study.store import threads
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.progress import Interrupted
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
 
@@ -91,7 +91,7 @@ def test_a_wrong_study_is_refused_before_what_computes_and_draws_is_loaded(tmp_p
         "xarray",
         "pandas",
         "plotly",
-        "stickslip.front.study",
+        "stickslip.api.study",
         "stickslip.assembly.model",
         "stickslip.response.system",
         "stickslip.harmonic.balance",

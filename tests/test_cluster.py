@@ -23,10 +23,10 @@ from toy_analysis import ToyStudy
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.verdict import of_tree
-from stickslip.study.keep import workers
-from stickslip.study.keep.attempts import reached
-from stickslip.study.keep.workers import LOOPBACK
 from stickslip.study.run import run_study
+from stickslip.study.store import workers
+from stickslip.study.store.attempts import reached
+from stickslip.study.store.workers import LOOPBACK
 
 if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):
     pytest.skip("the extra cluster is not installed", allow_module_level=True)
@@ -245,10 +245,10 @@ def test_scheduler_that_does_not_answer_is_told(study: ToyStudy, monkeypatch: py
 
 def test_slurm_outside_of_it_is_told(study: ToyStudy, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
-    monkeypatch.setattr("stickslip.study.keep.workers.shutil.which", lambda _name: None)
+    monkeypatch.setattr("stickslip.study.store.workers.shutil.which", lambda _name: None)
     with pytest.raises(InputError, match=r"--executor slurm: finds no srun here"):
         run_study(study, kind="slurm")
-    monkeypatch.setattr("stickslip.study.keep.workers.shutil.which", str)
+    monkeypatch.setattr("stickslip.study.store.workers.shutil.which", str)
     with pytest.raises(InputError, match=r"is not inside an allocation\. Begin with it: salloc"):
         run_study(study, kind="slurm")
     monkeypatch.setenv("SLURM_JOB_ID", "1")

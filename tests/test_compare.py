@@ -10,8 +10,8 @@ from synthetic_result import KEY, synthetic_result, tree_of
 from typer.testing import CliRunner
 
 import stickslip as ss
+from stickslip.api.comparison import Comparison
 from stickslip.cli import app
-from stickslip.front.comparison import Comparison
 from stickslip.report.quantities import column
 from stickslip.report.side_by_side import cards
 

@@ -221,18 +221,18 @@ def test_what_takes_long_to_compile_is_said_once(patience, monkeypatch, caplog):
 
 ASKED = """
 import numba
-from stickslip.contact import event_integrals, events, interface, intervals, march, path, product
-from stickslip.contact.planar import course, period, rows
-from stickslip.response import ahead
+from stickslip.contact import event_integrals, events, interface, intervals, march, prescribed_gap, product
+from stickslip.contact.planar import period, sensitivities, trajectory
+from stickslip.response import precompile
 from stickslip.response.time import start, time_step
 
-for task in ahead.TASKS.values():
+for task in precompile.TASKS.values():
     task()
 used = [
     event_integrals._integrate_events, events.contact_events, interface.add_contact_jacobian, interface.add_forces, interface.add_gaps,
-    intervals.contact_period, product.contact_product, product.multiply_blocks, product.sweep, course.run, rows.follow_rows,
+    intervals.contact_period, product.contact_product, product.multiply_blocks, product.sweep, trajectory.run, sensitivities.follow_rows,
 ]
-made = [march.period_march, path._walk, period._compiled, start._march, time_step.run_steps]
+made = [march.period_march, prescribed_gap._walk, period._compiled, start._march, time_step.run_steps]
 if numba.get_num_threads() > 1:
     used += [events.contact_events_threads, intervals.contact_period_threads]
     made += [period._threads]

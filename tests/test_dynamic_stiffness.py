@@ -16,10 +16,10 @@ from stickslip.harmonic.condensed_once import LARGE, condensed_once
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.spectral import ModeTerms, Poles
 from stickslip.harmonic.state_space import StateSpace
 from stickslip.harmonic.structured import real_matrix
-from stickslip.harmonic.support import harmonics_of
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 

@@ -15,13 +15,13 @@ from test_assembly_wheel import ORDER, SECTORS, sector_model, shrouded_sector
 from typer.testing import CliRunner
 
 import stickslip as ss
-from stickslip.assembly.everywhere import nodes_of
+from stickslip.api.model import Model
 from stickslip.assembly.forces import force_of
+from stickslip.assembly.full_field import nodes_of
 from stickslip.assembly.mistuning import BladeMistuning, Mistuning
 from stickslip.cli import app
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
-from stickslip.front.model import Model
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh

@@ -17,13 +17,13 @@ import xarray as xr
 from fault_readers import damaged
 from small_v2 import write_four_masses
 
+from stickslip.api.result import Result
 from stickslip.errors import InputError
-from stickslip.front.result import Result
-from stickslip.study.keep import netcdf
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.netcdf import read_tree, write_tree
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.store import netcdf
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.netcdf import read_tree, write_tree
 
 HERE = Path(__file__).parent
 SEED = 1

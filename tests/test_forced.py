@@ -10,7 +10,7 @@ from models import lifting
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response import ladder
+from stickslip.response import starting_solutions
 from stickslip.response.branch import BACKWARD
 from stickslip.response.forced import from_time
 from stickslip.response.forced.response import Sweep, accepted_pairs, accepted_points, forced_problem, forced_response
@@ -288,7 +288,7 @@ def no_rescue(monkeypatch):
                 break
         return solution
 
-    monkeypatch.setattr(ladder, "solve_robustly", newton_only)
+    monkeypatch.setattr(starting_solutions, "solve_robustly", newton_only)
     monkeypatch.setattr(from_time, "MOST_COORDINATES", 0)
 
 

@@ -34,21 +34,21 @@ from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Status
-from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
-from stickslip.study.analyses.forced.curve import Curve
-from stickslip.study.analyses.forced.estimate import estimate, retained_of
-from stickslip.study.analyses.forced.known import mixed_places, no_resonance, nothing_pressed, off_engine_order
-from stickslip.study.analyses.forced.question import Question, question_of
-from stickslip.study.analyses.forced.rules import twice_the_harmonics
-from stickslip.study.analyses.forced.section import ForcedResponse
-from stickslip.study.analyses.forced.sweeps import sweep_of
-from stickslip.study.analyses.forced_response import FORCED_RESPONSE
+from stickslip.study.analyses.forced_response import analysis as analysis_module
+from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.study.analyses.forced_response.curve import Curve
+from stickslip.study.analyses.forced_response.estimate import estimate, retained_of
+from stickslip.study.analyses.forced_response.known import mixed_places, no_resonance, nothing_pressed, off_engine_order
+from stickslip.study.analyses.forced_response.problem import Question, question_of
+from stickslip.study.analyses.forced_response.rules import twice_the_harmonics
+from stickslip.study.analyses.forced_response.section import ForcedResponse
+from stickslip.study.analyses.forced_response.sweeps import sweep_of
 from stickslip.study.file.harmonics import Harmonics
-from stickslip.study.keep.journal import JobJournal
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import case_variables
 from stickslip.study.run import run_study
+from stickslip.study.store.journal import JobJournal
 from stickslip.units import HZ, RPM
 
 NO_TIME = ("seconds", "attempt_seconds", "seconds_contact", "seconds_linear", "seconds_rest")
@@ -318,7 +318,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert 0 < np.count_nonzero(own > 0.01) < own.size
     doubted = ["are predicted to change it by" in text for text in data.verdict_reason.values.tolist()]
     np.testing.assert_array_equal(doubted, own > 0.01)
-    monkeypatch.setattr("stickslip.study.analyses.forced.points.own_error", lambda *_: float("nan"))
+    monkeypatch.setattr("stickslip.study.analyses.forced_response.points.own_error", lambda *_: float("nan"))
     data = dataset(solved(asked))
     assert np.all(data.verdict.values >= 1)
     assert data.verdict_reason[0].item().startswith("its harmonics were not examined")
@@ -450,7 +450,7 @@ def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(monkeypatc
         raise SingularError("static equilibrium: coordinate x is held by nothing")
         yield
 
-    monkeypatch.setattr("stickslip.study.analyses.forced_response.forced_response", fails)
+    monkeypatch.setattr("stickslip.study.analyses.forced_response.analysis.forced_response", fails)
     asked = lifted()
     with JobJournal(Path(":memory:"), ForcedPoint) as journal:
         with pytest.raises(SingularError, match="held by nothing"):

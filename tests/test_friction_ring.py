@@ -9,7 +9,7 @@ from small_v2 import EXAMPLES, changed
 from test_cli import done
 
 from evidence.validation.case_b9_friction_ring import FREQUENCIES, HARMONICS
-from stickslip.front.result import Result
+from stickslip.api.result import Result
 
 EXAMPLE = (EXAMPLES / "friction_ring" / "study.toml").read_text()
 SECTORS = 24

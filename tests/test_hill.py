@@ -23,7 +23,7 @@ from stickslip.response.stability.contact_tangent import contact_tangents
 from stickslip.response.stability.hill_segment import Segment
 from stickslip.response.system import System
 from stickslip.solve.status import Status
-from stickslip.study.keep.archive import decode, encode
+from stickslip.study.store.archive import decode, encode
 
 
 def random_motion(law, seed):

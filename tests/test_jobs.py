@@ -18,15 +18,15 @@ from toy_analysis import ToyStudy
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
 from stickslip.study.analyses import ANALYSES
-from stickslip.study.keep import folder as keep_folder
-from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behind
-from stickslip.study.keep.cell import Cell, Ended, Limits, OutOfTime, Stopped
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.journal import JobJournal, read_sealed
-from stickslip.study.keep.watch import solve_far, watched
-from stickslip.study.keep.workers import check_kind, executor
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
+from stickslip.study.store import folder as keep_folder
+from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.journal import JobJournal, read_sealed
+from stickslip.study.store.watch import solve_far, watched
+from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped
+from stickslip.study.store.workers import check_kind, executor
 
 
 @pytest.fixture(autouse=True)
@@ -248,7 +248,7 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
         run_study(study, kind="slrum")
     with pytest.raises(InputError, match="does not say where the scheduler is"):
         check_kind("dask")
-    monkeypatch.setattr("stickslip.study.keep.workers.find_spec", lambda _name: None)
+    monkeypatch.setattr("stickslip.study.store.workers.find_spec", lambda _name: None)
     with pytest.raises(StickslipError, match=r"distributed: not installed\. Use: pip install 'stickslip\[cluster\]'"):
         run_study(study, kind="dask=tcp://127.0.0.1:1")
     with pytest.raises(StickslipError, match="executorlib: not installed"):

@@ -15,8 +15,8 @@ from stickslip.errors import InputError
 from stickslip.model.checksum import with_checksum
 from stickslip.solve.status import Status
 from stickslip.study.analyses.analysis import Pieces
-from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
-from stickslip.study.keep.journal import JobJournal, read_note, read_sealed
+from stickslip.study.store.archive import decode, decode_record, encode, encode_record
+from stickslip.study.store.journal import JobJournal, read_note, read_sealed
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ KILLED = """
 import os, signal, sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
-from stickslip.study.keep.journal import JobJournal
+from stickslip.study.store.journal import JobJournal
 from test_journal import Point, point
 with JobJournal(Path(sys.argv[1]), Point) as journal:
     journal.add(point(0))

@@ -25,11 +25,11 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import factorise
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses
 from stickslip.harmonic.structured import HarmonicFactors, StructuredJacobian, real_matrix
-from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.operators import Bordered, Costs, array_of

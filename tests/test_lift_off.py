@@ -18,8 +18,8 @@ from stickslip.response.forced.response import Sweep, forced_problem, forced_res
 from stickslip.response.time.repeating import Repetition, repetition
 from stickslip.response.time.step_choice import ROUGH
 from stickslip.solve.status import Rung, Status
-from stickslip.study.analyses.forced.not_periodic import without_periodic
-from stickslip.study.analyses.forced.rules import unsolved
+from stickslip.study.analyses.forced_response.not_periodic import without_periodic
+from stickslip.study.analyses.forced_response.rules import unsolved
 
 OMEGA = 2.0 * np.pi * 1067.0
 

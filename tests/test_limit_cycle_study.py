@@ -14,12 +14,12 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.report.page import plots
 from stickslip.report.sections.limit_cycle import Cycles, cycle_table
-from stickslip.study.analyses.cycles.solve import _without
-from stickslip.study.analyses.cycles.time import compete
-from stickslip.study.analyses.cycles.words import case_verdicts
-from stickslip.study.analyses.limit_cycle import LIMIT_CYCLE
-from stickslip.study.keep.journal import JobJournal
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.analyses.limit_cycle.analysis import LIMIT_CYCLE
+from stickslip.study.analyses.limit_cycle.solve import _without
+from stickslip.study.analyses.limit_cycle.time import compete
+from stickslip.study.analyses.limit_cycle.verdicts import case_verdicts
+from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.netcdf import one_case
 
 B13 = (
     JENKINS.replace("0.02]]", "-0.1]]").replace("force_n = 0.1", "force_n = 1.0")

@@ -20,8 +20,8 @@ from stickslip.contact.neighbours import neighbour_gaps
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import TravellingStiffness, condense_side
 from stickslip.harmonic.wave_condensation import ModalWave, SolvedWave, condense_wave
 from stickslip.model.dofs import modal_dofs

@@ -8,10 +8,10 @@ from test_rivals import HZ, ORDER, errors, jacobian, residual, response, rows_of
 
 import stickslip as ss
 from evidence.models.lumped import blades_and_damper
-from stickslip.harmonic.local import LocalBalance
+from stickslip.harmonic.harmonic_set import joined, kept_by_dof, of_all, supports_of
+from stickslip.harmonic.harmonics_per_dof import LocalBalance
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.maple import Maple
-from stickslip.harmonic.support import joined, kept_by_dof, of_all, supports_of
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 

@@ -29,7 +29,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.deviations import Blade, blade_alone, blade_alone_hz
 from stickslip.assembly.mistuned import changed
-from stickslip.assembly.shares import at_rest
+from stickslip.assembly.point_laws import at_rest
 from stickslip.assembly.wheel_modes import wheel_modes
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError

@@ -9,7 +9,7 @@ from stickslip.assembly.mistuned import listed, of_all
 from stickslip.report.forced.curves import frequency_response
 from stickslip.report.forced.head import cards
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.curve import Curve, peak_output
+from stickslip.study.analyses.forced_response.curve import Curve, peak_output
 
 BLADES = [f"tip[{n}].x" for n in range(3)]
 

@@ -21,7 +21,7 @@ from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.stages import flange_doubts, unreached
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.store.netcdf import one_case
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_stages"
 PLANE = 0.1  # m, of the flange

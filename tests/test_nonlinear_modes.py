@@ -24,19 +24,19 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.vector_forces import known_by_vectors
 from stickslip.model.matrices import lumped
 from stickslip.report.page import plots
-from stickslip.response.at_rest import holding, opening
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
+from stickslip.response.static_contact_state import holding, opening
 from stickslip.response.system import System
-from stickslip.study.analyses.backbones.records import ModeRecord
-from stickslip.study.analyses.backbones.words import case_verdicts
+from stickslip.study.analyses.nonlinear_mode.records import ModeRecord
+from stickslip.study.analyses.nonlinear_mode.verdicts import case_verdicts
 from stickslip.study.check import check_study
-from stickslip.study.keep.journal import JobJournal
-from stickslip.study.keep.netcdf import one_case
-from stickslip.study.keep.progress import Interrupted
+from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.netcdf import one_case
+from stickslip.study.store.progress import Interrupted
 
 
 def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, HarmonicLoad]:

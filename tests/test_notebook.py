@@ -4,9 +4,9 @@ import logging
 
 import pytest
 
-from stickslip.front.notebook import NotebookScreen, in_notebook
-from stickslip.front.screen import on_screen
-from stickslip.study.keep.progress import LOG, advance, at_work, tell
+from stickslip.api.notebook import NotebookScreen, in_notebook
+from stickslip.api.screen import on_screen
+from stickslip.study.store.progress import LOG, advance, at_work, tell
 
 
 class Output:

@@ -17,17 +17,17 @@ from fault_readers import samples
 from small_v2 import write_four_masses
 from test_readers_ansys import cube
 
+from stickslip.api.result import Result
 from stickslip.errors import InputError, StickslipError
-from stickslip.front.result import Result
 from stickslip.model import load_structure
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.netcdf import attributes_there, write_tree
-from stickslip.study.keep.progress import LOG, written_down
-from stickslip.study.keep.provenance import as_text
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.netcdf import attributes_there, write_tree
+from stickslip.study.store.progress import LOG, written_down
+from stickslip.study.store.provenance import as_text
 
 SUFFIXES = (".inp", ".inp.gz", ".cdb", ".npz", ".mtx", ".mtx.gz", ".sti", ".h5", ".frd", ".full", ".rst", ".op2")
 
@@ -122,7 +122,7 @@ def test_a_full_disk_or_quota_is_no_reason_to_delete_anything(
     def full(*_words: object, **_named: object) -> None:
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr("stickslip.study.keep.folder.os.fsync", full)
+    monkeypatch.setattr("stickslip.study.store.folder.os.fsync", full)
     with pytest.raises(InputError) as caught, locked_folder(tmp_path):
         pass
     assert words in str(caught.value)
@@ -136,11 +136,11 @@ def test_a_limit_that_sqlite_meets_is_no_reason_to_delete_its_file(tmp_path: Pat
 import resource, signal, sys
 from pathlib import Path
 import numpy as np
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.netcdf import attributes_there, write_tree
-from stickslip.study.keep.progress import LOG, written_down
-from stickslip.study.keep.provenance import as_text
-from stickslip.study.keep.journal import JobJournal
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.netcdf import attributes_there, write_tree
+from stickslip.study.store.progress import LOG, written_down
+from stickslip.study.store.provenance import as_text
+from stickslip.study.store.journal import JobJournal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 if {what!r} == "lock":
     resource.setrlimit(resource.RLIMIT_FSIZE, (1, 1))

@@ -10,12 +10,12 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done
 
+from stickslip.api.result import Result
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.forces import first_nodes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
-from stickslip.front.result import Result
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.axis import Axis
 from stickslip.model.damping import rayleigh_damping

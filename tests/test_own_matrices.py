@@ -12,8 +12,8 @@ import scipy.sparse
 from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
+from stickslip.api.result import Result
 from stickslip.errors import InputError
-from stickslip.front.result import Result
 from stickslip.model.modes import lowest_modes
 from stickslip.study.models.study import read_study
 

@@ -18,7 +18,7 @@ from stickslip.model.damping import Damping
 from stickslip.response.physics.damper import complex_stiffness, damped_modes
 from stickslip.response.physics.friction import friction_of
 from stickslip.response.physics.modes import Range, RangeMode, range_modes, springs_of
-from stickslip.study.keep.progress import LOG
+from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
 
 STIFFNESS = 1e4 * np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])

@@ -10,15 +10,15 @@ from small_v2 import EXAMPLES, changed, write_two_blades
 from test_assembly_wheel import LAW, SECTORS, SPEED, STEEL, answered, shrouded_sector, whole_wheel
 from test_cli import done, refused
 
+from stickslip.api.result import Result
 from stickslip.assembly import wheel
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
-from stickslip.assembly.placing import place_of, placed_body
+from stickslip.assembly.part_copies import place_of, placed_body
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
-from stickslip.front.result import Result
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.modes import natural_frequencies

@@ -23,23 +23,23 @@ from stickslip.response.bifurcations.side_branch import CLOSES
 from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.solve.status import Status
-from stickslip.study.analyses.backbones.dataset import dataset as of_modes
-from stickslip.study.analyses.backbones.records import END, ModeRecord
-from stickslip.study.analyses.cycles.dataset import dataset as of_cycles
-from stickslip.study.analyses.cycles.records import CycleBranch
-from stickslip.study.analyses.motions.dataset import dataset as of_motions
-from stickslip.study.analyses.motions.dataset import noted
-from stickslip.study.analyses.resonances.dataset import dataset as of_resonances
-from stickslip.study.analyses.running import values
-from stickslip.study.analyses.running.fast import name_of
-from stickslip.study.analyses.running.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
-from stickslip.study.analyses.running.values import dataset as of_run_up
-from stickslip.study.analyses.synthesis.dataset import dataset as of_synthesis
-from stickslip.study.analyses.synthesis.records import SynthesisLevel
-from stickslip.study.analyses.tractions.dataset import dataset as of_tractions
-from stickslip.study.analyses.tractions.records import TractionRecord
-from stickslip.study.analyses.two_frequencies.dataset import dataset as of_two_frequencies
-from stickslip.study.analyses.two_frequencies.records import TwoFrequencies
+from stickslip.study.analyses.all_motions.dataset import dataset as of_motions
+from stickslip.study.analyses.all_motions.dataset import noted
+from stickslip.study.analyses.limit_cycle.dataset import dataset as of_cycles
+from stickslip.study.analyses.limit_cycle.records import CycleBranch
+from stickslip.study.analyses.modal_synthesis.dataset import dataset as of_synthesis
+from stickslip.study.analyses.modal_synthesis.records import SynthesisLevel
+from stickslip.study.analyses.nonlinear_mode.dataset import dataset as of_modes
+from stickslip.study.analyses.nonlinear_mode.records import END, ModeRecord
+from stickslip.study.analyses.quasi_periodic.dataset import dataset as of_two_frequencies
+from stickslip.study.analyses.quasi_periodic.records import TwoFrequencies
+from stickslip.study.analyses.residual_tractions.dataset import dataset as of_tractions
+from stickslip.study.analyses.residual_tractions.records import TractionRecord
+from stickslip.study.analyses.resonance.dataset import dataset as of_resonances
+from stickslip.study.analyses.run_up import values
+from stickslip.study.analyses.run_up.fast import name_of
+from stickslip.study.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
+from stickslip.study.analyses.run_up.values import dataset as of_run_up
 from stickslip.study.analyses.waves.about import STATIC, skin_note, told
 from stickslip.study.analyses.waves.about import _static as static_numbers
 from stickslip.study.analyses.waves.of_wheel import variables as of_wheel

@@ -14,8 +14,8 @@ from browser import CHROMIUM, Browser
 from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
+from stickslip.api.model import Model
 from stickslip.errors import InputError
-from stickslip.front.model import Model
 from stickslip.report.content import Table
 from stickslip.report.forced.bodies import body_motion, rigid_bodies
 from stickslip.report.forced.choice import choice, flagged_ranges

@@ -12,11 +12,11 @@ from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.report.page import plots
 from stickslip.study.analyses.analysis import Case
-from stickslip.study.analyses.residual_tractions import RESIDUAL_TRACTIONS
-from stickslip.study.keep.journal import JobJournal
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.netcdf import one_case
 
 KEYS = {
     "vary.load.shaker.force_n": "[2.0, 3.0, 5.0]",

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from study_texts import DETACHED, JENKINS, answered, study_of
 
+from stickslip.api.study import Study
 from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import InputError
-from stickslip.front.study import Study
 from stickslip.report.sections.resonance import Peaks, amplitudes, peak_table
-from stickslip.study.analyses.resonance import RESONANCE
-from stickslip.study.analyses.resonances.words import case_verdicts
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.analyses.resonance.analysis import RESONANCE
+from stickslip.study.analyses.resonance.verdicts import case_verdicts
+from stickslip.study.store.netcdf import one_case
 
 B3 = (
     JENKINS.replace("slip_limit_n = 0.1", "slip_limit_n = 0.2")

@@ -12,20 +12,20 @@ from stickslip.contact.interface import sparse_rows
 from stickslip.contact.law import PAIRS
 from stickslip.contact.product import harmonic_means, less_means
 from stickslip.harmonic import balance as balance_module
-from stickslip.harmonic import resting as resting_module
 from stickslip.harmonic import structured as structured_module
+from stickslip.harmonic import stuck_contact_elimination as resting_module
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import Condensed, condense
 from stickslip.harmonic.matrix_products import MatrixProducts
-from stickslip.harmonic.resting import Resting, TransposedElimination, known
 from stickslip.harmonic.structured import StructuredJacobian
+from stickslip.harmonic.stuck_contact_elimination import Resting, TransposedElimination, known
 from stickslip.operators import Bordered, Costs, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.eliminated import BorderedElimination, Reduced, reduced_factors
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Assembled, Dense, factorised, factors_of
 from stickslip.solve.newton_method import Newton
+from stickslip.solve.schur import BorderedElimination, Reduced, reduced_factors
 
 KINDS = ("rests", "static", "tangents", "all")
 

@@ -24,7 +24,7 @@ STOPS = {signal.SIGINT: "  point 6:", signal.SIGKILL: "  point 22:"}
 SCRIPT = """
 import logging, signal, sys
 from pathlib import Path
-from stickslip.study.keep.progress import Interrupted
+from stickslip.study.store.progress import Interrupted
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from evidence.strategies.compare import compared
 from evidence.strategies.page import page
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.jaumouille import Jaumouille, strain_energy
@@ -27,7 +28,6 @@ from stickslip.harmonic.selection.strategy import ErrorMeasure, Step, always_kep
 from stickslip.harmonic.selection.suess_jacobian import SuessJacobian, column_norms
 from stickslip.harmonic.selection.suess_spectral import SuessSpectral
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
-from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure
 from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response

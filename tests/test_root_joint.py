@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from small_v2 import changed
 from typer.testing import CliRunner
 
+from stickslip.api.result import Result
 from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
 from stickslip.contact.facets import KINDS
 from stickslip.contact.mortar import mortar_tie
 from stickslip.errors import InputError
-from stickslip.front.result import Result
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.study.models.study import read_study

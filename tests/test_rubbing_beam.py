@@ -9,10 +9,10 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
+from stickslip.api.result import Result
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.forces import force_of
 from stickslip.errors import InputError
-from stickslip.front.result import Result
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.beam import Beam, beam, rotating_beam
 from stickslip.model.fe.solid import Material

@@ -17,12 +17,12 @@ from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.verdict import Verdict, conclusion, of_tree
-from stickslip.study.keep.cell import Limits
-from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.progress import LOG, Interrupted
-from stickslip.study.keep.workers import executor
 from stickslip.study.run import answer, run_study
 from stickslip.study.shard import Shard
+from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.progress import LOG, Interrupted
+from stickslip.study.store.worker_process import Limits
+from stickslip.study.store.workers import executor
 
 HERE = Path(__file__).parent
 

@@ -22,8 +22,8 @@ from stickslip.report.forced.errors import errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.response import Response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.study.analyses import forced_response
-from stickslip.study.analyses.forced.retention import NO_SHIFT
+from stickslip.study.analyses.forced_response import analysis
+from stickslip.study.analyses.forced_response.retention import NO_SHIFT
 from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study
@@ -63,7 +63,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Study:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     # following the peak with less retention costs more than all else here, and is not what is tested
-    monkeypatch.setattr(forced_response, "peak_shift", lambda *_: NO_SHIFT)
+    monkeypatch.setattr(analysis, "peak_shift", lambda *_: NO_SHIFT)
 
 
 def changed(base: Study, harmonics: Mapping[str, object], folder: str, **sweep: object) -> Study:
@@ -191,7 +191,7 @@ def test_odd_harmonics_alone_are_solved_and_shown(base: Study) -> None:
 
 def check(study: Study) -> list[str]:
     (case,) = study.cases()
-    return list(forced_response.FORCED_RESPONSE.check(case, case.build()))
+    return list(analysis.FORCED_RESPONSE.check(case, case.build()))
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_error_is_taken_where_the_study_says(base: Study, over: object) -> None:
     mixed = "WARNING: harmonics.alert_over mixes rotations (damper.rx) with displacements (tip1.x, damper.z)"
     assert any(x.startswith(mixed) for x in said) == ("damper.rx" in over)
     (case,) = study.cases()
-    model = forced_response.FORCED_RESPONSE.inputs(case, case.build()).model
+    model = analysis.FORCED_RESPONSE.inputs(case, case.build()).model
     labels = np.array(model.system.structure.dofs.labels)
     assert model.system.alert_dofs is not None
     assert [x.rpartition(".")[2] for x in labels[model.system.alert_dofs]] == [

@@ -8,9 +8,9 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.solve.branch import Following, StepControl, reversed_point
+from stickslip.solve.branch_events import FOLD, Mark, located
 from stickslip.solve.continuation import advance, start_point, trace
 from stickslip.solve.linear import Dense
-from stickslip.solve.marks import FOLD, Mark, located
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Rung, Status
 

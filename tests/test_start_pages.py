@@ -9,8 +9,8 @@ import pytest
 from small_v2 import SECTOR_DECK, _written, write_four_masses
 from typer.testing import CliRunner
 
+from stickslip.api.study import Study
 from stickslip.cli import app
-from stickslip.front.study import Study
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.study.analyses import ANALYSES
 

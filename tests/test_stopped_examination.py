@@ -13,11 +13,11 @@ from test_flutter_wheel import forced
 from stickslip.response.stability import hill_stability
 from stickslip.response.stability.hill_segment import NODES, Segment
 from stickslip.study.analyses import analysis
-from stickslip.study.analyses.forced import looked
-from stickslip.study.analyses.forced.bifurcating import Remembered
-from stickslip.study.analyses.forced.looked import Looked
-from stickslip.study.analyses.forced.stable import Examined, as_note
-from stickslip.study.keep.archive import decode, encode
+from stickslip.study.analyses.forced_response import looked
+from stickslip.study.analyses.forced_response.bifurcating import Remembered
+from stickslip.study.analyses.forced_response.looked import Looked
+from stickslip.study.analyses.forced_response.stable import Examined, as_note
+from stickslip.study.store.archive import decode, encode
 from stickslip.units import HZ
 
 

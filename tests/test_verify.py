@@ -11,14 +11,14 @@ from small_v2 import changed, write_four_masses, write_shrouded_sector, write_tw
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult
-from stickslip.study.analyses.forced import in_time, with_stability
-from stickslip.study.analyses.forced.comparison import STEPS, Check
-from stickslip.study.analyses.forced.in_time import check_in_time, chosen, refined
-from stickslip.study.analyses.forced.points import Response, collect
-from stickslip.study.analyses.forced.question import Question
-from stickslip.study.analyses.forced_response import FORCED_RESPONSE
-from stickslip.study.keep.journal import JobJournal
+from stickslip.study.analyses.forced_response import in_time, with_stability
+from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.study.analyses.forced_response.comparison import STEPS, Check
+from stickslip.study.analyses.forced_response.in_time import check_in_time, chosen, refined
+from stickslip.study.analyses.forced_response.points import Response, collect
+from stickslip.study.analyses.forced_response.problem import Question
 from stickslip.study.models.study import read_study
+from stickslip.study.store.journal import JobJournal
 
 CHECK = Check(frequency_hz=180.0, balance=1.02e-3, transient=1.0e-3, settled=True, periods=90, order=5)
 

@@ -28,10 +28,10 @@ from stickslip.study.analyses.analysis import named
 from stickslip.study.analyses.verdict import stored
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.solve import Question, solve_wave
-from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
 from stickslip.study.run import answer, run_study
+from stickslip.study.store.netcdf import one_case
 from stickslip.units import RPM
 
 STEEL = """

@@ -16,8 +16,8 @@ import xarray as xr
 from stickslip.errors import SingularError, input_error
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.keep.netcdf import stacked, variable
-from stickslip.study.keep.progress import LOG, advance
+from stickslip.study.store.netcdf import stacked, variable
+from stickslip.study.store.progress import LOG, advance
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from stickslip.harmonic import structured
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.resting import coupling
+from stickslip.harmonic.stuck_contact_elimination import coupling
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep

@@ -12,15 +12,20 @@ import numpy as np
 
 from evidence.models.two_blades import two_blades
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.ladder import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, peak_with_others, with_others
 from stickslip.response.nonlinear_modes.more_points import refined
-from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
+from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
+from stickslip.response.nonlinear_modes.single_mode_validity import (
+    isolation,
+    other_modes,
+    peak_with_others,
+    with_others,
+)
 from stickslip.response.nonlinear_modes.synthesis import synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
-from stickslip.study.analyses.synthesis.solve import DOUBTFUL, TRUSTED
+from stickslip.response.starting_solutions import plain_sweep
+from stickslip.study.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 
 COARSER = 2.0
 RATIOS = np.geomspace(250.0, 20.0, 20)  # pull over excitation

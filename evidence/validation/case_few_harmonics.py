@@ -16,7 +16,7 @@ from evidence.benchmarks.robustness import OutOfTimeError, at_most
 from evidence.models.random_motions import as_solved, random_motion
 from evidence.models.solving import solve
 from evidence.validation.compare import Record, record
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.response.stability import stability
 

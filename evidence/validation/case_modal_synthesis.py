@@ -18,16 +18,16 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, peak_with_others
 from stickslip.response.nonlinear_modes.more_points import refined
-from stickslip.response.nonlinear_modes.one_mass import modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
+from stickslip.response.nonlinear_modes.sdof_oscillator import modal_oscillator
+from stickslip.response.nonlinear_modes.single_mode_validity import isolation, other_modes, peak_with_others
 from stickslip.response.nonlinear_modes.synthesis import resonances, synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.system import System
-from stickslip.study.analyses.synthesis.solve import DOUBTFUL, TRUSTED
+from stickslip.study.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 
 CASE = "Nonlinear modal synthesis"
 SOURCE = "peaks tracked with the same harmonics"

@@ -25,8 +25,8 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import ModePoint, mode_point
-from stickslip.response.nonlinear_modes.levels import ModeCurve
-from stickslip.response.nonlinear_modes.measure import Phase, by_energy
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
+from stickslip.response.nonlinear_modes.modal_amplitude import Phase, by_energy
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions

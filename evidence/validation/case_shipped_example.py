@@ -10,7 +10,7 @@ import numpy as np
 
 from evidence.models.two_blades import SHIPPED
 from evidence.validation.compare import Record, record
-from stickslip.front.study import Study
+from stickslip.api.study import Study
 
 CASE = "Two blades and a damper, as shipped"
 TOLERANCE = 0.01

@@ -7,6 +7,10 @@ from . import model as model
 from . import reduction as reduction
 from . import response as response
 from . import solve as solve
+from .api.comparison import compare as compare
+from .api.model import Model as Model
+from .api.result import Result as Result
+from .api.study import Study as Study
 from .assembly.contact import Contact as Contact
 from .assembly.contact import Join as Join
 from .assembly.load import Load as Load
@@ -27,10 +31,6 @@ from .contact.laws.unilateral_spring import UnilateralSpring as UnilateralSpring
 from .errors import InputError as InputError
 from .errors import SingularError as SingularError
 from .errors import StickslipError as StickslipError
-from .front.comparison import compare as compare
-from .front.model import Model as Model
-from .front.result import Result as Result
-from .front.study import Study as Study
 from .harmonic.excitation import HarmonicLoad as HarmonicLoad
 from .model.fe.solid import Material as Material
 from .model.mesh.blade_pair import BladePair as BladePair

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import typer
 
 from stickslip import __version__
+from stickslip.api.output import TRACEBACK, output_that_may_fail, unforeseen
+from stickslip.api.printed import console, say, say_answers, say_columns, say_lines, say_table
+from stickslip.api.reading import read
+from stickslip.api.screen import Screen, on_screen
 from stickslip.errors import InputError, StickslipError, input_error
-from stickslip.front.output import TRACEBACK, output_that_may_fail, unforeseen
-from stickslip.front.printed import console, say, say_answers, say_columns, say_lines, say_table
-from stickslip.front.reading import read
-from stickslip.front.screen import Screen, on_screen
 
 FILES_TOLD = 4  # of an export
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -132,7 +132,7 @@ def new(name: Annotated[Path, typer.Argument(help="A folder to make.")], *, kind
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
         from stickslip.study.file.example import example_text
-        from stickslip.study.keep.whole import unwritable, write_whole
+        from stickslip.study.store.atomic_write import unwritable, write_whole
 
         target = name / "study.toml"
         if os.path.lexists(target):
@@ -182,7 +182,7 @@ def export(
 ) -> None:
     """Write how every node and contact moves, for ParaView and other programs."""
     with _errors_as_text():
-        from stickslip.front.result import Result
+        from stickslip.api.result import Result
 
         with on_screen(Screen(console())):
             files = Result.open(result).export(
@@ -221,7 +221,7 @@ def compare(
 ) -> None:
     """Hold designs against each other: peaks, responses, optimisation curves, modes and inputs on one page."""
     with _errors_as_text():
-        from stickslip.front.comparison import compare as compared_designs
+        from stickslip.api.comparison import compare as compared_designs
 
         found = compared_designs(*compared, names=name or ())
         for title, table in (("Peaks", found.peaks), ("What differs", found.inputs)):
@@ -298,8 +298,8 @@ def fit(
 def compile_() -> None:
     """Compile contact laws and time steps, once an installation; otherwise the first runs do, for a minute or two."""
     with _errors_as_text():
-        from stickslip.response.ahead import compile_ahead
-        from stickslip.study.keep.threads import one_blas_thread
+        from stickslip.response.precompile import compile_ahead
+        from stickslip.study.store.threads import one_blas_thread
 
         one_blas_thread()
         for done in compile_ahead(os.cpu_count() or 1):

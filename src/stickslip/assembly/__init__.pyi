@@ -13,6 +13,6 @@ from .mistuning import Mistuning as Mistuning
 from .mistuning import OwnSector as OwnSector
 from .mistuning import pattern as pattern
 from .model import Model as Model
-from .placing import copy_of as copy_of
-from .placing import place_of as place_of
+from .part_copies import copy_of as copy_of
+from .part_copies import place_of as place_of
 from .pressure import PressureField as PressureField

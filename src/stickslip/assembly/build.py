@@ -9,22 +9,22 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.asked import Asked, asked, centrifugal_of_bodies, excitation, static_forces
+from stickslip.assembly.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
+from stickslip.assembly.contact_point_coordinates import in_points
 from stickslip.assembly.coordinates import coordinates
-from stickslip.assembly.flow import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
-from stickslip.assembly.held import held_warnings
-from stickslip.assembly.joined import KEY, on_shapes
+from stickslip.assembly.interface_modes import KEY, on_shapes
+from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.pairs import Pairs
-from stickslip.assembly.places import picked, stacked
-from stickslip.assembly.points import in_points
-from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
+from stickslip.assembly.response_request import Asked, asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps
+from stickslip.assembly.static_equilibrium_check import refuse_pulled
+from stickslip.assembly.unconstrained_bodies import held_warnings
+from stickslip.assembly.unreduced import as_it_is, refuse_rigid
 from stickslip.assembly.waves import reduced_sector
-from stickslip.assembly.whole import as_it_is, refuse_rigid
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
 from stickslip.errors import input_error
@@ -34,8 +34,8 @@ from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.waves import excited_wave, wave
-from stickslip.response.at_rest import pressed_by, static_contact_force
 from stickslip.response.equilibrium import preload
+from stickslip.response.static_contact_state import pressed_by, static_contact_force
 from stickslip.response.system import System
 
 MODES = 10  # natural frequencies compared

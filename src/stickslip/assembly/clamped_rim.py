@@ -3,7 +3,7 @@
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.assembly.places import Places, Spot
+from stickslip.assembly.locations import Places, Spot
 from stickslip.contact.facets import centres, normals
 from stickslip.contact.surface import SMOOTH, Surface
 from stickslip.model.mesh.mesh_facets import facets_of

@@ -7,9 +7,9 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.mistuning import BladeMistuning, OwnSector
 from stickslip.assembly.model import Model
-from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.reduced import at_speed, damped
 from stickslip.assembly.wheel import faces_of, leaders, own_and_onward
 from stickslip.errors import input_error

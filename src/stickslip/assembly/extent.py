@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.assembly.asked import asked
 from stickslip.assembly.model import Model
+from stickslip.assembly.response_request import asked
 from stickslip.model.facts import facts_of_part
 from stickslip.model.fe.solid import Material
 from stickslip.model.part import Part

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.load import Load, Output
-from stickslip.assembly.places import AXES, COMPONENTS, Places, Spot
+from stickslip.assembly.locations import AXES, COMPONENTS, Places, Spot
 from stickslip.errors import did_you_mean, input_error
 
 # what says that the error of missing harmonics is that of the answer: all outputs, each as a vector

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.places import NO_FACETS, Spot
+from stickslip.assembly.locations import NO_FACETS, Spot
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error

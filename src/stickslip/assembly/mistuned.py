@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.assembly.asked import Asked, asked, excitation
+from stickslip.assembly.aero_forces import about_static_state
 from stickslip.assembly.assembled import Assembled, Blades
 from stickslip.assembly.build import (
     Linear,
@@ -21,15 +21,15 @@ from stickslip.assembly.build import (
 )
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.deviations import Deviation, deviations
-from stickslip.assembly.flow import about_static_state
-from stickslip.assembly.held import held_warnings
+from stickslip.assembly.locations import picked
 from stickslip.assembly.mistuning import ContactMistuning
 from stickslip.assembly.model import Model
 from stickslip.assembly.pairs import Pairs
-from stickslip.assembly.places import picked
+from stickslip.assembly.point_laws import at_rest
 from stickslip.assembly.reduced import Store
+from stickslip.assembly.response_request import Asked, asked, excitation
 from stickslip.assembly.rigid import refuse_mixed_gaps
-from stickslip.assembly.shares import at_rest
+from stickslip.assembly.unconstrained_bodies import held_warnings
 from stickslip.assembly.waves import SectorWaves, sector_waves
 from stickslip.assembly.wheel import ReducedSector, wheel_of
 from stickslip.contact.interface import Interface
@@ -44,7 +44,7 @@ from stickslip.reduction.mistuned import MistunedWheel, mistuned_wheel
 from stickslip.reduction.sectors import circulant, couplings, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
-from stickslip.response.at_rest import pressed_by
+from stickslip.response.static_contact_state import pressed_by
 from stickslip.response.system import System
 
 RELATIVE = {

@@ -12,18 +12,18 @@ from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
-from stickslip.assembly.facing import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
+from stickslip.assembly.free_bodies import without_bodies
 from stickslip.assembly.load import Load, Output
-from stickslip.assembly.loose import without_bodies
+from stickslip.assembly.locations import Places
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
-from stickslip.assembly.places import Places
 from stickslip.assembly.reduced import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.shared_rotation import joined_displacements
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.stages import is_staged, stages_of
 from stickslip.assembly.statics import StaticState, static_state
+from stickslip.assembly.surface_checks import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.ties import Ties, tie_joins
 from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb

@@ -9,7 +9,10 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
-from stickslip.assembly.facing import (
+from stickslip.assembly.frames import direction, normals_of, whole, with_normals
+from stickslip.assembly.locations import AXES, NO_FACETS, Places, Spot
+from stickslip.assembly.point_laws import at_rest, shared
+from stickslip.assembly.surface_checks import (
     flat_warning,
     named,
     overlap_warning,
@@ -23,9 +26,6 @@ from stickslip.assembly.facing import (
     with_hint,
     with_pairing,
 )
-from stickslip.assembly.frames import direction, normals_of, whole, with_normals
-from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
-from stickslip.assembly.shares import at_rest, shared
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.pairing import Pairing, node_to_node, node_to_segment, segment_to_segment
 from stickslip.contact.surface import Surface

@@ -8,8 +8,8 @@ import scipy
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.clamped_rim import with_rim
-from stickslip.assembly.facing_field import Feet, between_sides, nearest, on_sides, unit_normals
-from stickslip.assembly.places import Places, Spot
+from stickslip.assembly.locations import Places, Spot
+from stickslip.assembly.pressure_mapping import Feet, between_sides, nearest, on_sides, unit_normals
 from stickslip.contact.facets import corner_counts, interpolation, normals, positions
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error

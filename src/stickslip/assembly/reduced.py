@@ -8,8 +8,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.places import node_rows
-from stickslip.assembly.placing import turned_dofs, turned_structure
+from stickslip.assembly.locations import node_rows
+from stickslip.assembly.part_copies import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs

@@ -5,7 +5,7 @@ import scipy
 
 from stickslip.arrays import IntArray
 from stickslip.assembly.coordinates import Coordinates
-from stickslip.assembly.places import Places, picked
+from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.reduced import Steady, steady_of
 from stickslip.assembly.ties import Ties
 from stickslip.assembly.wheel import Neighbours

@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.assembly.assembled import Skin
-from stickslip.assembly.places import AXES, Places
+from stickslip.assembly.locations import AXES, Places
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 

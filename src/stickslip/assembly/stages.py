@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.assembly.contact import ALONE, NEXT, SPATIAL, Join
-from stickslip.assembly.places import Places
+from stickslip.assembly.locations import Places
 from stickslip.assembly.wheel import faces_of
 from stickslip.errors import input_error
 from stickslip.reduction.coupled_stages import Flange, Multistage, multistage

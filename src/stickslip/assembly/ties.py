@@ -8,9 +8,9 @@ import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import ALONE, SPATIAL, Join
-from stickslip.assembly.facing import named
+from stickslip.assembly.locations import NO_FACETS, Places, Spot, picked
 from stickslip.assembly.pairs import Turn, match, sides
-from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
+from stickslip.assembly.surface_checks import named
 from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error

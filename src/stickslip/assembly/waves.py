@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.aero_forces import Flow
 from stickslip.assembly.coordinates import Coordinates
-from stickslip.assembly.flow import Flow
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import (

@@ -8,10 +8,10 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
+from stickslip.assembly.locations import Places, picked, stacked
+from stickslip.assembly.nonmatching_cyclic_faces import unlike_faces
 from stickslip.assembly.pairs import Pairs, Turn
-from stickslip.assembly.places import Places, picked, stacked
 from stickslip.assembly.ties import MEAN, Ties
-from stickslip.assembly.unlike_faces import unlike_faces
 from stickslip.assembly.wave_damping import DampingOfParts
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
-from stickslip.assembly.asked import Asked
 from stickslip.assembly.build import holding_points
 from stickslip.assembly.forces import output_labels
 from stickslip.assembly.mistuned import AllSectors, all_sectors, pairs_of_all
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.reduced import Store, in_memory
+from stickslip.assembly.response_request import Asked
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.modes import normal_modes, with_springs

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.hysteresis_fit_warnings import doubts
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.loop_doubts import doubts
 from stickslip.contact.loop_model import RIGID, Loop, LoopModel
 from stickslip.errors import input_error
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.path import forces_along
+from stickslip.contact.prescribed_gap import forces_along
 
 RIGID = 1e6  # times the force's range over that of the displacement: a spring that slips at once
 Loop = tuple[FloatArray, FloatArray]

@@ -18,11 +18,11 @@ from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
 from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import Harmonics, complex_rows, harmonics_of, is_full, real_rows, rows_of
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.matrix_products import matrices, products
 from stickslip.harmonic.sparse_stiffness import SparseStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_form
-from stickslip.harmonic.support import Harmonics, complex_rows, harmonics_of, is_full, real_rows, rows_of
 from stickslip.harmonic.vector_forces import known_by_vectors, linear_force, mass_damping_slope
 from stickslip.operators import Costs
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.matrix_products import MatrixProducts
 from stickslip.harmonic.spectral import Blocks
-from stickslip.harmonic.support import Harmonics
 
 
 @dataclass(frozen=True, eq=False)

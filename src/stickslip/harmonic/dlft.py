@@ -23,11 +23,11 @@ from stickslip.contact.rigid import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, check_retained, harmonic_balance
+from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.penalty import Penalty, dynamic_penalty
 from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
 from stickslip.harmonic.rigid_jacobian import GapLaws, RigidJacobian, RigidLinearisation, derivative
-from stickslip.harmonic.support import Harmonics, harmonics_of
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 

@@ -18,9 +18,9 @@ from stickslip.errors import input_error
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency, onto_interior
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
 from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
-from stickslip.harmonic.support import Harmonics
 from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.harmonic_set import Harmonics
 
 REACH = 3  # highest harmonic of a judging set over the highest that is kept or driven
 SAMPLES_A_HARMONIC = 8  # of the contact forces at least: with fewer, aliasing may hide what acts

@@ -9,9 +9,9 @@ from stickslip.errors import input_error
 from stickslip.harmonic.condensed_product import CondensedProduct, Inner
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.spectral import Blocks
-from stickslip.harmonic.support import Harmonics
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback

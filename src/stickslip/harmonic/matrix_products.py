@@ -8,9 +8,9 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import Harmonics, is_full
 from stickslip.harmonic.linear import DynamicStiffness, Products
 from stickslip.harmonic.small_blocks import SMALL
-from stickslip.harmonic.support import Harmonics, is_full
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.spectral import Blocks
-from stickslip.harmonic.support import Harmonics
 from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.sectors import circulant
 

@@ -17,9 +17,9 @@ from stickslip.harmonic.condensed_product import (
     slope_rows,
 )
 from stickslip.harmonic.factors import with_contacts
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry
 from stickslip.harmonic.spectral import Blocks, Interior
-from stickslip.harmonic.support import Harmonics
 
 
 @dataclass(frozen=True, eq=False)

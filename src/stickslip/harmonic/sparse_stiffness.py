@@ -16,9 +16,9 @@ from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import as_array
 from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import Harmonics, real_rows
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry
 from stickslip.harmonic.sparse_product import SparseMatrices, SparseProduct
-from stickslip.harmonic.support import Harmonics, real_rows
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 

@@ -16,12 +16,12 @@ from stickslip.harmonic.condensed_once import condensed_once
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
 from stickslip.harmonic.mistuned import by_sectors, condense_mistuned
 from stickslip.harmonic.sparse_stiffness import LEAST_SPARSE, Unreduced, keep_all
 from stickslip.harmonic.spectral import Blocks
-from stickslip.harmonic.support import Harmonics
 from stickslip.harmonic.wave_condensation import Array, ModalWave, SolvedWave, WaveAt, condense_wave
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback

@@ -19,7 +19,7 @@ from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
 from stickslip.study.analyses.verdict import Verdict, likewise, of_kinds, worst_first
-from stickslip.study.keep.whole import write_whole
+from stickslip.study.store.atomic_write import write_whole
 
 _CONFIG = {
     "responsive": True,

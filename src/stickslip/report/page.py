@@ -36,7 +36,7 @@ from stickslip.report.sections import (
     safe,
 )
 from stickslip.study.analyses.verdict import conclusion, not_trusted, of_tree
-from stickslip.study.keep.netcdf import alike, one_case
+from stickslip.study.store.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,

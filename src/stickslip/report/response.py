@@ -9,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
-from stickslip.study.analyses.forced.curve import Curve, branch_length, of_largest_blade, peak_output
-from stickslip.study.analyses.forced.quantities import MOTION
-from stickslip.study.analyses.forced.stable_words import said_of
-from stickslip.study.analyses.forced.summary import MEASURED
+from stickslip.study.analyses.forced_response.curve import Curve, branch_length, of_largest_blade, peak_output
+from stickslip.study.analyses.forced_response.quantities import MOTION
+from stickslip.study.analyses.forced_response.stable_words import said_of
+from stickslip.study.analyses.forced_response.summary import MEASURED
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")

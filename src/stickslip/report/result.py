@@ -7,7 +7,7 @@ import xarray as xr
 
 from stickslip.errors import input_error
 from stickslip.model.npz import require_no_pipe
-from stickslip.study.keep.netcdf import read_tree
+from stickslip.study.store.netcdf import read_tree
 
 RESULT = "result.nc"
 

@@ -7,7 +7,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.local import AnyBalance
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.solve.branch import Latest, Problem
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.newton_method import Newton, Solution
@@ -158,7 +158,7 @@ class OneLevel(Curve):
     way
         How its branch is followed.
     begin
-        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: effort, as for `stickslip.response.ladder.without_branch`.
+        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: effort, as for `stickslip.response.starting_solutions.without_branch`.
     """
 
     equation: Problem

@@ -6,8 +6,8 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, IntArray
 from stickslip.errors import input_error
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.selection.adjoint import Goal, contributions, estimate, outputs_of
-from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.contact.frozen import freezable, left_behind, sharing_friction
+from stickslip.contact.frozen_sliders import freezable, left_behind, sharing_friction
 from stickslip.contact.law import ContactLaw, holding_directions
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError, input_error
@@ -15,7 +15,7 @@ from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import as_array, real_part, solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
-from stickslip.harmonic.local import AnyBalance
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.fe.factorisation import factorise
 from stickslip.response.system import System

@@ -8,8 +8,8 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
-from stickslip.harmonic.local import AnyBalance
-from stickslip.solve.rescue import Homotopy
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
+from stickslip.solve.fallbacks import Homotopy
 
 # shares of the excitation at which contacts hardly change: the problem is linear there
 FAINT = (1e-2, 1e-3, 1e-5)

@@ -8,13 +8,13 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
+from stickslip.harmonic.engine_order_line import condense_line
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.travelling import condense_side
-from stickslip.harmonic.turning import condense_line
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_line import SpeedLine

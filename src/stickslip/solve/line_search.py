@@ -1,7 +1,7 @@
 """Newton steps, shortened where they do not help."""
 
 from stickslip.solve.iterate import Iterate, Work
-from stickslip.solve.kink import Kinks
+from stickslip.solve.nonsmooth_step import Kinks
 from stickslip.solve.status import Status
 
 MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step before kinks are stepped across

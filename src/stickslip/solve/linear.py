@@ -18,8 +18,8 @@ from stickslip.operators import (
     array_of,
     transpose_of,
 )
-from stickslip.solve.eliminated import elimination_of, reduced_factors
 from stickslip.solve.factors import lu_factors
+from stickslip.solve.schur import elimination_of, reduced_factors
 
 SOLUTIONS, PRODUCTS = (5, 10)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
 MOST = 8000  # unknowns of an array, which then takes half a GB

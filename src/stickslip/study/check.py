@@ -5,12 +5,12 @@ import math
 import numpy as np
 
 from stickslip.assembly.forces import first_nodes
-from stickslip.assembly.held import unheld
 from stickslip.assembly.model import Model
+from stickslip.assembly.unconstrained_bodies import unheld
 from stickslip.study.analyses.verdict import together
-from stickslip.study.keep.progress import LOG
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
+from stickslip.study.store.progress import LOG
 
 WARNING = "WARNING: "
 

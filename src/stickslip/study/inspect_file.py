@@ -10,7 +10,7 @@ from stickslip.model.facts import facts_of_solid
 from stickslip.model.readers.calculix_deck import Deck
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
-from stickslip.study.keep.progress import LOG
+from stickslip.study.store.progress import LOG
 
 WIDTH = 26  # of the column of names
 # what the arguments of readers are called here

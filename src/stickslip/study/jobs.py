@@ -15,15 +15,15 @@ import numpy as np
 
 from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analyses.analysis import Analysis, Job
-from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behind, new_owner, reached
-from stickslip.study.keep.cell import Limits, blas_threads
-from stickslip.study.keep.folder import token_file
-from stickslip.study.keep.journal import JobJournal
-from stickslip.study.keep.progress import LOG, at_work
-from stickslip.study.keep.provenance import library_versions
-from stickslip.study.keep.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched
-from stickslip.study.keep.workers import Hands
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
+from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind, new_owner, reached
+from stickslip.study.store.folder import token_file
+from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.progress import LOG, at_work
+from stickslip.study.store.provenance import library_versions
+from stickslip.study.store.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched
+from stickslip.study.store.worker_process import Limits, blas_threads
+from stickslip.study.store.workers import Hands
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 LOST = 3  # workers lost at the same place: they may be lost for reasons of their own

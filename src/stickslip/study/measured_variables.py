@@ -4,8 +4,8 @@ from typing import Any
 
 import xarray as xr
 
-from stickslip.study.keep.netcdf import variable
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
+from stickslip.study.store.netcdf import variable
 
 DIM = "measured"
 

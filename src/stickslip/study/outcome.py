@@ -9,15 +9,15 @@ import xarray as xr
 
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
-from stickslip.study.analyses.forced.working_range import with_regimes
+from stickslip.study.analyses.forced_response.working_range import with_regimes
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
-from stickslip.study.keep.journal import read_note, read_sealed
-from stickslip.study.keep.netcdf import variable
-from stickslip.study.keep.progress import tell
-from stickslip.study.keep.provenance import Provenance
-from stickslip.study.keep.watch import ASIDE
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks
+from stickslip.study.store.journal import read_note, read_sealed
+from stickslip.study.store.netcdf import variable
+from stickslip.study.store.progress import tell
+from stickslip.study.store.provenance import Provenance
+from stickslip.study.store.watch import ASIDE
 
 # notes that the runner itself puts down
 UNSOLVED, CHECKED = "no solution", "checks"

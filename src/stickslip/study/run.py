@@ -15,25 +15,25 @@ from time import monotonic
 from typing import Any
 
 from stickslip import __version__
-from stickslip.assembly.facing import TENFOLD
+from stickslip.assembly.surface_checks import TENFOLD
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Job, Solved, named
 from stickslip.study.jobs import Order, solve_job, worked
-from stickslip.study.keep.attempts import file_at_work, new_owner
-from stickslip.study.keep.cell import Limits, check_memory_limit
-from stickslip.study.keep.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
-from stickslip.study.keep.journal import SEALED, JobJournal, read_sealed
-from stickslip.study.keep.netcdf import attributes_there, write_tree
-from stickslip.study.keep.progress import LOG, Interrupted, written_down
-from stickslip.study.keep.provenance import Provenance, as_text, library_versions
-from stickslip.study.keep.store import PartStore
-from stickslip.study.keep.whole import whole_file
-from stickslip.study.keep.workers import Hands, check_kind, executor
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.shard import Shard
+from stickslip.study.store.atomic_write import whole_file
+from stickslip.study.store.attempts import file_at_work, new_owner
+from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
+from stickslip.study.store.journal import SEALED, JobJournal, read_sealed
+from stickslip.study.store.netcdf import attributes_there, write_tree
+from stickslip.study.store.progress import LOG, Interrupted, written_down
+from stickslip.study.store.provenance import Provenance, as_text, library_versions
+from stickslip.study.store.shelf import PartStore
+from stickslip.study.store.worker_process import Limits, check_memory_limit
+from stickslip.study.store.workers import Hands, check_kind, executor
 
 SHARE = 0.1  # of the time that a run may write what is not complete
 

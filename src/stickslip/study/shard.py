@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stickslip.errors import input_error
-from stickslip.study.keep.progress import LOG
 from stickslip.study.outcome import Book, Outcome, Task
+from stickslip.study.store.progress import LOG
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,20 @@ import numpy as np
 
 from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP
-from stickslip.contact.planar.course import ANGLE, CLOSED, COUNT, MODE, STARTED, STATE, Z_X, Z_Y, begin_at, begin_closed
 from stickslip.contact.planar.motion import TINY, X, Y, place
 from stickslip.contact.planar.radau import INNER, PART
+from stickslip.contact.planar.trajectory import (
+    ANGLE,
+    CLOSED,
+    COUNT,
+    MODE,
+    STARTED,
+    STATE,
+    Z_X,
+    Z_Y,
+    begin_at,
+    begin_closed,
+)
 from stickslip.contact.slider import PERIOD
 
 MAX_PERIODS = 400

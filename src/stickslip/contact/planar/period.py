@@ -17,13 +17,13 @@ from stickslip.contact.element import K_T
 from stickslip.contact.event_integrals import add_normal_force, fill_limit
 from stickslip.contact.events import LARGEST, sample_normal
 from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT, TW, WN, WT, WW
-from stickslip.contact.planar.course import course_room, run
 from stickslip.contact.planar.cycle import follow_closings, forgets, settle
 from stickslip.contact.planar.motion import fill_motion, place
 from stickslip.contact.planar.radau import PART
-from stickslip.contact.planar.rows import basis_at, follow_rows, rows_room, to_stick
 from stickslip.contact.planar.samples import sample_plane
+from stickslip.contact.planar.sensitivities import basis_at, follow_rows, rows_room, to_stick
 from stickslip.contact.planar.signatures import FOLLOW_ROWS, RUN
+from stickslip.contact.planar.trajectory import course_room, run
 from stickslip.contact.slider import scratch, zeros
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import product_matrix, search_grid

@@ -4,7 +4,10 @@ import numpy as np
 
 from stickslip.contact.cache import njit
 from stickslip.contact.law import STICK
-from stickslip.contact.planar.course import (
+from stickslip.contact.planar.motion import place
+from stickslip.contact.planar.radau import CROWDED, INNER, NEARLY, POWER
+from stickslip.contact.planar.slip import interpolated
+from stickslip.contact.planar.trajectory import (
     COUNT,
     END,
     FIRST,
@@ -17,9 +20,6 @@ from stickslip.contact.planar.course import (
     START,
     STATE,
 )
-from stickslip.contact.planar.motion import place
-from stickslip.contact.planar.radau import CROWDED, INNER, NEARLY, POWER
-from stickslip.contact.planar.slip import interpolated
 from stickslip.contact.slider import PERIOD
 
 

@@ -4,10 +4,10 @@ from typing import Any
 
 from numba import types
 
-from stickslip.contact.planar.course import Course
 from stickslip.contact.planar.motion import Motion
-from stickslip.contact.planar.rows import Rows
+from stickslip.contact.planar.sensitivities import Rows
 from stickslip.contact.planar.slip import Piece
+from stickslip.contact.planar.trajectory import Course
 
 _line = types.float64[::1]
 _plane = types.float64[:, ::1]

@@ -18,10 +18,10 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import Harmonics, rows_among
 from stickslip.harmonic.selection.alert import silent
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import Harmonics, rows_among
 from stickslip.model.blas_threads import threads_for
 
 Goal = Literal["motion", "amplitude"]

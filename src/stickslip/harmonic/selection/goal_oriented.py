@@ -7,11 +7,11 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray
 from stickslip.errors import check_choice, input_error
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.judging import covers
 from stickslip.harmonic.selection.adjoint import Estimate, Goal, Outputs, contributions, estimate, outputs_of
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import Harmonics
 
 GOALS = 8  # outputs with the largest errors by which harmonics are chosen
 NOTHING = 1e-6  # relative change that is no reason to keep a harmonic

@@ -6,10 +6,10 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.harmonic_set import kept_by_dof, of_all, supports_of
 from stickslip.harmonic.selection.alert import solve_array
 from stickslip.harmonic.selection.spectrum import above, foretold, padded_solution, shares_by_dof, spectral_shares
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import kept_by_dof, of_all, supports_of
 
 
 @dataclass(frozen=True)

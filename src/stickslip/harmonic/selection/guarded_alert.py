@@ -25,12 +25,12 @@ from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.factors import solved, with_contacts
+from stickslip.harmonic.harmonic_set import multiples, rows_among
 from stickslip.harmonic.judging import UNSEEN, covers, judging_balance
 from stickslip.harmonic.selection.adjoint import Factored, factored
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Solve, Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import multiples, rows_among
 
 SAMPLES_A_HARMONIC = 8
 DOUBT = 2.0  # times the chord step that the true change may go beyond the prediction

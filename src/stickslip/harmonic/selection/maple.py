@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from stickslip.harmonic.harmonic_set import of_all
 from stickslip.harmonic.selection.spectrum import next_up, raised, shares_by_dof, spectral_shares
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import of_all
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.structured import real_matrix
-from stickslip.harmonic.support import Harmonics
 
 Part = Literal["jacobian", "contact", "missing"]
 NOTHING = 1e-3  # off-diagonal terms of Γ that count as zero, beside ones on the diagonal

@@ -7,8 +7,8 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import ByDof, Harmonics, joined, of_all
 from stickslip.harmonic.selection.strategy import NOISE, Step, Verdict
-from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
 
 
 def padded_solution(step: Step) -> FloatArray:

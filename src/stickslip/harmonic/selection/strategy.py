@@ -17,8 +17,8 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import ByDof, Harmonics, of_all
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import ByDof, Harmonics, of_all
 
 Kept = Literal["low", "high"]
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]

@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.harmonic_set import rows_of
 from stickslip.harmonic.selection.spectrum import above, contacts_of_reference, foretold
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import rows_of
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from stickslip.report.content import Table, Words
 from stickslip.report.plot import MUTED, key_marker
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.summary import beside_bifurcations
+from stickslip.study.analyses.forced_response.summary import beside_bifurcations
 
 SYMBOLS = {
     "fold": "triangle-left",

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.support import named
+from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.forced.bifurcations import mark_bifurcations
 from stickslip.report.forced.measured import measured_of
@@ -17,8 +17,8 @@ from stickslip.report.forced.working import shade_working_range
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.summary import amplitude_name
-from stickslip.study.analyses.forced.working_range import FEWEST
+from stickslip.study.analyses.forced_response.summary import amplitude_name
+from stickslip.study.analyses.forced_response.working_range import FEWEST
 from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel

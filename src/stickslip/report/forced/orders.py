@@ -7,7 +7,7 @@ from stickslip.report.forced.curves import abscissa, most
 from stickslip.report.plot import Plot, log_ticks, styled
 from stickslip.report.quantities import number, scale_for
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.summary import orders_sentence, several_orders
+from stickslip.study.analyses.forced_response.summary import orders_sentence, several_orders
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 

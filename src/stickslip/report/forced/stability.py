@@ -6,7 +6,7 @@ from stickslip.report.content import Table, Words
 from stickslip.report.quantities import NONE, fixed, number
 from stickslip.report.response import Response
 from stickslip.response.stability.modulus import modulus_text
-from stickslip.study.analyses.forced.stable_words import FEW, all_lines
+from stickslip.study.analyses.forced_response.stable_words import FEW, all_lines
 
 BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
 

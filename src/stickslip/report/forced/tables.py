@@ -3,7 +3,7 @@
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.support import named
+from stickslip.harmonic.harmonic_set import named
 from stickslip.report.content import Table
 from stickslip.report.quantities import NONE, aligned, amplitude, column, fixed, number, percent, predicted, quantity
 from stickslip.report.response import Response

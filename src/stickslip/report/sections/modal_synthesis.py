@@ -11,7 +11,7 @@ from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.study.analyses.synthesis.percents import percent
+from stickslip.study.analyses.modal_synthesis.percents import percent
 
 NAME = "modal_synthesis"
 MOST = 24  # curves that get a name of their own

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.response.all_motions.basins import in_time, not_marched, sampler
 from stickslip.response.all_motions.options import MotionSearch
 from stickslip.response.equilibrium import bonded_start

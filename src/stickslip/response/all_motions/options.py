@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.bifurcations.larger import over_periods
+from stickslip.response.bifurcations.period_multiplied import over_periods
 from stickslip.response.forced.problem import ForcedProblem, forced_problem
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System

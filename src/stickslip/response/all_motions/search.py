@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
@@ -32,9 +32,9 @@ from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.response.ladder import plain_sweep
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.settled import stability
+from stickslip.response.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point

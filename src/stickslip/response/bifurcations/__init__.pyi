@@ -2,10 +2,10 @@
 
 from .found import Bifurcation as Bifurcation
 from .found import Bifurcations as Bifurcations
-from .larger import EverySector as EverySector
-from .larger import every_sector as every_sector
-from .larger import over_periods as over_periods
 from .locate import bifurcations as bifurcations
+from .period_multiplied import EverySector as EverySector
+from .period_multiplied import every_sector as every_sector
+from .period_multiplied import over_periods as over_periods
 from .side_branch import SideBranch as SideBranch
 from .side_branch import side_branches as side_branches
 from .side_branch import subharmonic_branch as subharmonic_branch

@@ -9,9 +9,9 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.bifurcations.branch_switching import candidates, first_point, open_directions
 from stickslip.response.bifurcations.found import Bifurcation
-from stickslip.response.bifurcations.larger import every_sector, in_periods, over_periods
-from stickslip.response.bifurcations.leave import candidates, first_point, open_directions
+from stickslip.response.bifurcations.period_multiplied import every_sector, in_periods, over_periods
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.continuation import advance, start_point, step_to

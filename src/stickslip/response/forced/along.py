@@ -8,21 +8,21 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set_of
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
-from stickslip.harmonic.support import Harmonics
 from stickslip.operators import Jacobian
+from stickslip.response.adaptive_continuation import follow
 from stickslip.response.branch import Followed, Judged, Kind, Route
-from stickslip.response.follow import follow
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.response.ladder import without_branch
+from stickslip.response.starting_solutions import without_branch
+from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised, is_factorised
-from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 _Inverse = Callable[[FloatArray], FloatArray | None]
@@ -233,7 +233,7 @@ def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Ite
     Yields
     ------
     ForcedPoint
-        Points not in `done`, their stage the kind of `stickslip.response.follow.Followed`.
+        Points not in `done`, their stage the kind of `stickslip.response.adaptive_continuation.Followed`.
     """
     curve = ForcedCurve(problem, problem.sweep.supports)
     yield from followed(curve, route_of(problem), done)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.selection.strategy import ErrorMeasure
-from stickslip.harmonic.support import Harmonics
 from stickslip.model.dofs import ROTATIONS
 from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.sweep import Sweep

@@ -9,14 +9,14 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
-from stickslip.harmonic.support import is_full
+from stickslip.harmonic.harmonic_set import is_full
 from stickslip.response.branch import Judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.time.repeating import Repetition, repetition
+from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import ParameterEvaluation
-from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.newton_method import Solution, charged, newton
-from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Rung, Status
 
 MOST_COORDINATES = 600  # half a second a period, or more

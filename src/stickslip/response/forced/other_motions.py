@@ -9,12 +9,12 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
-from stickslip.harmonic.local import AnyBalance
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.ladder import at_rest
+from stickslip.response.starting_solutions import at_rest
 from stickslip.response.time.marcher import prepared, step_work
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import start_from_harmonics

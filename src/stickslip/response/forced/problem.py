@@ -12,10 +12,10 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
+from stickslip.harmonic.harmonic_set import ByDof, Harmonics, is_full, kept_by_dof, supports_of
+from stickslip.harmonic.harmonics_per_dof import AnyBalance, LocalBalance
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.local import AnyBalance, LocalBalance
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept
-from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, supports_of
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import Judged, following_vibration
@@ -44,7 +44,7 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        With ``high = "auto"`` the kinds of `stickslip.response.follow.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
+        With ``high = "auto"`` the kinds of `stickslip.response.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
         passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
         repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
         ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time. ``settled``: with more harmonics, where a prediction alone spoke for a point

@@ -11,11 +11,11 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.homotopies import homotopies
+from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import ParameterEvaluation
+from stickslip.solve.fallbacks import solve_robustly, steps_at_most
 from stickslip.solve.linear import factorised
-from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
-from stickslip.solve.rescue import solve_robustly, steps_at_most
 from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start

@@ -6,17 +6,17 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.harmonic.local import AnyBalance
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.ladder import without_branch
+from stickslip.response.starting_solutions import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to
+from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
-from stickslip.solve.rescue import steps_at_most
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency

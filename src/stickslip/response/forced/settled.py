@@ -9,14 +9,14 @@ from time import perf_counter
 
 import numpy as np
 
+from stickslip.harmonic.harmonic_set import Harmonics, multiples
 from stickslip.harmonic.judging import REACH, SAMPLES_A_HARMONIC
-from stickslip.harmonic.support import Harmonics, multiples
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.along import AGREE, NEAR, SAFETY, SMALL
 from stickslip.response.forced.choices import RUNGS, Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.verification import own_error, with_waves
-from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most

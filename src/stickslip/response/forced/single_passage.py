@@ -7,14 +7,14 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray
-from stickslip.harmonic.local import AnyBalance
+from stickslip.harmonic.harmonic_set import ByDof, Harmonics, joined, of_all
+from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
-from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.ladder import without_branch
+from stickslip.response.starting_solutions import without_branch
+from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.newton_method import Solution, charged, newton
-from stickslip.solve.rescue import steps_at_most
 
 
 def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:

@@ -9,10 +9,10 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.evaluators import Evaluator, check_evaluator
 from stickslip.errors import check_choice, input_error
+from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of, multiples
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.harmonic.support import Harmonics, harmonics_of, multiples
 from stickslip.response.branch import steps_through
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, AmplitudeOf, Passages, RelativeTo, Rescue
 from stickslip.solve.continuation import StepControl

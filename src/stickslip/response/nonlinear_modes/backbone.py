@@ -16,10 +16,10 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.adaptive_continuation import LEAPS, follow
 from stickslip.response.branch import Followed, Route, branch_of
-from stickslip.response.follow import LEAPS, follow
 from stickslip.response.nonlinear_modes.closer import LOCATED, TAKES_PART, Closer
-from stickslip.response.nonlinear_modes.levels import ModeCurve
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.contacts import Contacts, contacts_of, leaving
 from stickslip.response.self_excited.curve import slip_amplitude

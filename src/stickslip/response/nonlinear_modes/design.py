@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
+from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
 TWICE = 2.0

@@ -10,9 +10,9 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
-from stickslip.response.nonlinear_modes.levels import ModeCurve
-from stickslip.response.nonlinear_modes.measure import Size, by_energy
-from stickslip.response.nonlinear_modes.one_mass import FEWEST, modal_oscillator
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
+from stickslip.response.nonlinear_modes.modal_amplitude import Size, by_energy
+from stickslip.response.nonlinear_modes.sdof_oscillator import FEWEST, modal_oscillator
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.solve.branch import Point

@@ -18,7 +18,7 @@ import scipy.integrate
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
+from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import checked_level, motions_at
 
 CELLS = 4096  # of the table of the oscillator over ln a

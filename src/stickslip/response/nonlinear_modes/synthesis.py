@@ -15,7 +15,7 @@ import scipy.optimize
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
+from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 
 POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
 REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.harmonic.torus_path import Indices
+from stickslip.harmonic.two_frequency_path import Indices
 from stickslip.solve.status import Status
 
 

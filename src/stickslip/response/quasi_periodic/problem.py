@@ -10,10 +10,10 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import driven_by, judging_indices
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.torus import MOST_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
-from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
-from stickslip.harmonic.torus_side import TorusSide
 from stickslip.harmonic.travelling import condense_side
+from stickslip.harmonic.two_frequency import MOST_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
+from stickslip.harmonic.two_frequency_path import Indices, TorusPath, closed_path, half_plane
+from stickslip.harmonic.two_frequency_side import TorusSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.reduction.tuned import TunedWheel

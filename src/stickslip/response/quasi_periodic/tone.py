@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
-from stickslip.harmonic.torus_path import TorusPath
+from stickslip.harmonic.two_frequency_path import TorusPath
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.response.quasi_periodic.motion import TorusMotion

@@ -18,7 +18,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.response.branch import Followed
-from stickslip.response.ladder import plain_sweep
+from stickslip.response.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 

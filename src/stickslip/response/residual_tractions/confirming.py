@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.contact.starts import starts_of
+from stickslip.contact.initial_sliders import starts_of
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure

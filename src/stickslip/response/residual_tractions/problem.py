@@ -12,8 +12,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.initial_sliders import Starts
 from stickslip.contact.law import PAIRS
-from stickslip.contact.starts import Starts
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.judging import covers, judging_balance

@@ -15,13 +15,13 @@ from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.interface import add_contact_jacobian
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
+from stickslip.harmonic.engine_order_line import TurningStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.structured import real_matrix
-from stickslip.harmonic.support import Harmonics, harmonics_of
-from stickslip.harmonic.turning import TurningStiffness
 from stickslip.reduction.speed_line import SpeedLine
-from stickslip.response.ladder import without_branch
+from stickslip.response.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 

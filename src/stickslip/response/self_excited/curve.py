@@ -9,14 +9,14 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.bordered import PeriodicProblem
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.adaptive_continuation import follow
 from stickslip.response.branch import Followed, OneLevel, Route, branch_of, steps_through
 from stickslip.response.equilibrium import preload
-from stickslip.response.follow import follow
 from stickslip.response.parameter import Parameter
 from stickslip.response.self_excited.contacts import contacts_of
 from stickslip.response.self_excited.problem import SelfExcited, levels
 from stickslip.solve.branch import Following
-from stickslip.solve.kept import KeptFactors
+from stickslip.solve.chord_newton import KeptFactors
 from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, first_converged, newton
 from stickslip.solve.status import Status

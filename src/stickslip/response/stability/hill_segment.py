@@ -16,8 +16,8 @@ import scipy.linalg
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.response.stability.contact_tangent import ContactTangent
-from stickslip.response.stability.hill_fast import reach
 from stickslip.response.stability.hill_modes import HillModes, HillSide
+from stickslip.response.stability.parametric_growth_bound import reach
 
 NODES = 8  # of the polynomial through a segment of half a frequency
 AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring; or so many times as far:

@@ -7,9 +7,9 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.judging import judging_set_of
 from stickslip.harmonic.selection.alert import silent
-from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.solve.newton_method import newton
 

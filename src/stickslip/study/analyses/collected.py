@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
 from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import alike, one_case, stacked, variable
+from stickslip.study.store.netcdf import alike, one_case, stacked, variable
 
 Variables = dict[str, xr.Variable]
 About = Mapping[str, tuple[str, str, str]]  # dimensions, unit and words of each variable

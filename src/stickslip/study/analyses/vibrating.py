@@ -14,12 +14,12 @@ from stickslip.assembly.reduced import Store
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.at_rest import pressed_by
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
+from stickslip.response.static_contact_state import pressed_by
 from stickslip.response.system import System
-from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.forced_response.problem import peak_first
 
 ONE = -1  # wave number of a single structure
 SAMPLES = 256

@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.study.analyses.vibrating import ONE
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.store.netcdf import one_case
 from stickslip.units import HZ, millimetres
 
 ROUNDED = 1e-3  # of a number that was read from a table, relative

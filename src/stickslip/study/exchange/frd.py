@@ -9,7 +9,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.model.readers.frd import CELLS, MODAL, RESPONSE
 from stickslip.model.readers.units import Units
 from stickslip.study.exchange.motion import Motion, numbers_of
-from stickslip.study.keep.whole import write_whole
+from stickslip.study.store.atomic_write import write_whole
 
 KINDS = {len(places): kind for kind, places in CELLS.items()}  # nodes of a cell -> element type
 PER_LINE = 10  # nodes of an element in a line

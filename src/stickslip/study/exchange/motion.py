@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.assembly.everywhere import Everywhere, Felt, Nodes, as_it_is, everywhere, nodes_of
+from stickslip.assembly.full_field import Everywhere, Felt, Nodes, as_it_is, everywhere, nodes_of
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.harmonic.decaying import DecayingStiffness
 from stickslip.model.axis import Axis
 from stickslip.study.exchange.chosen import Chosen
-from stickslip.study.keep.progress import LOG
+from stickslip.study.store.progress import LOG
 
 AGREE = 1e-6  # relative, of the outputs: the model is that of the result, not another one
 CHANGED = "Files of the model have changed since the run, or the study has: run it again, then export."

@@ -11,7 +11,7 @@ from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import missing_package
 from stickslip.study.exchange.chosen import as_complex
 from stickslip.study.exchange.motion import Motion, numbers_of
-from stickslip.study.keep.whole import whole_file
+from stickslip.study.store.atomic_write import whole_file
 
 SI = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
 DIRECTIONS = {name: k for k, name in enumerate(("x", "y", "z", "rx", "ry", "rz"), 1)}

@@ -11,7 +11,7 @@ from stickslip.errors import missing_package
 from stickslip.model.mesh.solid_mesh import CELL_NAMES
 from stickslip.study.exchange.contacts import ContactMotion
 from stickslip.study.exchange.motion import Motion
-from stickslip.study.keep.whole import whole_file, write_whole
+from stickslip.study.store.atomic_write import whole_file, write_whole
 
 Cells = list[tuple[str, IntArray]]
 

@@ -15,7 +15,7 @@ from stickslip.model.part import Part
 from stickslip.model.readers.measured_columns import read_columns
 from stickslip.study.file.mistuning import MOST_MODES, MistuningTable
 from stickslip.study.file.tables import Tables
-from stickslip.study.keep.progress import LOG
+from stickslip.study.store.progress import LOG
 
 FROM_ZERO = "Blades count from 0, not from 1: number them 0 to "
 BLADE_COLUMNS = ("blade", "mode", "frequency_hz")

@@ -11,7 +11,7 @@ from stickslip.assembly.statics import StaticState
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.verdict import Verdict, doubt, to_json
 from stickslip.study.analyses.waves.doubts import static_doubts
-from stickslip.study.keep.netcdf import variable
+from stickslip.study.store.netcdf import variable
 from stickslip.units import RPM
 
 STATIC = ("static_rpm", "static_displacement_m", "static_strain", "static_rotation_rad")

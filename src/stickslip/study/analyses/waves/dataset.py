@@ -13,7 +13,7 @@ from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, from_json, of_a
 from stickslip.study.analyses.waves.about import ABOUT, told
 from stickslip.study.analyses.waves.numbers import wave_name
 from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
-from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.study.store.netcdf import stacked, variable
 
 Variables = dict[str, xr.Variable]
 Waves = Sequence[WaveModes] | Sequence[WaveBranches] | Sequence[WaveFlutter]

@@ -7,10 +7,10 @@ import numpy as np
 
 from stickslip.assembly.wheel_modes import wheel_modes
 from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.forced.bounds import localisation
+from stickslip.study.analyses.forced_response.bounds import localisation
 from stickslip.study.analyses.waves.dataset import Variables
 from stickslip.study.analyses.waves.solve import Question
-from stickslip.study.keep.netcdf import variable
+from stickslip.study.store.netcdf import variable
 
 NOTE = "mistuned"
 MOST_ROWS = 40  # of modes on the screen

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.aero_forces import own_dofs, phases
 from stickslip.assembly.build import holding_points
-from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.reduced import stiffening
 from stickslip.errors import input_error
@@ -28,7 +28,7 @@ from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
 from stickslip.study.analyses.waves.in_flow import wave_in_flow
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
-from stickslip.study.keep.progress import advance
+from stickslip.study.store.progress import advance
 
 FEW = 300  # dofs of a sector, of which all waves are solved in no time
 MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for

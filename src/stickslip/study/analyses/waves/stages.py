@@ -17,7 +17,7 @@ from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.verdict import Verdict, doubt, to_json
 from stickslip.study.analyses.waves.about import ABOUT, STATIC
 from stickslip.study.analyses.waves.results import WaveModes
-from stickslip.study.keep.progress import advance
+from stickslip.study.store.progress import advance
 
 LEFT_OUT = 0.01  # of a frequency: so much harmonics that are not coupled may change it without a doubt
 

@@ -1,0 +1,168 @@
+"""Comparing designs: results and curves of a measurement side by side."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.api.result import Result
+from stickslip.api.study import Study
+from stickslip.api.table import Table
+from stickslip.errors import did_you_mean, input_error
+from stickslip.report.designs import Design, MeasuredCurve, differences, per_force, read_curve
+from stickslip.report.frame import write_page
+from stickslip.report.plot import Plot
+from stickslip.report.result import RESULT
+from stickslip.report.side_by_side import comparison_html, contents, peak_rows, unit_of
+
+Compared = str | Path | Result
+_FOLDER = "results"  # of a study that names no other
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Designs held against each other.
+
+    Parameters
+    ----------
+    designs
+        In the order given; the others are held against the first.
+    curves
+        Responses of measurements or of other programs.
+    """
+
+    designs: tuple[Design, ...]
+    curves: tuple[MeasuredCurve, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be compared."""
+        per_force(self.designs, self.curves)
+
+    @cached_property
+    def _contents(self) -> dict[str, list[object]]:
+        return {key: list(own) for key, _, own in contents(self.designs, self.curves)}
+
+    @cached_property
+    def _figures(self) -> dict[str, go.Figure]:
+        every = (own for chapter in self._contents.values() for own in chapter)
+        return {own.key: own.figure for own in every if isinstance(own, Plot)}
+
+    @property
+    def plots(self) -> tuple[str, ...]:
+        """Names of the figures."""
+        return tuple(self._figures)
+
+    def plot(self, name: str) -> go.Figure:
+        """Return a figure; an `InputError` tells the names where there is none of that."""
+        if name not in self._figures:
+            remedy = did_you_mean(name, list(self._figures))
+            raise input_error(f"plot({name!r})", "is no figure of this comparison", remedy)
+        return self._figures[name]
+
+    @property
+    def peaks(self) -> Table:
+        """A row for each case of each design: its peak, and how far it is from that of the first design; NaN where that has no such case."""
+        divided = per_force(self.designs, self.curves)
+        found = peak_rows(self.designs, divided=divided)
+        if not found:
+            return Table({})
+        columns = {
+            "case": "case",
+            "design": "design",
+            "frequency (Hz)": "hz",
+            f"amplitude ({unit_of(self.designs, divided=divided)})": "height",
+            "verdict": "level",
+            "against the first (%)": "off_percent",
+            "shift (Hz)": "shift_hz",
+        }
+        return Table({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})
+
+    @property
+    def inputs(self) -> Table:
+        """What differs between the study files: a row a key, a column a design."""
+        head, rows = ["key", *(d.name for d in self.designs)], differences(self.designs)
+        columns = zip(*rows, strict=True) if rows else [() for _ in head]
+        return Table({n: np.array(own) for n, own in zip(head, columns, strict=True)})
+
+    def report(self, path: str | Path = "comparison.html") -> Path:
+        """Write the page; return it."""
+        target = Path(path)
+        write_page(comparison_html(self.designs, self.curves), target)
+        return target
+
+    def __repr__(self) -> str:
+        names = ", ".join(d.name for d in self.designs)
+        return f"Comparison of {names}\n{self.peaks!r}"
+
+
+def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
+    """Compare designs: their peaks, responses, optimisation curves, modes and inputs.
+
+    Parameters
+    ----------
+    compared
+        Results; or result files, folders or study files whose results are there; or CSV files with the columns ``frequency_hz`` and
+        ``amplitude_um`` (``_mm``, ``_m``; ``_um_per_n`` …) of a measurement or another program. At least two, one of them a result.
+    names
+        Of all of them, for legends and tables; left out: by their folders, files or titles.
+
+    Raises
+    ------
+    InputError
+        If something cannot be read, there is nothing to compare, or two have the same name.
+    """
+    given = [_opened(own) for own in compared]
+    results = [own for own in given if isinstance(own, Result)]
+    if len(given) < 2 or not results:
+        raise input_error(
+            f"compare({', '.join(map(str, compared))})",
+            f"has {len(results)} results and {len(given) - len(results)} curves",
+            "Give two results at least, or a result and a CSV file.",
+        )
+    labels = list(names) or _names(compared)
+    if len(labels) != len(given) or len(set(labels)) != len(labels):
+        raise input_error(
+            f"names = {labels}", f"are no {len(given)} names that differ", "Give one for each that is compared."
+        )
+    designs: list[Design] = []
+    curves: list[MeasuredCurve] = []
+    for label, own in zip(labels, given, strict=True):
+        if isinstance(own, Result):
+            designs.append(Design(label, own.data, len(designs)))
+        else:
+            curves.append(MeasuredCurve(label, own.hz, own.amplitude, own.per_force))
+    return Comparison(tuple(designs), tuple(curves))
+
+
+def _opened(given: Compared) -> Result | MeasuredCurve:
+    if isinstance(given, Result):
+        return given
+    path = Path(given)
+    if path.suffix.lower() == ".csv":
+        return read_curve(path)
+    if path.suffix == ".toml":
+        return Result.open(Study.from_file(path).folder)
+    if path.is_dir() and not (path / RESULT).is_file() and (path / _FOLDER / RESULT).is_file():
+        return Result.open(path / _FOLDER)
+    return Result.open(path)
+
+
+def _names(compared: Sequence[Compared]) -> list[str]:
+    """Return names by folder, file or title: as much of the path as tells them apart."""
+    found = []
+    for own in compared:
+        if isinstance(own, Result):
+            found.append(str(own.data.attrs.get("title", "")) or "result")
+        else:
+            parts = [p for p in Path(own).with_suffix("").parts if p not in (_FOLDER, "result", "study", "/")]
+            found.append(parts[-1] if parts else str(own))
+    twice = len(set(found)) < len(found)
+    if twice:
+        found = [
+            str(own) if isinstance(own, str | Path) else f"{name} {k + 1}"
+            for k, (own, name) in enumerate(zip(compared, found, strict=True))
+        ]
+    return found

@@ -1,0 +1,108 @@
+"""A result written for other programs: which motion of which case, and the model that it was computed of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.model.readers.units import Units
+from stickslip.study.exchange.chosen import chosen
+from stickslip.study.exchange.contacts import contacts_of
+from stickslip.study.exchange.frd import write_frd
+from stickslip.study.exchange.motion import motion_of
+from stickslip.study.exchange.uff import write_uff
+from stickslip.study.exchange.vtu import write_vtu
+from stickslip.study.file.study import StudyFile, validated
+from stickslip.study.file.toml import parsed
+from stickslip.study.models.study import Study
+from stickslip.study.store.atomic_write import unwritable
+from stickslip.study.store.progress import LOG
+
+Format = Literal["vtu", "frd", "uff"]
+MOST_STEPS = 1000
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is written of a result; see `Result.export`."""
+
+    to: Format = "vtu"
+    case: int = 0
+    hz: float | None = None
+    steps: int = 24
+    wheel: bool = False
+    units: str = "SI"
+    analysis: str = ""
+    number: int = 0
+    amplitude_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.to not in get_args(Format):
+            remedy = f"Give one of {', '.join(get_args(Format))}."
+            raise input_error("export: to", f"is {self.to!r}", remedy)
+        if not 1 <= self.steps <= MOST_STEPS:
+            remedy = f"Give 1 to {MOST_STEPS} instants."
+            raise input_error("export: steps", f"is {self.steps}", remedy)
+        if self.units != "SI" and self.to != "frd":
+            what = f"is {self.units}, and only frd takes other units"
+            remedy = "Leave it out: vtu and uff are in m, N and Hz."
+            raise input_error("export: units", what, remedy)
+
+
+def export_result(
+    tree: xr.DataTree, path: Path | None, folder: Path | None, wanted: Wanted, of: Model | Path | None
+) -> tuple[Path, ...]:
+    """Write a motion of a result, which lies at `path`; return the files."""
+    case, units = wanted.case, Units.named(wanted.units)
+    picked = chosen(tree, wanted.analysis, case, number=wanted.number, hz=wanted.hz, amplitude_mm=wanted.amplitude_mm)
+    LOG.info(f"[{picked.analysis}] {picked.told}")
+    model = of if isinstance(of, Model) else _model(tree, path, of, case)
+    if wanted.wheel and model.sectors == 1:
+        remedy = "Leave it out: a structure that is no sector is written whole."
+        raise input_error("export: wheel", "is asked of a single structure", remedy)
+    motion = motion_of(picked, model, wheel=wanted.wheel)
+    forced = tree[picked.analysis].to_dataset() if picked.point is not None else None
+    name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"
+    place = _place(path, f"{name}_wheel" if wanted.wheel else name, folder)
+    count = sum(len(body.nodes.points) for body in motion.bodies)
+    sectors = f" of {motion.sectors} sectors" if motion.sectors > 1 else ""
+    LOG.info(f"writing {count} nodes{sectors} to {place}")
+    if wanted.to == "vtu":
+        contacts = (
+            contacts_of(forced, motion, case, picked.point) if forced is not None and picked.point is not None else ()
+        )
+        return write_vtu(motion, contacts, place, wanted.steps)
+    if wanted.to == "frd":
+        return (write_frd(motion, place / "motion.frd", units),)
+    return (write_uff(motion, forced, case, place / "motion.uff"),)
+
+
+def _place(path: Path | None, name: str, folder: Path | None) -> Path:
+    beside = Path() if path is None else path.parent
+    place = beside / name if folder is None else folder
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(place, error) from None
+    return place
+
+
+def _model(tree: xr.DataTree, path: Path | None, home: Path | None, case: int) -> Model:
+    """Return the model of a case by the study's text in the result."""
+    text = str(tree.attrs.get("study_toml", ""))
+    if not text:
+        remedy = "Give the model that was asked: result.export(..., of=model)."
+        raise input_error("export", "the result is of a model made in Python", remedy)
+    raw = parsed(text, Path("study.toml"))
+    if home is None:
+        inner = Path(str(raw.get("output", {}).get("folder", "results")))
+        last = () if path is None else path.resolve().parent.parts
+        if last[-len(inner.parts) :] != inner.parts:
+            remedy = "Say in which folder the study's files lie: --of FOLDER, or of=..."
+            raise input_error("export", "the result does not lie where its study put it", remedy)
+        home = Path(*last[: -len(inner.parts)])
+    place = home / "study.toml"
+    return Study(StudyFile(place, text, raw, validated(place, raw))).model(case)

@@ -1,0 +1,32 @@
+"""A study file read step by step: what is wrong with it is told before the libraries that compute and draw are loaded."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip.api.study import Study
+
+
+def read(path: Path) -> "Study":
+    """Read a study file for the command line; BLAS has one thread from here on, unless the user said how many.
+
+    Raises
+    ------
+    InputError
+        Naming every problem of the file, one a line.
+    """
+    from stickslip.study.file.toml import read_toml
+    from stickslip.study.store.threads import one_blas_thread
+
+    one_blas_thread()
+    read_toml(path)
+    from stickslip.study.file.study import read_file
+
+    file = read_file(path)
+    from stickslip.study.models.checks import refuse
+
+    refuse(file)
+    from stickslip.api.study import Study
+    from stickslip.study.models.study import judged
+
+    return Study(judged(file))

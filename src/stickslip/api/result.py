@@ -1,0 +1,302 @@
+"""What a Python user holds of a result: its data, its figures, its peaks, its page."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+import xarray as xr
+
+from stickslip.api.export import Format, Wanted, export_result
+from stickslip.api.frame_of import dataframe
+from stickslip.api.screen import by_default
+from stickslip.api.table import Table
+from stickslip.assembly.model import Model
+from stickslip.errors import did_you_mean, input_error
+from stickslip.report.page import plots, write_report
+from stickslip.report.result import RESULT, open_result
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
+from stickslip.study.outcome import Outcome
+from stickslip.study.store.netcdf import write_tree
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The answers of a study or a model.
+
+    Parameters
+    ----------
+    data
+        A DataTree with a dataset for each analysis, in Hz and SI units; provenance in the attributes of the root.
+    path
+        The file that holds it; None for a result in memory.
+    files
+        All files that the run wrote.
+    failed
+        Number of points without a solution.
+    summaries
+        Of each analysis, what the terminal prints; empty for a result that was read from a file.
+    waits
+        For what it waits, of a shard that was not the last to end; empty: it is whole.
+    """
+
+    data: xr.DataTree
+    path: Path | None = None
+    files: tuple[Path, ...] = ()
+    failed: int = 0
+    summaries: dict[str, tuple[TextTable, ...]] = field(default_factory=dict)
+    waits: str = ""
+
+    @classmethod
+    def open(cls, path: str | Path) -> "Result":
+        """Read a result file, or the one in a folder."""
+        path = Path(path)
+        return cls(open_result(path), path / RESULT if path.is_dir() else path)
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> "Result":
+        """Return what a run has found."""
+        path = outcome.files[0] if outcome.files and not outcome.waits else None
+        found = (outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
+        return cls(*found, outcome.waits)
+
+    def __getitem__(self, name: str) -> xr.Dataset:
+        """Return the dataset of an analysis.
+
+        Raises
+        ------
+        InputError
+            If the result has none of that name.
+        """
+        if name not in self.data.children:
+            raise input_error(f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, list(self)))
+        return self.data[name].to_dataset()
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the analyses, in the order of the file, as over the keys of a dictionary."""
+        return (str(name) for name in self.data.children)
+
+    def to_dataframe(self, name: str = "", of: str = "") -> pd.DataFrame:
+        """Return an analysis as a table of pandas, in Hz and SI units, which `DataFrame.attrs` names.
+
+        Parameters
+        ----------
+        name
+            Of the analysis; left out: the first of the result.
+        of
+            Variable that has an entry in each row, with all that belongs to it; left out: amplitude, damping or frequency.
+
+        Raises
+        ------
+        InputError
+            If there is no such analysis or variable.
+        """
+        name = name or next(iter(self), "")
+        return dataframe(self[name], name, of)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the result as netCDF-4; return the file.
+
+        Parameters
+        ----------
+        path
+            The file, such as ``out.nc``, or a folder that exists.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or cannot be written.
+        """
+        path = Path(path)
+        target = path / RESULT if path.is_dir() else path
+        if not target.suffix:
+            raise input_error(
+                str(path),
+                "is no folder that exists, and a file's name has an ending",
+                f"Give {path}.nc, or make the folder first: it gets a {RESULT}.",
+            )
+        write_tree(self.data, target)
+        return target
+
+    def export(  # noqa: PLR0913
+        self,
+        to: Format = "vtu",
+        folder: str | Path | None = None,
+        *,
+        case: int = 0,
+        hz: float | None = None,
+        steps: int = 24,
+        wheel: bool = False,
+        units: str = "SI",
+        of: Model | str | Path | None = None,
+        analysis: str = "",
+        number: int = 0,
+        amplitude_mm: float | None = None,
+    ) -> tuple[Path, ...]:
+        """Write how every node moves at the peak of a forced response, in a nonlinear mode or a limit cycle, for another program; return the files.
+
+        Parameters
+        ----------
+        to
+            ``vtu``: one period as a series of files for ParaView (open ``motion.pvd`` and ``contacts.pvd``), and all harmonics in
+            ``harmonics.vtu``; ``frd``: harmonics for CalculiX's viewer; ``uff``: deflection shapes and response functions for test
+            software.
+        folder
+            Made where it is not there; left out: a folder such as ``vtu_0`` or ``vtu_0_wheel`` beside the result's file.
+        case
+            Position among the cases of [vary].
+        hz
+            The converged point of the response nearest to this frequency; None: the peak.
+        steps
+            Instants of the period.
+        wheel
+            Whether all sectors of a tuned wheel are written, not one; a wheel whose sectors differ is always written whole.
+        units
+            Of an ``frd`` file, such as ``mm-t-s``.
+        of
+            The model that was asked, where it was made in Python; of a study it is made again from the study's text and files: the
+            folder of these, where the result has been moved away from it.
+        analysis
+            ``forced_response``, ``nonlinear_mode`` or ``limit_cycle``; left out: the first of these that the result has.
+        number
+            Which nonlinear mode or limit cycle of the case, from 0 in the order of the result.
+        amplitude_mm
+            The motion of the nonlinear mode nearest to this amplitude of its output; None: the most damped one.
+
+        Raises
+        ------
+        InputError
+            If there is no such motion, or the model is no longer the one that was asked.
+        """
+        place = None if folder is None else Path(folder)
+        source = Path(of) if isinstance(of, str) else of
+        wanted = Wanted(to, case, hz, steps, wheel, units, analysis, number, amplitude_mm)
+        with by_default():
+            return export_result(self.data, self.path, place, wanted, source)
+
+    def report(self, path: str | Path | None = None) -> Path:
+        """Write the page of all figures and tables; return it.
+
+        Parameters
+        ----------
+        path
+            The page; left out: ``report.html`` beside the result's file, or here.
+        """
+        folder = Path() if self.path is None else self.path.parent
+        target = folder / "report.html" if path is None else Path(path)
+        write_report(self.data, target)
+        return target
+
+    @cached_property
+    def _figures(self) -> dict[str, go.Figure]:
+        return plots(self.data)
+
+    @property
+    def plots(self) -> tuple[str, ...]:
+        """Names of the figures, in the order of the page."""
+        return tuple(self._figures)
+
+    def plot(self, name: str) -> go.Figure:
+        """Return a figure of the page.
+
+        Raises
+        ------
+        InputError
+            If the result has none of that name.
+        """
+        if name not in self._figures:
+            known = list(self.plots)
+            raise input_error(f"plot({name!r})", "is no figure of this result", did_you_mean(name, known))
+        return self._figures[name]
+
+    @property
+    def peaks(self) -> Table:
+        """The peak of each case of the forced response, or the frequencies of all modes where there is none."""
+        if "forced_response" in self.data.children:
+            return _peaks(self.data["forced_response"].to_dataset())
+        name = next((n for n in ("modes", "safe") if n in self.data.children), None)
+        return _frequencies(self.data[name].to_dataset()) if name else Table({})
+
+    @property
+    def measured(self) -> Table:
+        """The measured peaks that the study names, as they were read, in SI units and Hz; empty where it names none."""
+        name = "forced_response"
+        return _measured(self.data[name].to_dataset()) if name in self.data.children else Table({})
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What is to be trusted, and what not, why, and what to do: of each case, and of its points where they differ from it."""
+        return of_tree(self.data)
+
+    @property
+    def not_trusted(self) -> str:
+        """A line that says which cases are doubtful or wrong; empty where all are trusted."""
+        return not_trusted(self.data)
+
+    @property
+    def conclusion(self) -> str:
+        """The last line of a run: `not_trusted`, or that every answer is trusted and how many single points are not."""
+        return conclusion(self.data)
+
+    def saved(self, folder: Path) -> "Result":
+        """Return the result with a file in a folder, which is made."""
+        folder.mkdir(parents=True, exist_ok=True)
+        return replace(self, path=self.save(folder))
+
+    def __repr__(self) -> str:
+        title = str(self.data.attrs.get("title", "")) or "untitled"
+        lines = [f"Result: {title}", f"  file: {self.path or 'in memory'}"]
+        for name, node in self.data.children.items():
+            cases, points = node.sizes.get("case", 1), node.sizes.get("point")
+            size = f"{cases} cases" if cases != 1 else "1 case"
+            lines.append(f"  {name}: {size}" + (f", {points} points" if points else ""))
+        lines.append(f"  plots: {', '.join(self.plots)}")
+        lines += [f"  {v}" for v in self.verdicts if v.told]
+        lines.append(f"  {self.conclusion}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
+
+
+def _peaks(data: xr.Dataset) -> Table:
+    keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else []
+    found = {key: np.asarray(data["vary_value"].values[:, k]) for k, key in enumerate(keys)}
+    units = {"excitation_n": "excitation (N)", "peak_frequency_hz": "frequency (Hz)", "peak_amplitude": "amplitude (m)"}
+    found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
+    if "case_verdict" in data:
+        found["verdict"] = np.array([LEVELS[int(v)] for v in data["case_verdict"].values])
+    return Table(found)
+
+
+def _measured(data: xr.Dataset) -> Table:
+    if "measured_value" not in data:
+        return Table({})
+    found = {str(data.attrs["measured_key"]): np.asarray(data["measured_value"].values)}
+    names = {
+        "measured_others": "beside it",
+        "measured_excitation_n": "excitation (N)",
+        "measured_frequency_hz": "frequency (Hz)",
+        "measured_frequency_hz_error": "its {} (Hz)",
+        "measured_amplitude": "amplitude ({})",
+        "measured_amplitude_error": "its {} ({})",
+    }
+    for key, text in names.items():
+        values = data[key].values if key in data else np.zeros(0)
+        if values.size and (any(values) if values.dtype.kind == "U" else np.isfinite(values).any()):
+            told = [data[key].attrs.get(name, "") for name in ("error", "units")]
+            found[text.format(*filter(None, told))] = np.asarray(values)
+    return Table(found)
+
+
+def _frequencies(data: xr.Dataset) -> Table:
+    """Return a row a wave of the first case."""
+    first = data.isel(case=0) if "case" in data.dims else data
+    hz = np.asarray(first["frequency_hz"].values)
+    found = {name.replace("_", " "): np.asarray(first[name].values) for name in ("nodal_diameter", "wave_kind")}
+    return Table(found | {f"mode {m + 1} (Hz)": hz[:, m] for m in range(hz.shape[1])})

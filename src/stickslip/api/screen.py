@@ -1,0 +1,142 @@
+"""What a user sees while something is computed: a bar on a terminal, plain lines elsewhere."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import monotonic
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from stickslip.api.notebook import NotebookScreen, in_notebook
+from stickslip.errors import printable
+from stickslip.study.store.progress import DONE, head
+
+LOG = logging.getLogger("stickslip")
+STEPS = 10  # plain lines that a job writes on its way
+BETWEEN = 60.0  # seconds between plain lines of a job, where points are not asked for
+FULL = "━" * 10  # the bar of a job that is done
+
+
+class Screen(logging.Handler):
+    """Draws a bar for each job at work and leaves a line of it when it is done; writes all that belongs to no job as lines.
+
+    Parameters
+    ----------
+    console
+        Where to write; where it is no terminal, lines stand in place of bars.
+    bars
+        Most bars at a time: one a worker.
+    warnings
+        Whether to write warnings and verdicts: not where they are listed at the end.
+    verbose
+        Whether to write what jobs say on their way, too, as the log of a run has it.
+    """
+
+    def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False) -> None:
+        super().__init__()
+        self._console, self._bars = console, bars
+        self._warnings, self._verbose = warnings, verbose
+        self._progress: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._steps: dict[str, int] = {}
+        self._begun: dict[str, float] = {}
+        self._told: dict[str, float] = {}
+        self._sums: dict[str, str] = {}
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """Draw while the block runs."""
+        if not self._console.is_terminal:
+            yield
+            return
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[state]}"),
+        )
+        with Progress(*columns, console=self._console, transient=True) as self._progress:
+            yield
+        self._progress = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show a record."""
+        text, job = record.getMessage(), str(getattr(record, "job", ""))
+        fraction = getattr(record, "fraction", None)
+        if job and job not in self._begun:
+            self._begun[job] = self._told[job] = monotonic()
+        if fraction is not None:
+            self._advance(job, float(fraction), text)
+            return
+        if hasattr(record, "sums_up"):
+            self._sums[job] = str(record.sums_up)
+        if head(record):
+            if self._warnings:
+                self._line(f"{head(record)}{text}")
+        elif self._verbose or not job:
+            self._line(text)
+
+    def _line(self, text: str) -> None:
+        self._console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
+
+    def _advance(self, job: str, fraction: float, text: str) -> None:
+        if text == DONE:
+            self._done(job)
+        elif self._progress is None:
+            self._plain(job, fraction, text)
+        else:
+            if job not in self._tasks:
+                while len(self._tasks) >= self._bars:  # of workers that were lost
+                    self._progress.remove_task(self._tasks.pop(next(iter(self._tasks))))
+                self._tasks[job] = self._progress.add_task(job or "model", total=1.0, state="")
+            state = "" if text == job or not self._verbose else text
+            self._progress.update(self._tasks[job], completed=fraction, state=state)
+
+    def _plain(self, job: str, fraction: float, text: str) -> None:
+        """Write some of the states of a job: without `verbose` no more than one a minute."""
+        if not self._verbose:
+            if monotonic() - self._told.get(job, monotonic()) > BETWEEN:
+                self._told[job] = monotonic()
+                self._line(f"  {job} {100 * fraction:.0f} %")
+            return
+        step = int(STEPS * fraction)
+        if step > self._steps.get(job, -1):
+            self._steps[job] = step
+            self._line(text if step == 0 else f"  {job} {100 * fraction:.0f} %: {text}")
+
+    def _done(self, job: str) -> None:
+        """Leave the line of a job that is done."""
+        seconds = monotonic() - self._begun.get(job, monotonic())
+        told = f"{job}: {self._sums.get(job, DONE)} ({seconds:.0f} s)"
+        if self._progress is not None and job in self._tasks:
+            self._progress.remove_task(self._tasks.pop(job))
+            told = f"{FULL} {told}"
+        self._line(told)
+
+
+@contextmanager
+def on_screen(screen: Screen | NotebookScreen) -> Iterator[None]:
+    """Send what the package says to a screen while the block runs."""
+    level = LOG.level
+    LOG.addHandler(screen)
+    if level == logging.NOTSET:
+        LOG.setLevel(logging.INFO)
+    screen.setLevel(LOG.level)
+    try:
+        with screen.shown():
+            yield
+    finally:
+        LOG.removeHandler(screen)
+        LOG.setLevel(level)
+
+
+@contextmanager
+def by_default(workers: int = 1) -> Iterator[None]:
+    """Show progress on stderr, or in the output of a notebook, unless the user has said where it goes: a handler of the root or of this package's logger."""
+    if logging.getLogger().handlers or LOG.handlers:
+        yield
+        return
+    screen = NotebookScreen() if in_notebook() else Screen(Console(stderr=True), workers)
+    with on_screen(screen):
+        yield

@@ -1,0 +1,174 @@
+"""A study file as a Python user holds it."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, fields, replace
+from hashlib import sha256
+from html import escape
+from os.path import realpath
+from pathlib import Path
+from typing import Any
+
+from stickslip.api.model import Model
+from stickslip.api.result import Result
+from stickslip.api.screen import by_default
+from stickslip.model.blas_threads import one_loaded_blas_thread
+from stickslip.study.analyses.forced_response.problem import HARMONICS, IN_TIME
+from stickslip.study.check import check_study
+from stickslip.study.models.study import Study as Content
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+from stickslip.study.shard import Shard
+
+
+@dataclass(frozen=True, eq=False)
+class _Elsewhere(Content):
+    """A study whose results go to a folder anywhere."""
+
+    place: Path = Path()
+
+    @property
+    def folder(self) -> Path:
+        """Where results go."""
+        return self.place
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Study:
+    """Questions about models, read from a file.
+
+    Parameters
+    ----------
+    content
+        What the file says, read and found good.
+    """
+
+    content: Content
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> "Study":
+        """Read a study file.
+
+        Raises
+        ------
+        InputError
+            Naming every problem of the file, one a line.
+        """
+        return cls(read_study(Path(path)))
+
+    @property
+    def folder(self) -> Path:
+        """Where results go."""
+        return self.content.folder
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Labels of what [vary] spans; one empty label without it."""
+        return tuple(case.label for case in self.content.file.cases)
+
+    def run(
+        self,
+        *,
+        workers: int = 1,
+        only: Sequence[str] = (),
+        fresh: bool = False,
+        verify: bool = False,
+        verify_harmonics: bool = False,
+        folder: str | Path | None = None,
+        executor: str | Executor = "",
+        shard: str | None = None,
+    ) -> Result:
+        """Answer the questions of the study, going on from what an interrupted run has finished.
+
+        BLAS takes one thread meanwhile, as in the command, so that the bits are the same: that of the wheels of NumPy and SciPy,
+        where no environment variable says otherwise. For another BLAS say OMP_NUM_THREADS=1 before NumPy is imported.
+
+        Parameters
+        ----------
+        workers
+            Number of processes; the numbers do not depend on it.
+        only
+            Names of the analyses to answer; all of the study if empty.
+        fresh
+            Forget what the results folder holds.
+        verify, verify_harmonics
+            Compare with time integration, and with twice as many harmonics.
+        folder
+            Where results go; left out: where the study says.
+        executor
+            What the jobs are given to: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or any
+            executor like those of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask client. Machines
+            share the folder.
+        shard
+            ``"2/5"``: the second of five runs that share the jobs, each started by itself.
+
+        Raises
+        ------
+        InputError
+            If the study, its files or its folder do not allow a run; before anything long is computed.
+        """
+        asked = {IN_TIME: verify, HARMONICS: verify_harmonics}
+        checks = [name for name, wanted in asked.items() if wanted]
+        names = [only] if isinstance(only, str) else list(only)
+        content = self.content
+        if folder is not None:
+            content = _Elsewhere(content.file, content.memo, Path(realpath(folder)))
+        share = None if shard is None else Shard.read(shard)
+        with by_default(workers), one_loaded_blas_thread():
+            outcome = run_study(
+                content, only=names, workers=workers, kind=executor, shard=share, fresh=fresh, checks=checks
+            )
+        return Result.of(outcome)
+
+    def check(self) -> tuple[str, ...]:
+        """Build every model, find its static state and natural frequencies, and estimate the cost; return warnings.
+
+        Raises
+        ------
+        InputError
+            If the study cannot be run.
+        """
+        with by_default():
+            return tuple(check_study(self.content))
+
+    def replace(self, values: Mapping[str, Any]) -> "Study":
+        """Return the study with other values of some keys; its results go to a folder of their own.
+
+        Parameters
+        ----------
+        values
+            Key of the file -> value: ``{"contact.flat.friction_coefficient": 0.4}``.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, its value is refused, or it is varied: then replace ``vary``.
+        """
+        said = [f"{key} = {value!r}" for key, value in sorted(values.items())]
+        mark = sha256("\n".join(said).encode()).hexdigest()[:8]
+        named = {"output.folder": f"{self.content.tables.output.folder}-{mark}"}
+        changed = self.content.replace({**named, **values})
+        text = "\n".join([self.content.text, "# replaced in Python", *(f"# {line}" for line in said), ""])
+        return Study(replace(changed, file=replace(changed.file, text=text)))
+
+    def model(self, case: int = 0) -> Model:
+        """Return the model of a case, which answers questions itself."""
+        made = self.content.model(case)
+        return Model(**{f.name: getattr(made, f.name) for f in fields(made)})
+
+    def __repr__(self) -> str:
+        tables = self.content.tables
+        contacts = f", contacts {', '.join(tables.contact)}" if tables.contact else ""
+        lines = [
+            f"Study: {self.content.title}",
+            f"  file: {self.content.path}",
+            f"  parts {', '.join(tables.part)}{contacts}",
+            f"  asks for {', '.join(self.content.asked) or 'nothing'}",
+            f"  results: {self.folder}",
+        ]
+        if len(self.cases) > 1:
+            lines.insert(4, f"  {len(self.cases)} cases: {self.cases[0]} ... {self.cases[-1]}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"

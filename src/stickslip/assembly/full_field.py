@@ -1,0 +1,169 @@
+"""The motion of every node from what a response solves for: the reductions made again with their way back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.build import linear_side, system_of
+from stickslip.assembly.locations import AXES
+from stickslip.assembly.mistuned import of_all, system_of_all
+from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import with_ways_back
+from stickslip.assembly.response_request import asked
+from stickslip.assembly.skin import mesh_dofs
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.reduction.waves import wave
+from stickslip.response.system import System
+
+Felt = Callable[[DynamicStiffness], DynamicStiffness]
+
+
+def as_it_is(side: DynamicStiffness) -> DynamicStiffness:
+    """Return what vibrates as a steady motion feels it."""
+    return side
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """The nodes of a part.
+
+    Parameters
+    ----------
+    part
+        Its name.
+    numbers
+        (n,) node numbers; 0 of the centre of a rigid body.
+    points
+        (n, 3) in m.
+    cells
+        (m, k) nodes of each cell in VTK order; None where the part has no mesh.
+    cell_numbers
+        (m,) of the cells; None without a mesh.
+    dofs
+        (n, 3) displacements among the dofs of all parts; -1 where a node is held.
+    """
+
+    part: str
+    numbers: IntArray
+    points: FloatArray
+    cells: IntArray | None
+    cell_numbers: IntArray | None
+    dofs: IntArray
+
+    def of(self, field: Matrix) -> Matrix:
+        """Return displacements (..., n, 3) from fields (..., N) on the dofs of all parts."""
+        held = np.zeros((*field.shape[:-1], 1), dtype=field.dtype)
+        return np.concatenate([field, held], axis=-1)[..., self.dofs]
+
+
+def nodes_of(model: Model) -> tuple[Nodes, ...]:
+    """Return the nodes of all parts that have a place in space.
+
+    Raises
+    ------
+    InputError
+        If none has.
+    """
+    found = [own for name in model.parts if (own := _nodes(model, name)) is not None]
+    if not found:
+        raise input_error("export", "no part has nodes with a place in space", "Give the matrices their nodes.")
+    return tuple(found)
+
+
+def _nodes(model: Model, name: str) -> Nodes | None:
+    part, first = model.parts[name], model.places.offset(name)
+    mesh, table = part.mesh, part.structure.dofs
+    if mesh is not None:
+        dofs = np.full((len(mesh.points), 3), -1)
+        own, nodes, components = mesh_dofs(part, mesh)
+        dofs[nodes, components] = own + first
+        return Nodes(name, mesh.numbers, mesh.points, mesh.cells, mesh.cell_numbers, dofs)
+    placed = np.isin(table.component, AXES) & np.isfinite(table.position).all(axis=1)
+    rows = np.flatnonzero(placed & ((table.node >= 0) | (part.body is not None)))
+    if not rows.size:
+        return None
+    numbers, where, place = np.unique(table.node[rows], return_index=True, return_inverse=True)
+    dofs = np.full((numbers.size, 3), -1)
+    dofs[place, [AXES.index(table.component[row]) for row in rows]] = rows + first
+    return Nodes(name, np.maximum(numbers, 0), table.position[rows[where]], None, None, dofs)
+
+
+@dataclass(frozen=True, eq=False)
+class Everywhere:
+    """From the coordinates that a motion is solved for to all dofs of all parts.
+
+    Parameters
+    ----------
+    system, load
+        As those of `Assembled`.
+    output_labels, outputs
+        What is reported, and the (k, 2) sector and dof of all parts of each.
+    order, sectors
+        Engine order or wave number, and number of sectors of a wheel; 0 and 1 of a single structure.
+    alike
+        Whether all sectors do what one does, later; else each has a motion of its own.
+    """
+
+    system: System
+    load: HarmonicLoad
+    output_labels: tuple[str, ...]
+    outputs: IntArray
+    order: int
+    sectors: int
+    alike: bool
+    _expand: Callable[[Matrix, int], Matrix]
+
+    def fields(self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is) -> ComplexArray:
+        """Return the (s, H+1, N) motion of all dofs: of each sector on the axes of the first one turned to it, of one where they are alike.
+
+        Parameters
+        ----------
+        omega
+            In rad/s.
+        retained
+            (H+1, n) motion of the retained coordinates of the system and of `more`, in rising order.
+        more
+            Coordinates that are known, too.
+        felt
+            What vibrates as the motion feels it, from what vibrates in steady motion.
+        """
+        condensed = felt(self.system.condensed(self.load, len(retained) - 1, more))
+        every = condensed.recover(omega, retained)
+        each = [np.atleast_2d(self._expand(own, h)) for h, own in enumerate(every)]
+        return np.stack(each, axis=1)
+
+    def phase(self, harmonic: int, sector: int) -> complex:
+        """Return what the motion of a sector is ahead of that of sector 0, on its own axes, in a harmonic, where sectors are alike."""
+        return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
+
+
+def everywhere(model: Model, harmonics: int, *, every_wave: bool = False, wave_number: int | None = None) -> Everywhere:
+    """Reduce a model again, with the way back to all its dofs.
+
+    Parameters
+    ----------
+    model
+        As it was solved.
+    harmonics, every_wave
+        As in `assemble`: with others of a wheel the number of modes may be another one.
+    wave_number
+        Of a tuned wheel that no load drives; None: that of the loads.
+    """
+    what = asked(model, harmonics)
+    names, dofs = what.labels.names, what.labels.dofs
+    if model.mistuning is not None:
+        n = model.sectors
+        wheel, (_, held), load = system_of_all(model, what, with_ways_back)
+        outputs = np.column_stack([np.repeat(np.arange(n), dofs.size), np.tile(dofs, n)])
+        named, order = of_all(names, n), what.order or 0
+        return Everywhere(held, load, named, outputs, order, n, False, lambda q, _: wheel.expand(q))
+    order = (what.order if wave_number is None else wave_number) or 0
+    more = range(model.sectors) if every_wave else ()
+    linear = linear_side(model, order, harmonics, what.kept, what.stay, with_ways_back, more)
+    _, held, load = system_of(model, linear, what)
+    outputs = np.column_stack([np.zeros_like(dofs), dofs])
+    return Everywhere(held, load, names, outputs, order, model.sectors, True, linear.expand)

@@ -1,0 +1,213 @@
+"""Which bodies of a model neither supports nor contacts nor joins hold, and how these can move."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.locations import picked
+from stickslip.assembly.model import Model
+from stickslip.contact.law import holding_directions
+from stickslip.contact.laws import law_name
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.errors import InputError, input_error
+from stickslip.model.part import Part
+from stickslip.model.rigid.motion import in_words, loose_motions
+
+RANK = 1e-8  # singular value over what rows and motions would give without cancelling, below which a motion strains nothing
+SHARE = 1e-6  # of the largest share of a free motion below which a body takes no part in it
+SLIDERS = ("jenkins", "iwan", "dahl")  # laws of a bounded force that nothing presses
+NAMED = 3  # parts that a message names
+
+
+@dataclass(frozen=True, eq=False)
+class Loose:
+    """A body of a part that nothing of the part itself holds.
+
+    Parameters
+    ----------
+    part
+        Its name.
+    dofs
+        (m,) among those of all parts.
+    motions
+        (m, f) its free motions, the largest entry of each one.
+    """
+
+    part: str
+    dofs: IntArray
+    motions: FloatArray
+
+
+def refuse_unheld(model: Model) -> None:
+    """Refuse a model of which a body is free although all contacts stick.
+
+    Raises
+    ------
+    InputError
+        Naming the part and its free motions.
+    """
+    found = unheld(model, np.ones(len(model.pairs.names), dtype=bool))
+    if found:
+        raise found[0]
+
+
+def unheld(model: Model, holds: BoolArray) -> list[InputError]:
+    """Return a complaint about each part that is free to move where some contact points (p,) hold and the others are open."""
+    bodies = _loose(model)
+    columns = _columns(bodies)
+    free = _free(model, bodies, holds)
+    found: dict[str, InputError] = {}
+    for body, first, last in zip(bodies, columns, columns[1:], strict=False):
+        own = free[first:last]
+        left, sizes, _ = np.linalg.svd(own, full_matrices=False)
+        shapes = body.motions @ left[:, sizes > SHARE]
+        if shapes.shape[1]:
+            complaint = _complaint(model, body, shapes, at_rest=not np.all(holds))
+            found.setdefault(body.part, complaint)
+    return list(found.values())
+
+
+def held_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that are free at rest, or once all sliders slip, where contact points (p,) are pressed at rest."""
+    return (*open_warnings(model, pressed), *sliding_warnings(model, pressed))
+
+
+def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that are free to move at rest, where the static loads press some contact points (p,) and the others are open."""
+    if np.all(pressed):
+        return ()
+    return tuple(
+        f"{error} The mean of its vibration is known only where contacts close." for error in unheld(model, pressed)
+    )
+
+
+def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that sliders alone hold where contact points (p,) are pressed at rest: once all slip, nothing does."""
+    slides = np.array([law_name(law) in SLIDERS for law in model.pairs.laws], dtype=bool)
+    if not slides.any():
+        return ()
+    at_rest = {error.place for error in unheld(model, pressed)}
+    return tuple(
+        f"{error.place}: sliders alone hold it; while all of them slip it is free, its mean position is undetermined, and the "
+        "solution may fail there. Give it a spring to the ground, or a load that does not move them all."
+        for error in unheld(model, pressed & ~slides)
+        if error.place not in at_rest
+    )
+
+
+def free_motions(model: Model, holds: BoolArray) -> FloatArray:
+    """Return the (N, f) motions of the dofs of all parts that strain nothing where some contact points (p,) hold."""
+    bodies = _loose(model)
+    return _moves(model, bodies) @ _free(model, bodies, holds)
+
+
+def _columns(bodies: list[Loose]) -> IntArray:
+    return np.cumsum([0, *(body.motions.shape[1] for body in bodies)])
+
+
+def _moves(model: Model, bodies: list[Loose]) -> FloatArray:
+    """Return the motions of bodies side by side, on the dofs of all parts."""
+    columns = _columns(bodies)
+    moves = np.zeros((model.places.n, columns[-1]))
+    for body, first in zip(bodies, columns, strict=False):
+        moves[body.dofs, first : first + body.motions.shape[1]] = body.motions
+    return moves
+
+
+def _free(model: Model, bodies: list[Loose], holds: BoolArray) -> FloatArray:
+    """Return the shares (m, f) of the motions of bodies that make one that strains nothing."""
+    moves = _moves(model, bodies)
+    rows = _holding(model, holds)
+    strained = np.vstack([one @ moves for one in rows])
+    largest = max((float((abs(one) @ abs(moves)).max(initial=0.0)) for one in rows), default=0.0)
+    if len(strained) > moves.shape[1]:
+        strained = np.asarray(np.linalg.qr(strained, mode="r"))
+    _, values, right = np.linalg.svd(strained, full_matrices=True)
+    rank = int(np.count_nonzero(values > RANK * largest))
+    return np.asarray(right[rank:].T)
+
+
+def _loose(model: Model) -> list[Loose]:
+    bodies = []
+    for name, part in model.parts.items():
+        own = model.places.own(name)
+        for dofs, motions in _of_part(part):
+            if motions.shape[1]:
+                bodies.append(Loose(name, own[dofs], motions))
+    return bodies
+
+
+def _of_part(part: Part) -> list[tuple[IntArray, FloatArray]]:
+    """Return the bodies of a part that are free by themselves, with their motions; remembered."""
+    if "loose" not in part.memo:
+        structure = part.structure
+        found: list[tuple[IntArray, FloatArray]] = [(np.arange(6), np.eye(6))]
+        if part.body is None:
+            found = loose_motions(structure.stiffness, structure.dofs)
+        if part.sectors > 1 and _alike(part):
+            found = [(dofs, _with_all_sectors(part, dofs, motions)) for dofs, motions in found]
+        part.memo["loose"] = found
+    loose: list[tuple[IntArray, FloatArray]] = part.memo["loose"]
+    return loose
+
+
+def _alike(part: Part) -> bool:
+    """Whether cyclic faces let a sector move as all others do, and not by itself."""
+    return any(face in part.structure.sets for face in part.faces)
+
+
+def _with_all_sectors(part: Part, dofs: IntArray, motions: FloatArray) -> FloatArray:
+    """Return those free motions of a sector that all sectors have alike: along the axis and about it."""
+    table, axis = part.structure.dofs.take(dofs), part.axis
+    turning = np.cross(axis.unit, table.position - np.asarray(axis.origin))
+    column = [("x", "y", "z").index(c) if c in ("x", "y", "z") else -1 for c in table.component]
+    rows = np.arange(len(column))
+    alike = np.column_stack([np.tile(axis.unit, (len(column), 1))[rows, column], turning[rows, column]])
+    alike = np.where(np.array(column)[:, None] >= 0, np.nan_to_num(alike), 0.0)
+    kept = [v / np.abs(v).max() for v in alike.T if np.any(v) and _inside(v, motions)]
+    return np.column_stack(kept) if kept else motions[:, :0]
+
+
+def _inside(vector: FloatArray, motions: FloatArray) -> bool:
+    rest = vector - motions @ np.linalg.lstsq(motions, vector, rcond=None)[0]
+    return bool(np.linalg.norm(rest) < 1e-6 * np.linalg.norm(vector))
+
+
+def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
+    """Return rows on the dofs of all parts that vanish where nothing is strained."""
+    pairs, ties = model.pairs, model.ties
+    stiff = [np.ones(3, dtype=bool) if isinstance(law, RigidCoulomb) else holding_directions(law) for law in pairs.laws]
+    rows = np.flatnonzero(np.repeat(holds, 3) & np.array(stiff, dtype=bool).reshape(-1))
+    n = model.places.n
+    found = [
+        (pairs.own + pairs.following)[rows],
+        picked(ties.followers, n) - ties.weights,
+        picked(ties.high, n) - ties.onward @ picked(ties.low, n),
+    ]
+    if model.retention > 0:
+        found.append(picked(model.places.bodies(), n))
+    return found
+
+
+def _complaint(model: Model, body: Loose, shapes: FloatArray, *, at_rest: bool) -> InputError:
+    part = model.parts[body.part]
+    words = in_words(model.places.dofs.take(body.dofs), shapes)
+    if part.sectors > 1 and shapes.shape[1] == 2 and _alike(part):
+        words = "moving along the axis and turning about it"
+    whole = body.dofs.size == part.structure.n
+    which = "" if whole else f"the body of {_label(part, body.dofs[0] - model.places.own(body.part)[0])} "
+    what = "no closed contact, support" if at_rest else "no support, contact"
+    add = "press its contacts by a static load" if at_rest else "add a contact with stiffness"
+    spring = "give [retention] a stiffness" if part.body is not None else "give it a spring to the ground"
+    return input_error(
+        f"part.{body.part}",
+        f"{which}is held by nothing{' at rest' if at_rest else ''}: {what} or join keeps it from {words}",
+        f"Clamp it, join it, {add} in that direction, or {spring}.",
+    )
+
+
+def _label(part: Part, dof: int) -> str:
+    """Return the name of a dof: of a set that holds it alone, else that of its node."""
+    names = [name for name, members in part.structure.sets.items() if list(members) == [dof]]
+    return (names or [part.structure.dofs.labels[dof]])[0]

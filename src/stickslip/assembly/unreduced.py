@@ -1,0 +1,93 @@
+"""Models that stay as the finite elements made them: when nothing is condensed, and which analyses take that."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import Matrix
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.locations import stacked
+from stickslip.assembly.model import Model
+from stickslip.contact.laws import law_name
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.errors import input_error
+from stickslip.harmonic.dynamic_stiffness import LARGEST_INTERIOR
+from stickslip.harmonic.linear import LinearSide
+from stickslip.harmonic.sparse_stiffness import Unreduced
+from stickslip.model.structure import Structure
+
+KEPT = 'reduction.method = "none" keeps parts whole'
+INSTEAD = "take [forced_response], which solves for all dofs"
+
+
+def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
+    """Return a structure whose parts are kept whole as it is where it has too many dofs to be condensed; `gaps` are those of its contacts."""
+    if structure.is_complex or not scipy.sparse.issparse(structure.stiffness):
+        return structure
+    interior = structure.n - np.unique(gaps.nonzero()[1]).size
+    return Unreduced(structure) if interior > LARGEST_INTERIOR else structure
+
+
+def kept_whole(model: Model) -> int:
+    """Return how many dofs a model not yet assembled keeps because nothing is condensed, about; 0 where something is."""
+    dofs, interior = _dofs(model)
+    return dofs if interior > LARGEST_INTERIOR else 0
+
+
+def _dofs(model: Model) -> tuple[int, int]:
+    """Return how many dofs the parts that are kept whole have, and how many of these touch no contact."""
+    if model.neighbours is not None:
+        return 0, 0
+    whole = [
+        model.places.own(name)
+        for name, part in model.parts.items()
+        if part.body is None and (part.template or part).reduction is None
+    ]
+    dofs = stacked(whole)
+    interior = np.setdiff1d(dofs, model.pairs.own.nonzero()[1])
+    return dofs.size, interior.size
+
+
+def refuse_rigid(model: Model, side: LinearSide) -> None:
+    """Refuse rigid contacts of a model of which nothing is condensed.
+
+    Raises
+    ------
+    InputError
+        That names the contact.
+    """
+    rigid = [n for n, one in model.contacts.items() if isinstance(one.law, RigidCoulomb)]
+    if rigid and isinstance(side, Unreduced):
+        raise input_error(
+            f"contact.{rigid[0]}.law",
+            f"is {law_name(model.contacts[rigid[0]].law)}, which needs a reduced model: {KEPT}",
+            'Reduce the parts (method = "craig_bampton"), or give the contact a stiffness, such as elastic_coulomb.',
+        )
+
+
+def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
+    """Refuse a model of which nothing would be condensed, before it is assembled.
+
+    Raises
+    ------
+    InputError
+        That names `analysis`, and what to do `instead`.
+    """
+    dofs, interior = _dofs(model)
+    if interior <= LARGEST_INTERIOR:
+        return
+    raise input_error(
+        analysis,
+        f"needs a reduced model: {KEPT}, and {interior} of {dofs} dofs touch no contact, more than {LARGEST_INTERIOR}",
+        f'Reduce the parts (method = "craig_bampton"), or {instead}.',
+    )
+
+
+def unreduced_line(model: Assembled) -> tuple[str, ...]:
+    """Return how a model is solved of which nothing is condensed; nothing of others."""
+    if not isinstance(model.system.structure, Unreduced):
+        return ()
+    text = (
+        f"nothing is condensed: {KEPT}, all {model.system.structure.n} dofs are unknown in each harmonic. Their matrices stay sparse, Newton "
+        "steps are solved by a Krylov method with one sparse factor. Stability and time integration need a reduced model"
+    )
+    return (text,)

@@ -1,0 +1,313 @@
+"""Harmonic balance of motions with two frequencies: ``q(t) = Re Σ Q_jk e^{i(jω1 + kω2)t}``, with the static term.
+
+Each combined frequency has its own condensed dynamic stiffness; contacts are marched along characteristics of the torus
+(`stickslip.harmonic.two_frequency_path`), and their derivatives with them, so that the Jacobian is that of the equations that are solved. It has the
+parts of that of a harmonic balance, combined frequencies in place of harmonics, and is kept by them where that costs less.
+"""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.addresses import law_address
+from stickslip.contact.compiled import CompiledContacts, MarchedLaws
+from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
+from stickslip.contact.march import period_march
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import JacobianForm, check_retained
+from stickslip.harmonic.costs import linear_costs, products_pay
+from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.structured import StructuredJacobian
+from stickslip.harmonic.two_frequency_path import Indices, TorusPath, half_plane, torus_basis, torus_rates
+from stickslip.harmonic.two_frequency_products import CombinedProducts
+from stickslip.harmonic.two_frequency_side import TorusSide
+
+MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
+
+
+@dataclass(frozen=True, eq=False)
+class TorusForces:
+    """Contacts over the torus.
+
+    Parameters
+    ----------
+    coefficients
+        (m, 3 n_contacts) of the forces, N.
+    blocks
+        (n_contacts, P, m, m) derivatives by those of the gaps.
+    beyond
+        (m', 3 n_contacts) coefficients at the combined frequencies asked for besides.
+    rates
+        Whether a force depends on velocity.
+    unsettled
+        Contacts whose state did not repeat on a characteristic.
+    """
+
+    coefficients: FloatArray
+    blocks: FloatArray
+    beyond: FloatArray
+    rates: bool
+    unsettled: int
+
+
+@dataclass(frozen=True, eq=False)
+class TorusLinearisation:
+    """Residual and derivatives at one state, all scaled."""
+
+    residual: FloatArray
+    jac: FloatArray | StructuredJacobian
+    by_first: FloatArray
+    by_second: FloatArray
+    seconds_contact: float
+    unsettled: int
+
+    def dense_jac(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
+
+
+@dataclass(frozen=True, eq=False)
+class TorusBalance:
+    """The problem of two frequencies; `torus_balance` makes one.
+
+    Unknowns are the real coefficients of each index, index-major: ``[Q_00, C_10, S_10, ...]`` with ``Q = C - iS``, over `displacement_scale`.
+    """
+
+    side: TorusSide
+    interface: Interface
+    compiled: CompiledContacts
+    rows: SparseRows
+    indices: Indices
+    displacement_scale: float
+    force_scale: float
+    jacobian: JacobianForm = "auto"
+
+    @property
+    def structured(self) -> bool:
+        """Whether the Jacobian is given by its products."""
+        derivatives = self.compiled.n_contacts * self.compiled.pairs * self.n_rows**2
+        pays = products_pay(linear_costs(self.side.n, len(self.indices), derivatives))
+        return pays if self.jacobian == "auto" else self.jacobian == "structured"
+
+    @property
+    def order(self) -> int:
+        """Largest sum of harmonics."""
+        return max(abs(j) + abs(k) for j, k in self.indices)
+
+    @property
+    def n_rows(self) -> int:
+        """Real coefficients a coordinate."""
+        return 2 * len(self.indices) - 1
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.n_rows * self.side.n
+
+    def coefficients(self, x: FloatArray) -> ComplexArray:
+        """Return the (len(indices), n) coefficients of unknowns, m."""
+        return to_complex(x.reshape(self.n_rows, self.side.n)) * self.displacement_scale
+
+    def unknowns(self, coefficients: ComplexArray) -> FloatArray:
+        """Return the unknowns of coefficients."""
+        return to_real(coefficients).reshape(-1) / self.displacement_scale
+
+    def with_indices(self, indices: Indices) -> "TorusBalance":
+        """Return the same with other combined frequencies."""
+        # rows of its own: they tell a solver which Jacobians can share a preconditioner
+        return replace(self, indices=indices, rows=replace(self.rows))
+
+    def from_other(self, other: "TorusBalance", x: FloatArray) -> FloatArray:
+        """Return the unknowns of a motion that was found with other indices."""
+        known = dict(zip(other.indices, other.coefficients(x), strict=True))
+        none = np.zeros(self.side.n, dtype=complex)
+        return self.unknowns(np.array([known.get(index, none) for index in self.indices]))
+
+    def forces(
+        self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices = ((0, 0),)
+    ) -> TorusForces:
+        """Return what the contacts do on the torus, `more` names combined frequencies at which their forces are asked for, too."""
+        gaps = self.rows.gaps(x.reshape(self.n_rows, self.side.n) * self.displacement_scale)
+        frequencies = self.frequencies(omegas)
+        n, m, pairs = self.compiled.n_contacts, self.n_rows, self.compiled.pairs
+        coefficients, blocks = np.zeros((m, n, 3)), np.zeros((n, pairs, m, m))
+        beyond = np.zeros((2 * len(more) - 1, n, 3))
+        unsettled, rates = 0, False
+        for way in range(path.ways):
+            basis = torus_basis(path, self.indices, way)
+            slope = torus_rates(basis, frequencies)
+            for laws in self.compiled.marched:
+                force, own, late, rated = _marched(laws, gaps.reshape(m, n, 3), (basis, slope), omegas[0], pairs)
+                coefficients[:, laws.contacts] += _analysed(force, basis) / path.ways
+                wider = torus_basis(path, more, way)
+                beyond[:, laws.contacts] += _analysed(force, wider) / path.ways
+                blocks[laws.contacts] += own / path.ways
+                unsettled, rates = unsettled + late, rates or rated
+        if self.compiled.weights is not None:
+            coefficients *= self.compiled.weights[:, None]
+            beyond *= self.compiled.weights[:, None]
+            blocks *= self.compiled.weights[:, None, None, None]
+        return TorusForces(coefficients.reshape(m, -1), blocks, beyond.reshape(len(beyond), -1), rates, unsettled)
+
+    def frequencies(self, omegas: tuple[float, float]) -> FloatArray:
+        """Return the combined frequencies, rad/s; some may be below zero."""
+        return np.asarray(np.array(self.indices, dtype=float) @ np.array(omegas))
+
+    def linearise(
+        self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, rate: float = 0.0
+    ) -> TorusLinearisation:
+        """Return residual and derivatives at unknowns `x`; `rate` as in `TorusSide.stiffness`."""
+        start = perf_counter()
+        forces = self.forces(x, omegas, path)
+        seconds = perf_counter() - start
+        factor = self.displacement_scale / self.force_scale
+        stiffness, slopes = self.side.stiffness(self.indices, omegas, rate)
+        load, load_first, load_second = self.side.load(self.indices, omegas)
+        jac = StructuredJacobian(CombinedProducts(stiffness), forces.blocks, self.rows, factor)
+        q = self.coefficients(x)[:, :, None]
+        residual = to_real((stiffness @ q)[..., 0] - load)
+        self.rows.add_forces(forces.coefficients, residual)
+        j, k = np.array(self.indices, dtype=float).T[:, :, None]
+        moved = (slopes @ q)[..., 0]
+        by = [to_real(j * moved - load_first), to_real(k * moved - load_second)]
+        if forces.rates:
+            for place in range(2):
+                self.rows.add_forces(self._by_rate(x, omegas, path, place), by[place])
+        scale = self.force_scale
+        return TorusLinearisation(
+            residual.reshape(-1) / scale,
+            jac if self.structured else jac.dense(),
+            by[0].reshape(-1) / scale,
+            by[1].reshape(-1) / scale,
+            seconds,
+            forces.unsettled,
+        )
+
+    def left_out(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices) -> ComplexArray:
+        """Return the (len(more), n) motion that the contact forces at combined frequencies left out would make, m; 0 at (0, 0).
+
+        Contacts answer it with the stiffness that they have against the first frequency.
+        """
+        forces = self.forces(x, omegas, path, more)
+        out = np.zeros((2 * len(more) - 1, self.side.n))
+        self.rows.add_forces(forces.beyond, out)
+        stiffness, _ = self.side.stiffness(more, omegas)
+        against = np.zeros((self.side.n, self.side.n), order="F")
+        cos = forces.blocks[:, :, 1:3, 1:3].diagonal(axis1=2, axis2=3).mean(axis=2)
+        add_contact_jacobian(
+            np.ascontiguousarray(cos[:, :, None, None]), self.rows.columns, self.rows.values, self.side.n, 1.0, against
+        )
+        moved = np.zeros((len(more), self.side.n), dtype=complex)
+        right = to_complex(out)
+        moved[1:] = np.linalg.solve(stiffness[1:] + against, -right[1:, :, None])[..., 0]
+        return moved
+
+    def by_damping(self, x: FloatArray, omegas: tuple[float, float], rate: float, step: float) -> FloatArray:
+        """Return the derivative of the residual by `rate`, a central difference of the linear side."""
+        q = self.coefficients(x)[:, :, None]
+        ends = [self.side.stiffness(self.indices, omegas, rate + s)[0] for s in (-step, step)]
+        change = ((ends[1] - ends[0]) @ q)[..., 0] / (2.0 * step)
+        return np.asarray(to_real(change).reshape(-1) / self.force_scale)
+
+    def _by_rate(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, place: int) -> FloatArray:
+        """Return the derivative of the coefficients of the contact forces by a frequency, where they depend on velocity."""
+        step = 1e-5 * omegas[place]
+        ends = []
+        for sign in (-1.0, 1.0):
+            moved = list(omegas)
+            moved[place] += sign * step
+            ends.append(self.forces(x, (moved[0], moved[1]), path).coefficients)
+        return np.asarray((ends[1] - ends[0]) / (2.0 * step))
+
+
+def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBalance:
+    """Set up the balance of a motion with two frequencies.
+
+    Parameters
+    ----------
+    side
+        What vibrates and its loads.
+    interface
+        Contacts on all dofs.
+    order
+        Largest sum of harmonics ``|j| + |k|``.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, its dofs are not retained, a load is above the order, or there are too many unknowns.
+    """
+    if interface.rigid:
+        raise input_error(
+            "quasi_periodic",
+            "a contact is rigid: its force is no function of the gap",
+            "Give the contacts a stiffness, such as elastic_coulomb.",
+        )
+    check_retained("quasi_periodic", side.first, interface)
+    loads = side.first.load, side.second.load
+    highest = max((h for one in loads for h, f in one.harmonics.items() if np.any(f)), default=0)
+    if highest > order:
+        raise input_error(
+            "quasi_periodic.harmonics",
+            f"is {order}, and a load acts with {highest} times its frequency",
+            f"Keep {highest} or more.",
+        )
+    local = interface.restricted(side.first.retained)
+    stiffness = local.stuck_stiffness()
+    known = stiffness[stiffness > 0.0]
+    typical = float(np.exp(np.mean(np.log(known)))) if known.size else 1.0
+    scale = max(*(one.scale for one in loads), float(np.max(np.abs(local.resting_force()), initial=0.0)))
+    if scale <= 0.0:
+        raise input_error("quasi_periodic", "nothing acts on the model", "Give a load.")
+    indices = half_plane(order)
+    unknowns = (2 * len(indices) - 1) * side.n
+    if unknowns > MOST_UNKNOWNS:
+        raise input_error(
+            "quasi_periodic.harmonics",
+            f"{order} make {unknowns} unknowns of {side.n} coordinates, more than {MOST_UNKNOWNS}",
+            "Keep fewer, or reduce the contacts.",
+        )
+    compiled = local.compiled("march")
+    rows = sparse_rows(local.gap_operator)
+    return TorusBalance(side, local, compiled, rows, indices, scale / typical, scale)
+
+
+def _marched(
+    laws: MarchedLaws, gaps: FloatArray, tables: tuple[FloatArray, FloatArray], omega: float, pairs: int
+) -> tuple[FloatArray, FloatArray, int, bool]:
+    """March contacts of one law class along a characteristic; return forces, blocks, how many did not settle, and whether velocity counts."""
+    basis, rates = tables
+    own = gaps[:, laws.contacts]
+    n, samples = own.shape[1], len(basis)
+    flat = own.reshape(len(own), -1).T
+    gap, velocity = (np.ascontiguousarray((flat @ t.T).reshape(n, 3, samples)) for t in tables)
+    force, by_omega = np.empty_like(gap), np.empty_like(gap)
+    state = np.empty((n, 2, samples), dtype=np.int64)
+    blocks = np.empty((n, pairs, len(own), len(own)))
+    periods = np.empty(n, dtype=np.int64)
+    period_march()(
+        law_address(laws.kernel),
+        laws.parameters,
+        laws.start,
+        gap,
+        velocity,
+        basis,
+        rates,
+        omega,
+        force,
+        state,
+        blocks,
+        by_omega,
+        periods,
+    )
+    return force, blocks, int(np.count_nonzero(periods < 0)), bool(np.any(by_omega))
+
+
+def _analysed(force: FloatArray, basis: FloatArray) -> FloatArray:
+    """Return the (m, n, 3) coefficients of forces (n, 3, samples)."""
+    n, _, samples = force.shape
+    found = (2.0 / samples) * (basis.T @ force.reshape(3 * n, samples).T)
+    found[0] *= 0.5
+    return np.asarray(found.reshape(-1, n, 3))

@@ -1,0 +1,216 @@
+"""A nonlinear mode as a curve whose harmonics are raised where frequency or damping ratio ask for it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.bordered import PeriodicProblem
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.response.branch import Curve, Followed, Judged
+from stickslip.response.equilibrium import preload
+from stickslip.response.nonlinear_modes.modal_amplitude import by_energy
+from stickslip.response.self_excited.contacts import contacts_of
+from stickslip.response.self_excited.curve import PATIENT
+from stickslip.response.self_excited.problem import SelfExcited
+from stickslip.solve.branch import Following, Latest
+from stickslip.solve.continuation import Point, StepControl
+from stickslip.solve.linear import factorised
+from stickslip.solve.newton_method import Solution, first_converged, newton
+
+LARGEST = 0.1  # change of the shape in a step: with 0.25 a mode of a chain went past two of its four folds
+CORRECTIONS = 8  # Newton steps to a point: beyond a corner a shorter step takes fewer
+GROWTH = 2.5  # of steps beyond a corner, where they have become short
+MORE = 2  # times the harmonics, and one, from one level to the next
+SAFETY = 1.25
+AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
+NEAR = 0.3
+FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
+SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCurve(Curve):
+    """The motions of a mode over ``ln a``.
+
+    Parameters
+    ----------
+    problems
+        The mode with the harmonics of each level.
+    control
+        Steps.
+    tolerance
+        Relative change of frequency or damping ratio beyond which harmonics are raised.
+    decaying
+        Whether motions are those that decay as they are, at the complex frequency λ, not steady ones that a level of damping keeps going.
+    """
+
+    problems: tuple[SelfExcited, ...]
+    control: StepControl
+    tolerance: float
+    decaying: bool = False
+    wider: dict[int, tuple[SelfExcited, PeriodicProblem] | None] = field(
+        default_factory=dict, repr=False
+    )  # of each level, made when first needed
+
+    @classmethod
+    def of(
+        cls,
+        problem: SelfExcited,
+        span: tuple[float, float],
+        points: int,
+        most: int = 0,
+        tolerance: float = 1e-3,
+        *,
+        decaying: bool = False,
+    ) -> "ModeCurve":
+        """Return the curve of a mode with its harmonics, and levels of more up to `most`."""
+        every = [problem]
+        while every[-1].balance.order < most:
+            every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
+        length = abs(float(np.log(span[1] / span[0])))
+        control = StepControl(scale=length / (points * LARGEST), first=0.05, largest=LARGEST, growth=GROWTH)
+        return cls(tuple(every), control, tolerance, decaying)
+
+    @property
+    def levels(self) -> int:
+        """Number of levels."""
+        return len(self.problems)
+
+    @cached_property
+    def equations(self) -> tuple[PeriodicProblem, ...]:
+        """The equation of each level."""
+        return tuple(map(self._equation, self.problems))
+
+    def _equation(self, own: SelfExcited) -> PeriodicProblem:
+        family = own.decaying if self.decaying else None
+        return own.over_amplitude(family, held=by_energy(own), linear_alone=True)
+
+    def judging(self, level: int) -> tuple[SelfExcited, PeriodicProblem] | None:
+        """Return the mode and its equation with the harmonics towards which motions of a level are judged; None where a wheel has no such waves."""
+        if level not in self.wider:
+            made = self.problems[level].judging()
+            self.wider[level] = None if made is None else (made, self._equation(made))
+        return self.wider[level]
+
+    def linear(self, level: int, y: FloatArray) -> DynamicStiffness:
+        """Return what vibrates as a motion feels it."""
+        own = self.problems[level]
+        return (own.decaying if self.decaying else own.damped)(float(y[-1])).linear
+
+    def frequency_and_damping(self, level: int, y: FloatArray) -> tuple[float, float]:
+        """Return frequency, rad/s, and damping ratio of a motion; of one that decays |λ| and -Re λ / |λ|."""
+        own = self.problems[level]
+        omega, ratio = own.omega(y), own.ratio(y)
+        if not self.decaying:
+            return omega, ratio
+        stretch = float(np.hypot(1.0, ratio))
+        return omega * stretch, ratio / stretch
+
+    @cached_property
+    def static(self) -> FloatArray:
+        """(n_retained,) displacement under the static load, m."""
+        own = self.problems[0]
+        return preload(own.system, own.load.static)
+
+    def problem(self, level: int) -> PeriodicProblem:
+        """Return the equation of a level."""
+        return self.equations[level]
+
+    def following(self, level: int) -> Following:
+        """Return how its branch is followed: lengths are those of the vibration, the frequency and the level, not of the mean."""
+        own = self.problems[level]
+        weights = np.ones(own.balance.size + 2)
+        weights[: own.balance.linear.n] = 0.0
+        few = replace(own.how.newton, max_iterations=CORRECTIONS)
+        return Following(
+            newton=few, control=self.control, weights=weights, predictor="parabola", corrector="kept_factors"
+        )
+
+    def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
+        """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
+        own, equation = self.problems[level], self.problem(level)
+        starts = [self.lifted(n.point.x, n.level, level) for n in near]
+        starts.append(own.guess(self.static, float(np.exp(p))))
+        options = own.how.newton, replace(PATIENT, linear=own.how.newton.linear)
+        attempts = (
+            newton(lambda y: equation.linearise(y, p), start, one)
+            for one in options[: 2 if effort else 1]
+            for start in starts
+        )
+        return first_converged(attempts)
+
+    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
+        """Return unknowns of one level as those of another; missing harmonics are zero."""
+        return x if level == to else _lifted(self.problems[level], self.problems[to], x)
+
+    def cost(self, level: int) -> float:
+        """Return the work of a Newton step."""
+        return 1.0 + self.problems[level].balance.size / SMALL
+
+    def judge(self, level: int, point: Point, latest: Latest) -> Judged:
+        """Foretell by a Newton step with the harmonics towards which motions are judged what these change of frequency and damping ratio; with the most harmonics the difference from fewer counts, too."""
+        if level + 1 == self.levels > 1:
+            last = self.at_the_cap(level, point)
+            return last if last.bound > self.tolerance else Judged(np.fmax(last.bound, self._foretold(level, point)))
+        return Judged(self._foretold(level, point))
+
+    def _foretold(self, level: int, point: Point) -> float:
+        """Return the change by a Newton step towards the judging set; NaN where a wheel has no such waves."""
+        wider = self.judging(level)
+        if wider is None:
+            return np.nan
+        mode, equation = wider
+        more = _lifted(self.problems[level], mode, point.x)
+        at = equation.linearise(more, point.p)
+        inverse = factorised(mode.how.newton.linear, at.jac)
+        step = None if inverse is None else inverse(-at.residual)
+        return np.inf if step is None else SAFETY * self._change(level, more, more + step)
+
+    def at_the_cap(self, level: int, point: Point) -> Judged:
+        """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
+        fewer = self.problem(level - 1)
+        start = self.lifted(point.x, level, level - 1)
+        found = newton(lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton)
+        if not found.status.converged:
+            return Judged(np.inf)
+        return Judged(self._change(level, self.lifted(found.x, level - 1, level), point.x))
+
+    def quiet(self, level: int, judged: Judged) -> bool:
+        """Whether a bound is below the tolerance, or nobody can tell."""
+        return not judged.bound > self.tolerance
+
+    def agree(self, fewer: Followed, more: Followed) -> bool:
+        """Whether frequency and damping ratio differ by clearly less than the tolerance."""
+        return self._between(fewer, more) <= AGREE * self.tolerance
+
+    def near(self, fewer: Followed, more: Followed) -> bool:
+        """Whether two motions differ by so little that they cannot stand on different sheets."""
+        return self._between(fewer, more) <= NEAR
+
+    def height(self, found: Followed) -> float:
+        """Return the damping ratio."""
+        return self.frequency_and_damping(found.level, found.point.x)[1]
+
+    def slips_grossly(self, found: Followed) -> bool:
+        """Whether every contact that can slip has slipped or opened in a motion."""
+        own = self.problems[found.level]
+        return contacts_of(own, found.point.x, float(np.exp(found.p))).slipping == 1.0
+
+    def _between(self, fewer: Followed, more: Followed) -> float:
+        lifted = self.lifted(fewer.point.x, fewer.level, more.level)
+        return self._change(more.level, lifted, more.point.x)
+
+    def _change(self, level: int, one: FloatArray, other: FloatArray) -> float:
+        """Return the relative difference of two motions in frequency or damping ratio, the larger one."""
+        (slow, few), (fast, many) = (self.frequency_and_damping(level, y) for y in (one, other))
+        size = max(abs(few), abs(many), FAINT_RATIO)
+        return max(abs(fast / slow - 1.0), abs(many - few) / size)
+
+
+def _lifted(own: SelfExcited, other: SelfExcited, x: FloatArray) -> FloatArray:
+    """Return unknowns of a mode as those of the same mode with other harmonics."""
+    a, b = (replace(p.balance, displacement_scale=1.0) for p in (own, other))
+    return np.append(b.unknowns(a.coefficients(x[:-2])), x[-2:])

@@ -1,0 +1,260 @@
+"""Whether a mode may be taken as the only one that answers: what the other modes do, linearly, under the same force.
+
+All other modes are there as the linear ones that they are with the contacts stuck: what the whole linear structure answers, less the part of the
+linear mode. They answer to what the motion of the backbone leaves of the load. As long as nothing slips they are added, and the sum is the
+exact response. Where contacts slip they feel a motion that the backbone does not know, and the amplitude of a resonance is off by about
+
+    foreign = m max(1 - S, 1/5) + (ζ / δ)² ,
+
+with m the motion of the others over that of the mode, in the output or in the gaps of the contacts; S the growth ``d ln a / d ln level``, which is
+small where slip holds the gap; ζ the damping ratio and δ the relative distance to the next frequency. `docs/theory/modal_synthesis.md` says how
+often it was.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.model.blas_threads import by_one_thread
+from stickslip.model.modes import normal_modes, with_springs
+from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_basis, in_coordinates
+from stickslip.reduction.nodal import own_motions
+from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
+from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, at_resonance
+from stickslip.response.static_contact_state import holding
+
+WHOLE = 300  # coordinates up to which all motions count
+LOWEST = 80  # of more, so many modes and the static answer to the force
+ACROSS = 0.02  # of ln a, over which the growth with the level is taken
+WIDTHS = 2.0  # half-widths of a peak within which the other modes may move it
+HELD = 0.2  # least share of the others that counts
+CHANGES = 1e-3  # relative change of frequency or damping from the linear mode that counts as slip
+
+
+@dataclass(frozen=True, eq=False)
+class OtherModes:
+    """The linear structure with its contacts stuck, less the linear mode that the backbone begins with.
+
+    Parameters
+    ----------
+    oscillator
+        The backbone and its load.
+    poles
+        (m,) eigenvalues of the structure, 1/s.
+    left, right
+        (m, n) and (n, m): a force f answers with ``right diag(1 / (iΩ - poles)) left f``.
+    """
+
+    oscillator: ModalOscillator
+    poles: ComplexArray
+    left: ComplexArray
+    right: ComplexArray
+
+    def answer(self, omega: FloatArray, force: ComplexArray, rows: Matrix) -> ComplexArray:
+        """Return the (p, k) answer of the other modes to forces (p, n) at frequencies (p,), in the `rows` (k, n) of what is looked at."""
+        taken = (force @ self.left.T) / (1j * omega[:, None] - self.poles)
+        here = self.oscillator.at(np.array([self.oscillator.ends[0]]))
+        shape = self.oscillator.motion[0, 1] / here.amplitude[0]
+        own = (force @ shape.conj()) / here.stiffness(omega)
+        return np.asarray(taken @ (rows @ self.right).T - own[:, None] * (rows @ shape))
+
+    def distance(self, omega: float) -> float:
+        """Return the distance of the nearest other frequency, relative to `omega`."""
+        values = self.poles.imag[self.poles.imag > 0.0]
+        mode = self.oscillator.backbone.mode
+        own = int(np.argmin(np.abs(values - mode.omega))) if values.size else 0
+        others = np.delete(values, own) if values.size else values
+        return float(np.min(np.abs(others / omega - 1.0), initial=np.inf))
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """How isolated a mode is at a resonance.
+
+    Parameters
+    ----------
+    output, gaps
+        Motion of the other modes over that of the mode: of the output, and of the gaps of the contacts.
+    distance
+        Of the next frequency, relative.
+    overlap
+        Damping ratio over that distance.
+    growth
+        ``d ln a / d ln level``: 1 where the motion is linear.
+    harmonics
+        Higher harmonics over the first, in the output.
+    linear
+        Whether nothing slips: then the other modes are added, and the response is exact.
+    """
+
+    output: float
+    gaps: float
+    distance: float
+    overlap: float
+    growth: float
+    harmonics: float
+    linear: bool
+
+    @property
+    def foreign(self) -> float:
+        """About the relative error of the amplitude that the other modes make."""
+        if self.linear:
+            return 0.0
+        share = max(self.output, self.gaps)
+        return share * float(np.clip(1.0 - self.growth, HELD, 1.0)) + self.overlap**2
+
+
+@by_one_thread
+def other_modes(oscillator: ModalOscillator) -> OtherModes:
+    """Return the linear modes beside the followed one."""
+    system = oscillator.backbone.system
+    own = system.structure.of_harmonic(1)
+    holds = np.repeat(holding(system, oscillator.load.static), 3)
+    springs = np.where(holds, system.springs.stuck_stiffness(), 0.0)
+    bound = with_springs(own, system.interface.gap_operator, springs)
+    way = own_motions(bound, system.structure.multipliers)
+    free = in_coordinates(bound, way, bound.dofs.take(np.arange(way.shape[1])), {})
+    basis = _basis(free, way.conj().T @ oscillator.load.harmonics[1])
+    mass, damping, stiffness = (in_basis(m, basis) for m in (free.mass, free.damping, free.stiffness))
+    if free.loss is not None:
+        stiffness = stiffness + 1j * in_basis(free.loss, basis)
+    n, spread = len(mass), way @ basis
+    inner = np.linalg.solve(mass, np.hstack([stiffness, damping, spread.conj().T]))
+    zero, one = np.zeros((n, n)), np.eye(n)
+    poles, vectors = np.linalg.eig(np.block([[zero, one], [-inner[:, :n], -inner[:, n : 2 * n]]]))
+    pulled = np.vstack([np.zeros_like(inner[:, 2 * n :]), inner[:, 2 * n :]])
+    return OtherModes(oscillator, poles, np.linalg.solve(vectors, pulled), spread @ vectors[:n])
+
+
+def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
+    """Return the (p, n) forces that the equations of motion still ask for at synthesised points: zero along the mode itself.
+
+    Motions of the backbone go on with damping of the mass in place of the load and the other frequency; what both do to the other modes
+    is not the same.
+    """
+    structure = oscillator.backbone.system.structure.of_harmonic(1)
+    here = oscillator.at(found.place)
+    motion = oscillator.first(found.place) * np.exp(1j * found.phase)[:, None]
+    inertia, dashpots = ((m @ motion.T).T for m in (structure.mass, structure.damping))
+    off = (found.omega - here.omega)[:, None]
+    plain = (here.omega**2 - found.omega**2 + 2j * here.ratio * here.omega**2)[:, None]
+    return np.asarray(found.level * oscillator.load.harmonics[1] - plain * inertia - 1j * off * dashpots)
+
+
+@by_one_thread
+def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
+    """Return how isolated a mode is at a resonance.
+
+    Parameters
+    ----------
+    others
+        The modes beside it.
+    resonance
+        Of the synthesis.
+    dof
+        The output that counts.
+    """
+    own = others.oscillator
+    found = at_resonance(own, resonance)
+    here = own.at(found.place)
+    motion = own.displacement(found.place)[0]
+    system = own.backbone.system
+    gaps = _dense(system.interface.gap_operator)
+    rows = np.vstack([np.eye(1, system.structure.n, dof), gaps])
+    beside = others.answer(found.omega, left_over(own, found), rows)[0]
+    moves = rows @ motion[1]
+    distance = others.distance(resonance.omega)
+    return Isolation(
+        _share(beside[:1], moves[:1]),
+        _share(beside[1:], moves[1:]),
+        distance,
+        abs(float(here.ratio[0])) / distance,
+        growth(own, resonance.place),
+        _share(motion[2:, dof], motion[1:2, dof]),
+        is_linear(own, resonance.place, 1.0 + _share(beside[1:], moves[1:])),
+    )
+
+
+def growth(oscillator: ModalOscillator, place: float) -> float:
+    """Return ``d ln a / d ln level`` of the resonances at a place; infinite where two of them meet."""
+    ends = np.clip([place - ACROSS, place + ACROSS], *oscillator.ends)
+    level = np.log(oscillator.needed(ends))
+    size = np.log(oscillator.at(ends).amplitude)
+    change = float(level[1] - level[0])
+    return float(size[1] - size[0]) / change if change != 0.0 else np.inf
+
+
+def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) -> bool:
+    """Whether the mode is still the linear one at `factor` times the amplitude of a place."""
+    last = min(place + float(np.log(factor)), oscillator.ends[1])
+    looked = np.append(oscillator.place[oscillator.place <= last], last)
+    here = oscillator.at(looked)
+    moved = np.abs(here.omega / here.omega[0] - 1.0)
+    damped = np.abs(here.ratio - here.ratio[0]) / np.maximum(np.abs(here.ratio[0]), CHANGES)
+    return bool(oscillator.begins > 0.0 and max(np.max(moved), np.max(damped)) < CHANGES)
+
+
+@by_one_thread
+def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> ComplexArray:
+    """Return (p, k) first harmonics of dofs with the share of the other modes, in the phase of the load, m."""
+    own = others.oscillator
+    motion = own.first(found.place)[:, dofs] * np.exp(1j * found.phase)[:, None]
+    rows = np.zeros((dofs.size, own.backbone.system.structure.n))
+    rows[np.arange(dofs.size), dofs] = 1.0
+    return np.asarray(motion + others.answer(found.omega, left_over(own, found), rows))
+
+
+@by_one_thread
+def peak_with_others(others: OtherModes, curve: Synthesised, found: Resonance, dof: int) -> tuple[float, float]:
+    """Return the largest amplitude of a dof, m, with the share of the other modes, and its frequency, rad/s.
+
+    Parameters
+    ----------
+    others
+        The modes beside the followed one.
+    curve
+        The response of the level.
+    found
+        One of its peaks.
+    dof
+        The output.
+    """
+    own = others.oscillator.at(np.array([found.place]))
+    width = WIDTHS * abs(float(own.ratio[0])) * found.omega
+    near = np.abs(curve.omega - found.omega) <= width
+    top = at_resonance(others.oscillator, found)
+    place, omega = np.append(top.place, curve.place[near]), np.append(top.omega, curve.omega[near])
+    both = replace(top, place=place, omega=omega, phase=np.append(top.phase, curve.phase[near]))
+    size = np.abs(with_others(others, both, np.array([dof]))[:, 0])
+    at = int(np.argmax(size))
+    return float(size[at]), float(omega[at])
+
+
+def _share(one: ComplexArray, other: ComplexArray) -> float:
+    size = float(np.linalg.norm(other))
+    return float(np.linalg.norm(one)) / size if size > 0.0 else np.inf
+
+
+def _basis(free: Structure, force: ComplexArray) -> Matrix:
+    """Return what spans the motions that count."""
+    if free.n <= WHOLE:
+        return np.eye(free.n)
+    still = replace(free, stiffness=_hermitian(free.stiffness), mass=_hermitian(free.mass))
+    shapes = np.asarray(normal_modes(still, LOWEST).shapes)
+    answer = np.linalg.solve(still.stiffness, force)
+    both = np.column_stack([shapes, answer / np.linalg.norm(answer)])
+    square, turn = np.linalg.eigh(both.conj().T @ (still.mass @ both))
+    kept = square > 1e-10 * square[-1]
+    return both @ (turn[:, kept] / np.sqrt(square[kept]))
+
+
+def _hermitian(matrix: Matrix) -> Matrix:
+    dense = _dense(matrix)
+    return 0.5 * (dense + dense.conj().T)
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)

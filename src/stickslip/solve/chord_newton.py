@@ -1,0 +1,104 @@
+"""Newton steps whose factors are kept while they serve: a residual costs a small part of a factorised Jacobian.
+
+After a full Newton step the same factors give further corrections, with Broyden's updates of rank one (Kelley, Solving Nonlinear Equations with
+Newton's Method, SIAM 2003, chapter 4), as long as each is clearly smaller than the one before. Where contacts change their states they are not: then the
+Jacobian is factorised again where the residual is smallest.
+"""
+
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.operators import Inverse
+from stickslip.solve.factors import Factored
+from stickslip.solve.iterate import Globalisation, Iterate, Work
+from stickslip.solve.line_search import MEMORY, LineSearch
+from stickslip.solve.linear import Signed, factorised, is_factorised
+from stickslip.solve.schur import Reduced
+from stickslip.solve.status import Status
+
+SMALLER = 0.5  # part of a correction that the next one by the same factors may be
+MOST = 7  # corrections by the same factors
+REFUSED = 2  # trials of one correction after which something else is tried
+
+
+class KeptFactors:
+    """Newton steps and corrections by the factors of the last one, for starts near a solution.
+
+    Parameters
+    ----------
+    tolerance
+        Of the corrector: corrections end where the residual is as small.
+    then
+        What goes on after a few refused trials, or where the Jacobian is not factorised; None: the correction is given up after them, for a shorter step along
+        a branch costs less.
+    known
+        Factors of a Jacobian nearby, which are tried first.
+
+    Attributes
+    ----------
+    inverse
+        The last factors where corrections by them ended at a solution; None before, and where a new Jacobian is asked for.
+    """
+
+    def __init__(self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None) -> None:
+        self.inverse: Signed | None = None
+        self._known = known
+        self._tolerance = tolerance
+        self._then = then
+        self._gives_up = then is None
+        self._over = False
+        self._norms: list[float] = []
+
+    def advance(self, work: Work, now: Iterate) -> Iterate | Status:
+        """Return the next iterate, or why there is none."""
+        self.inverse = None
+        known, self._known = self._known, None
+        step = None if known is None else work.timed(partial(known, -now.at.residual))
+        if known is not None and step is not None:
+            trial = work.at(now.x + step)
+            if trial.norm < now.norm:
+                return self._corrected(work, known, step, trial)
+        if self._over or not is_factorised(now.at.jac):
+            self._then = self._then or LineSearch()
+            return self._then.advance(work, now)
+        self._norms = [*self._norms[1 - MEMORY :], now.norm]
+        solve = factorised(work.linear, now.at.jac)
+        step = None if solve is None else work.timed(partial(solve, -now.at.residual))
+        if solve is None or step is None:
+            return Status.SINGULAR
+        share = 1.0
+        while work.rejected <= REFUSED:
+            trial = work.at(now.x + share * step)
+            if trial.norm <= (1.0 - 1e-4 * share) * max(self._norms):
+                return self._corrected(work, solve, step, trial) if share == 1.0 else trial
+            work.rejected += 1
+            share *= 0.5
+        self._over = True
+        return Status.STALLED if self._gives_up else self.advance(work, now)
+
+    def _corrected(self, work: Work, solve: Inverse, step: FloatArray, here: Iterate) -> Iterate:
+        """Go on from the end of a full Newton step by its factors; return the iterate with the smallest residual."""
+        steps, best = [step], here
+        while len(steps) <= MOST and np.isfinite(here.norm) and here.norm > self._tolerance:
+            next_one = work.timed(partial(solve, -here.at.residual))
+            if next_one is None:
+                break
+            step = next_one
+            for one, after in pairwise(steps):
+                step = step + after * (one @ step) / (one @ one)
+            last = steps[-1]
+            along = (last @ step) / (last @ last)
+            if along >= SMALLER:
+                break
+            step = step / (1.0 - along)
+            if np.linalg.norm(step) > SMALLER * np.linalg.norm(last):
+                break
+            steps.append(step)
+            here = work.at(here.x + step)
+            best = here if here.norm < best.norm else best
+        if best.norm <= self._tolerance and isinstance(solve, Factored | Reduced):
+            self.inverse = solve
+        return best

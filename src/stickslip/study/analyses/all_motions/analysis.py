@@ -1,0 +1,99 @@
+"""Motions that a sweep does not meet, and which one most starts end on: the analysis ``all_motions``."""
+
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.response.all_motions.estimate import PERIODS_OF_A_START, search_seconds
+from stickslip.response.all_motions.found import Stage, gathered
+from stickslip.response.all_motions.search import search_stages
+from stickslip.study.analyses.all_motions.dataset import dataset, noted
+from stickslip.study.analyses.all_motions.problem import Question, question_of
+from stickslip.study.analyses.all_motions.table import AllMotionsTable
+from stickslip.study.analyses.all_motions.verdicts import tables
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.verdict import Verdict, stored
+from stickslip.study.store.progress import LOG, advance
+from stickslip.units import HZ
+
+MODEL, FOUND = "model", "found"  # notes
+
+
+class AllMotionsAnalysis:
+    """The analysis; see `Analysis` for what its methods promise."""
+
+    name = "all_motions"
+    table = AllMotionsTable
+    record = Stage
+    linear = False
+    checks: tuple[str, ...] = ()
+
+    def key(self, case: Case) -> str:
+        """Return the tables that the stages of a case depend on beside the model."""
+        return case.as_text("all_motions", "solver")
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is searched; refuse what cannot be."""
+        question = question_of(case, model)
+        LOG.info(f"all_motions: {_said(question)}")
+        return question
+
+    def solve(self, inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[Stage]:
+        """Yield the stages that are not done."""
+        if notes.get(FOUND) is not None:
+            return
+        notes.put(MODEL, dict(inputs.facts) | {"output": inputs.model.output_labels[0]})
+        problem, stages = inputs.problem, list(done)
+        most = 3 * len(inputs.search.places)
+        for stage in search_stages(problem, inputs.search, done):
+            stages.append(stage)
+            over = sum(s.kind != "branch" for s in stages)
+            advance(0.95 * min(over / most, 1.0), _told(stage, inputs))
+            yield stage
+        notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.solves))
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return what was found in all cases."""
+        return dataset(solved)
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what is to be thought of each case."""
+        return stored(data.attrs)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say what is searched, and for how long."""
+        question = question_of(case, model)
+        seconds = search_seconds(question.problem, question.search)
+        return (
+            f"all_motions: {_said(question)}",
+            f"all_motions: about {seconds:.2g} s for these, where a start settles in {PERIODS_OF_A_START} periods; branches that are found take more",
+        )
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return what the terminal prints."""
+        return tables(data)
+
+
+def _said(question: Question) -> str:
+    search = question.search
+    return (
+        f"{len(search.places)} frequencies searched by deflation and {search.starts} starts in time each, "
+        f"{search.solves} solves at most; {search.harmonics} harmonics"
+    )
+
+
+def _told(stage: Stage, inputs: Question) -> str:
+    if stage.kind == "branch":
+        how = {"sweep": "the sweep", "deflation": "a branch found by deflation", "time": "a branch found in time"}
+        return f"{how[stage.origin]}: {stage.omega.size} points; {stage.end}"
+    hertz = inputs.search.places[stage.place] / HZ
+    told = {
+        "searched": f"{stage.tries} deflated solves",
+        "starts": f"{stage.tries} starts in time",
+        "motions": f"{stage.omega.size} motions",
+    }
+    return f"{hertz:.6g} Hz: {told[stage.kind]}{', ' * bool(stage.end)}{stage.end}"
+
+
+ALL_MOTIONS = AllMotionsAnalysis()

@@ -1,0 +1,186 @@
+"""What the response of a case will cost, told before anything long is computed."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.assembly.model import Model
+from stickslip.assembly.unreduced import kept_whole
+from stickslip.harmonic.harmonic_set import named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.model.part import Part
+from stickslip.response.forced.response import Sweep
+from stickslip.solve.linear import MOST
+from stickslip.study.file.loads import Limits
+from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
+
+POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
+NEWTON_A_POINT = (
+    6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+)
+FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
+AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
+REPEATED = 0.6  # share of points that a strategy solves with many harmonics
+FEWEST_A_POINT = 2  # where hardly a contact slips: two wheels took 1.6 to 3
+SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
+# of a step where hardly a contact slips: 10 ms with 190 to 300 unknowns, 12 to 30 ms with 440 to 570, 20 ms with 1900
+SECONDS_AN_UNKNOWN = 3e-5
+# where nothing is condensed, of a step with a new factor: 32 µs with 2000 contacts and 27 with 5000; 13 with a kept one in gross slip
+SECONDS_A_WHOLE_UNKNOWN = 4e-5
+BYTES_A_WHOLE_UNKNOWN = 2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
+FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cost of a case.
+
+    Parameters
+    ----------
+    nodes
+        Of all parts.
+    unknowns
+        Of a solution with all harmonics.
+    memory_gb
+        Largest memory.
+    newton_steps
+        Of all points, at most.
+    model_seconds
+        Of one core, to mesh and reduce the parts and find their frequencies; cases with the same parts share it.
+    least_seconds, most_seconds
+        Of one core, to solve the response: where hardly a contact slips and the fewest harmonics do at every point, and where contacts slip
+        at all points and as many of these as may be need the most harmonics.
+        Stability and time integration are not counted.
+    most
+        How many harmonics the most stands for, in words; empty where their number is fixed.
+    """
+
+    nodes: int
+    unknowns: int
+    memory_gb: float
+    newton_steps: int
+    model_seconds: float
+    least_seconds: float
+    most_seconds: float
+    most: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """What ``limits.work_s`` is held against: the model and the most that its response takes."""
+        return self.model_seconds + self.most_seconds
+
+    def __str__(self) -> str:
+        least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))
+        solving = f"{least} to {most} s"
+        many = f"contacts slip at every point, {self.most}" if self.most else "contacts slip at every point"
+        meant = f" (the least: hardly a contact slips; the most: {many})"
+        return (
+            f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {solving} to solve this case{meant}; stability and time "
+            f"integration not counted. At most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of "
+            f"memory. limits.work_s is held against {self.seconds:.0f} s"
+        )
+
+
+def estimate(model: Model, sweep: Sweep) -> Estimate:
+    """Estimate memory and work of the response of a model that is not assembled yet: how many points slip nobody knows before."""
+    sectors = 1 if model.mistuning is None else model.sectors
+    whole = kept_whole(model)
+    nodes, coordinates = nodes_of(model), whole or sectors * retained_of(model)
+    low, high = ((2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics))
+    grid = sweep.grid.size or (sweep.points if sweep.single else POINTS * sweep.points)
+    points = grid + sweep.peak_points
+    kept = always_kept(sweep.strategy)
+    some = AT_THE_CAP if sweep.auto else REPEATED
+    share_high = {"low": 0.0, "high": 1.0}.get(kept or "", some)
+    # each strategy looks at the larger space about once a point
+    judged = 0 if kept else points * some if sweep.auto else points
+    steps_high = points * share_high * NEWTON_A_POINT
+    steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
+    of_low, of_high = (
+        (SECONDS_A_WHOLE_UNKNOWN * n if whole else _flops(n) / FLOPS) + SECONDS_A_STEP for n in (low, high)
+    )
+    most_seconds = steps_low * of_low + (steps_high + judged) * of_high
+    # without a budget strategies look at the larger space wherever they stand
+    easy_low, easy_high = (SECONDS_AN_UNKNOWN * n + SECONDS_A_STEP for n in (low, high))
+    easy = FEWEST_A_POINT * points * (easy_high if kept == "high" else easy_low)
+    least_seconds = min(easy + (0 if sweep.auto else judged * easy_high), most_seconds)
+    harmonics = f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
+    each = 1 if whole else 10  # numbers a harmonic and coordinate: contacts are few among all dofs
+    stored = points * (sweep.high_harmonics[-1] + 1) * each * coordinates * 16 / 1e9
+    solving = BYTES_A_WHOLE_UNKNOWN * high if whole else 8 * _numbers(sectors, coordinates, high)
+    memory = memory_gb(nodes) + stored + solving / 1e9
+    return Estimate(
+        nodes=nodes,
+        unknowns=high,
+        memory_gb=memory,
+        newton_steps=round(steps_low + steps_high),
+        model_seconds=nodes * SECONDS_A_NODE * (sectors // 2 + 1),
+        least_seconds=least_seconds,
+        most_seconds=most_seconds,
+        most="" if kept else harmonics,
+    )
+
+
+def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
+    """Return how many numbers a Newton step holds at once."""
+    if sectors > 1:  # a factor of each harmonic and the wheel's matrices
+        return 12 * (unknowns + 4 * coordinates) * coordinates
+    if unknowns <= MOST:  # an array of all harmonics together, and its factors
+        return 6 * unknowns**2
+    # the structure's matrices and a factor of each harmonic at most; 2.1 GB with 1000 contacts and H = 5, reduction included
+    return 8 * coordinates**2 + unknowns * coordinates
+
+
+def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
+    """Return the sweep, its cap of ``auto`` lowered as far as the study's limits ask, but not below its second level; what is above them then is left to `check_limits`."""
+    if not sweep.auto:
+        return sweep
+    for support in reversed(sweep.supports[1:] or sweep.supports):
+        capped = replace(sweep, cap=support[-1])
+        cost = estimate(model, capped)
+        if above(limits, "", cost.memory_gb, cost.seconds) is None:
+            return capped
+    return capped
+
+
+def _flops(unknowns: int) -> int:
+    """Return what a Newton step takes; with many unknowns a Krylov method is used, which does not factorise them all together."""
+    return 4 * unknowns * min(unknowns, FACTORISED) ** 2
+
+
+def check_limits(limits: Limits, cost: Estimate) -> None:
+    """Refuse a case that is estimated above the study's limits.
+
+    Raises
+    ------
+    InputError
+        Naming the limit.
+    """
+    what = (
+        f"a case of the forced response ({cost.nodes} nodes, {cost.unknowns} unknowns, {cost.newton_steps} Newton steps) is "
+        "estimated"
+    )
+    refusal = above(limits, what, cost.memory_gb, cost.seconds)
+    if refusal is not None:
+        raise refusal
+
+
+def nodes_of(model: Model) -> int:
+    """Return the number of nodes of all parts that are reduced; copies share the reduction of their template."""
+    return sum(_nodes(part) for part in model.parts.values() if part.template is None)
+
+
+def retained_of(model: Model) -> int:
+    """Return how many coordinates stay unknown: of free rigid bodies, and dofs under contacts or the motion of contact points if that is less."""
+    bodies = np.zeros(model.places.n, dtype=bool)
+    bodies[model.places.bodies()] = True
+    both = scipy.sparse.hstack([model.pairs.own, model.pairs.following], format="csr")
+    both = both @ scipy.sparse.diags_array(np.tile(~bodies, 2).astype(float))
+    both.eliminate_zeros()
+    dofs = np.unique(both.indices % model.places.n).size
+    return int(bodies.sum()) + min(dofs, int(np.count_nonzero(np.diff(both.indptr))))
+
+
+def _nodes(part: Part) -> int:
+    return len(part.mesh.points) if part.mesh is not None else -(-part.structure.n // 3)

@@ -1,0 +1,254 @@
+"""The points of one case, put in order: what was accepted, its fields, its peak, its counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.response.forced.accepted import audits_by_frequency
+from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.choices import AmplitudeOf
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
+from stickslip.response.recovery import Fields, fields
+from stickslip.response.verification import own_error
+from stickslip.solve.status import Status
+from stickslip.units import HZ
+
+FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A frequency of the response, with the solution that stands for it.
+
+    Parameters
+    ----------
+    point
+        The solution with most harmonics; not a solution where its status says so.
+    low
+        The first solution at the same frequency, or None (peak refinements, points of a branch with many harmonics).
+    fields, low_fields
+        What they look like everywhere; None where the point did not converge.
+    real_error
+        Difference between both, a fraction; NaN unless the point repeats the first one.
+    driven
+        Harmonics that the load drives: those of its amplitudes.
+    amplitude_of
+        What an amplitude is, as of a `Sweep`.
+    own_error
+        Bound of its own error, a fraction: 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
+    audit_error
+        Difference from the same motion solved with more harmonics to compare, a fraction; NaN where it was not.
+    audit
+        That solution.
+    audit_place
+        Of what differs so much, in what the error is taken over; -1 without one.
+    """
+
+    point: ForcedPoint
+    low: ForcedPoint | None
+    fields: Fields | None
+    low_fields: Fields | None
+    real_error: float
+    driven: Harmonics = (1,)
+    amplitude_of: AmplitudeOf = "first"
+    own_error: float = float("nan")
+    audit_error: float = float("nan")
+    audit: ForcedPoint | None = None
+    audit_place: int = -1
+
+    @property
+    def exact(self) -> bool:
+        """Whether no force acts on the harmonics left out: with however many it stays the same, and no audit is needed."""
+        return self.own_error == 0.0
+
+    @property
+    def indicator(self) -> float:
+        """What the strategy said of the first solution: of an alert the predicted error, a fraction; NaN where it was not asked."""
+        return (self.low or self.point).predicted_error
+
+    def amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the (n_outputs,) amplitudes, m; NaN where the point did not converge."""
+        return _amplitudes(self.fields, n_outputs, self.driven, self.amplitude_of)
+
+    def driven_amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the (driven, n_outputs) amplitudes of each driven harmonic, m; NaN where the point did not converge."""
+        if self.fields is None:
+            return np.full((len(self.driven), n_outputs), np.nan)
+        return np.asarray(np.abs(self.fields.outputs[list(self.driven), :n_outputs]))
+
+    def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
+        """Return the same of the first solution, NaN where that had other harmonics than these."""
+        known = self.low is not None and self.low.support == harmonics
+        first = self.low_fields if known else None
+        return _amplitudes(first, n_outputs, self.driven, self.amplitude_of)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The finished response of a case.
+
+    Parameters
+    ----------
+    solved
+        Every point that was solved, accepted or not, in the order of solution.
+    accepted
+        One entry a frequency, along the branch, peak refinements last.
+    peak
+        Position in `accepted` of the largest amplitude of the report output that is not known to be unstable, -1 if nothing converged.
+    output
+        Position of the output whose peak counts.
+    low_harmonics
+        Harmonics of the first passage.
+    unstable_peak
+        Position of a larger amplitude whose motion is unstable, so that it is not the peak; -1 where there is none.
+    """
+
+    solved: tuple[ForcedPoint, ...]
+    accepted: tuple[Accepted, ...]
+    peak: int
+    output: int
+    low_harmonics: Harmonics
+    unstable_peak: int = -1
+
+    @property
+    def top(self) -> Accepted | None:
+        """The peak; None if nothing converged."""
+        return None if self.peak < 0 else self.accepted[self.peak]
+
+    def amplitude(self, accepted: Accepted) -> float:
+        """Return the amplitude of the report output, m; NaN where the point did not converge."""
+        return float(accepted.amplitudes(self.output + 1)[self.output])
+
+    @property
+    def peak_amplitude(self) -> float:
+        """Largest amplitude of the report output, m; NaN if nothing converged."""
+        return float("nan") if self.top is None else self.amplitude(self.top)
+
+    @property
+    def peak_hz(self) -> float:
+        """Frequency of the peak, Hz."""
+        return float("nan") if self.top is None else self.top.point.omega / HZ
+
+    @property
+    def points_low(self) -> int:
+        """Number of accepted points with few harmonics."""
+        return sum(a.point.support == self.low_harmonics for a in self.accepted)
+
+    @property
+    def failed(self) -> int:
+        """Number of accepted points that did not converge."""
+        return sum(not a.point.converged for a in self.accepted)
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of all solutions together, accepted or not: the work in harmonics, whatever chose them."""
+        return sum(p.unknowns for p in self.solved)
+
+    @property
+    def newton_steps(self) -> int:
+        """Newton iterations of all points solved."""
+        return sum(p.iterations for p in self.solved)
+
+    @property
+    def seconds(self) -> tuple[float, float, float]:
+        """Seconds in contact, linear algebra and the rest, over all points solved."""
+        contact = sum(p.seconds_contact for p in self.solved)
+        linear = sum(p.seconds_linear for p in self.solved)
+        return contact, linear, sum(p.seconds_total for p in self.solved) - contact - linear
+
+    @property
+    def flanks(self) -> tuple[Accepted, ...]:
+        """On either side of the peak the point whose amplitude is nearest to a share of the peak's."""
+        if self.top is None:
+            return ()
+        here, wanted = self.top.point.omega, FLANK * self.peak_amplitude
+        sides = ([a for a in self.accepted if a.fields and side * (a.point.omega - here) > 0] for side in (-1, 1))
+        return tuple(min(s, key=lambda a: abs(self.amplitude(a) - wanted)) for s in sides if s)
+
+
+def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) -> Response:
+    """Put the points of a case in order and recover what they look like.
+
+    Parameters
+    ----------
+    problem
+        What was solved.
+    points
+        All points in the order of solution.
+    output
+        Position of the output whose peak counts; of the largest of several, where the system says so.
+    """
+    audits = audits_by_frequency(points)
+    accepted = []
+    for point, low in accepted_pairs(points):
+        own = own_error(problem, point)
+        more = _audit(point, audits.get(point.omega, []))
+        audit, place = float("nan"), -1
+        if more is not None:
+            audit, place = problem.difference(point.omega, point.coefficients, more.coefficients)
+        made = _accept(problem, point, low)
+        of = problem.sweep.amplitude_of
+        accepted.append(
+            replace(
+                made,
+                driven=problem.driven,
+                amplitude_of=of,
+                own_error=own,
+                audit_error=audit,
+                audit=more,
+                audit_place=place,
+            )
+        )
+    some = problem.system.peak_of
+    if some is not None and any(a.fields for a in accepted):
+        sizes = np.array([a.amplitudes(problem.system.outputs.size)[some] for a in accepted])
+        output = int(some[np.argmax(np.nanmax(sizes, axis=0))])
+    amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
+    peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
+    return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)
+
+
+def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
+    """Return the point at which a response ended that could not begin: no solution, like any that did not converge."""
+    sweep, harmonics = problem.sweep, np.array(problem.sweep.first_harmonics, dtype=np.int64)
+    shape = (int(harmonics[-1]) + 1, problem.system.retained.size)
+    return ForcedPoint(
+        stage="point" if sweep.auto else "low",
+        index=0,
+        omega=sweep.ends[0],
+        coefficients=np.zeros(shape, dtype=complex),
+        tangent=np.zeros(0),
+        step=0.0,
+        status=Status.NOT_FINITE if isinstance(error, FloatingPointError) else Status.SINGULAR,
+        iterations=0,
+        predicted_error=float("nan"),
+        seconds_contact=0.0,
+        seconds_linear=0.0,
+        seconds_total=0.0,
+        harmonics=harmonics,
+    )
+
+
+def _audit(point: ForcedPoint, audits: Sequence[ForcedPoint]) -> ForcedPoint | None:
+    """Return the solution with most harmonics at the frequency of a point; None where there is none with more than its own."""
+    most = max(audits, key=lambda p: p.harmonics.size, default=point)
+    return most if point.converged and most.harmonics.size > point.harmonics.size else None
+
+
+def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:
+    found = fields(problem, point) if point.converged else None
+    if low is None or not low.converged:
+        return Accepted(point, low, found, None, float("nan"))
+    if low is point:
+        return Accepted(point, low, found, found, float("nan"))
+    error = problem.real_error(low, point) if point.converged else float("nan")
+    return Accepted(point, low, found, fields(problem, low), error)
+
+
+def _amplitudes(found: Fields | None, n_outputs: int, driven: Harmonics, of: AmplitudeOf) -> FloatArray:
+    if found is None:
+        return np.full(n_outputs, np.nan)
+    return amplitudes(found.outputs[:, :n_outputs], driven, of)

@@ -1,0 +1,68 @@
+"""The response of a case with what is known of its stability: each point examined once, an undecided peak integrated in time, points told by motions whose stability is known."""
+
+from collections.abc import Generator, Sequence
+from dataclasses import asdict
+
+from stickslip.response.forced.problem import ForcedPoint
+from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.forced_response.comparison import Check
+from stickslip.study.analyses.forced_response.examining import examined_points, with_stable_peak
+from stickslip.study.analyses.forced_response.in_time import check_in_time
+from stickslip.study.analyses.forced_response.looked import Looked
+from stickslip.study.analyses.forced_response.points import Accepted, Response, collect
+from stickslip.study.analyses.forced_response.problem import IN_TIME, Question
+from stickslip.study.analyses.forced_response.stable import Examined, to_integrate, with_motion, with_raised
+from stickslip.study.store.progress import LOG
+
+MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
+
+
+def with_stability(
+    question: Question, points: Sequence[ForcedPoint], notes: Notes
+) -> Generator[ForcedPoint, None, tuple[Response, list[Examined]]]:
+    """Return the response with its stable peak and what is known of the stability; yield motions that take the place of points whose stability they tell."""
+    ended = notes.get("finished") or {"points": len(points)}
+    notes.put("finished", ended)
+    solved, raised = list(points[: ended["points"]]), list(points[ended["points"] :])
+    response = collect(question.problem, solved, question.model.peak_output)
+    examined = _examined(question, response, notes)
+    for point in with_raised([a.point for a in response.accepted], examined)[len(raised) :]:
+        raised.append(point)
+        yield point
+    if raised:
+        response = collect(question.problem, [*solved, *raised], question.model.peak_output)
+    return with_stable_peak(response, examined), examined
+
+
+def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:
+    """Examine the stability; what an interrupted run has examined is not done again.
+
+    Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
+    """
+    look = Looked(question, notes)
+    found = examined_points(question, response, look)
+    look.tell()
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, found)
+        if not to_integrate(question, peak, found) or peak.top is None:
+            break
+        check = integrated(question, peak, peak.top, found, notes)
+        found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
+    return found
+
+
+def integrated(
+    question: Question, response: Response, accepted: Accepted, examined: Sequence[Examined], notes: Notes
+) -> Check:
+    """Integrate in time; what an interrupted run has integrated is not done again."""
+    omega = accepted.point.omega
+    name = f"{IN_TIME}.{omega!r}"
+    known = notes.get(name)
+    if known:
+        check = Check(**known)
+    else:
+        doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
+        check = check_in_time(question, response, accepted, *doubted)
+    notes.put(name, asdict(check))
+    LOG.info(f"time integration: {question.said(check.sentence)}")
+    return check

@@ -1,0 +1,162 @@
+"""Resonance peaks over a design parameter: the analysis ``resonance``."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.errors import InputError
+from stickslip.response.resonances.curve import peak_curve
+from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.tracker import represented_as
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.resonance.dataset import dataset
+from stickslip.study.analyses.resonance.envelope import heights, valley
+from stickslip.study.analyses.resonance.problem import Question, more_than, question_of
+from stickslip.study.analyses.resonance.table import ResonanceTable
+from stickslip.study.analyses.resonance.unmet import unmet_peaks
+from stickslip.study.analyses.resonance.verdicts import tables
+from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
+from stickslip.study.analyses.vibrating import represented
+from stickslip.study.store.progress import LOG, advance
+from stickslip.units import HZ, millimetres
+
+MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
+UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
+HARMONICS = "harmonics"  # note: the highest peak with more of them
+
+
+class ResonanceAnalysis:
+    """The analysis; see `Analysis` for what its methods promise."""
+
+    name = "resonance"
+    table = ResonanceTable
+    record = PeakPoint
+    linear = False
+    checks: tuple[str, ...] = ()
+
+    def key(self, case: Case) -> str:
+        """Return the tables that the points of a case depend on beside the model."""
+        return case.as_text("resonance", "solver")
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is followed; refuse what cannot be."""
+        question = question_of(case, model)
+        LOG.info(f"resonance: peaks of {question.output} over {question.asked.parameter}")
+        return question
+
+    def solve(self, inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterator[PeakPoint]:
+        """Yield the peaks that are not done."""
+        if notes.get(LAST) is not None:
+            return
+        asked = inputs.asked
+        notes.put(MODEL, {"verdicts": to_json(map(doubt, inputs.warnings)), "output": inputs.output, **inputs.facts})
+        every = list(done)
+        try:
+            for point in _told(self._points(inputs, done), inputs):
+                every.append(point)
+                yield point
+        except InputError as error:  # no peak in the range
+            notes.put(LAST, {"problem": error.problem})
+            return
+        # what was followed back from the last value before an interruption is none of the first ones
+        first = notes.get(FIRST)
+        known = [p for p in every if first is None or p.peak < first["peaks"]]
+        later = 1 + max((p.peak for p in known), default=-1)
+        notes.put(FIRST, {"peaks": later})
+        problem = ""
+        if asked.values is not None and len(asked.values) > 1:
+            try:
+                back = later_peaks(inputs.search, asked.values, known, asked.peaks, done)
+                for point in _told(back, inputs):
+                    every.append(point)
+                    yield point
+            except InputError as error:
+                problem = error.problem
+            between = valley(every, heights(every, asked.values), asked.values)
+            notes.put(UNMET, unmet_peaks(inputs.search, every, asked.values, later))
+            notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
+        notes.put(HARMONICS, _more_harmonics(inputs, every))
+        notes.put(LAST, {"problem": problem})
+
+    def _points(self, inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoint]:
+        asked, search = inputs.asked, inputs.search
+        if asked.values is not None:
+            yield from follow_peaks(search, asked.values, asked.peaks, done)
+            return
+        # a curve by arc length is followed again to where it was left: it has no state but its points
+        for peak in range(asked.peaks):
+            known = sum(p.peak == peak for p in done)
+            try:
+                for i, point in enumerate(peak_curve(search, asked.ends, asked.points, peak)):
+                    if i >= known:
+                        yield point
+            except InputError as error:
+                if peak == 0 or error.place != "peak":
+                    raise
+                return  # there are no more
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return the peaks of all cases."""
+        return dataset(solved)
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what is to be thought of each case."""
+        return stored(data.attrs)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say what is followed, and how many peaks there will be at most."""
+        question = question_of(case, model)
+        asked = question.asked
+        count = len(asked.values) if asked.values else asked.points
+        told = f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}"
+        if asked.span is not None and callable(question.search.parameter):
+            told += "; a span makes the model anew for each trial, which takes minutes where a contact begins to slip at the peak: values are faster"
+        return (told,)
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return what the terminal prints."""
+        return tables(data)
+
+
+def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
+    first, last = inputs.asked.ends
+    for point in points:
+        share = abs((point.value - first) / (last - first)) if last != first else 1.0
+        state = "" if point.converged else f", {point.status.advice}"
+        advance(
+            0.9 * min(share, 1.0),
+            f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {millimetres(point.amplitude, 5)}{state}",
+        )
+        yield point
+
+
+def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, float]:
+    """Return by how much twice the harmonics and one change the highest peak, relatively; NaN where it is not found with them."""
+    maxima = [p for p in points if p.converged and p.is_maximum]
+    if not maxima:
+        return {}
+    top = max(maxima, key=lambda p: p.amplitude)
+    order = more_than(inputs.asked.harmonics)
+    how = represented(order, inputs.search.how.evaluator)
+    more = represented_as(inputs.search, top, how)
+    # a peak by phase lies below the maximum, by what it says itself
+    there = top.amplitude * (1.0 + (top.below if np.isfinite(top.below) else 0.0))
+    change = more.amplitude / there - 1.0 if more.converged else np.nan
+    return {"change": change, "value": top.value, "peak": top.peak, "order": order}
+
+
+def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:
+    """Return the lowest place of the highest peak between two values; nothing where that is not found."""
+    r = inputs.search
+    try:
+        best = smallest_peak(r.system, r.load, r.parameter, between, r.omega_range, r.output, r.how)
+    except InputError as error:
+        LOG.info(f"the lowest peak was not found: {error}")
+        return {}
+    return {"value": best.value, "amplitude": best.amplitude, "omega": best.omega}
+
+
+RESONANCE = ResonanceAnalysis()

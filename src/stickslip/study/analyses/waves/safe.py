@@ -1,0 +1,112 @@
+"""Which modes engine orders can excite at one speed: the SAFE or interference diagram."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
+from stickslip.response.rotating.safe import Safe, safe
+from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.analyses.waves.analysis import WaveAnalysis
+from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
+from stickslip.study.analyses.waves.doubts import safe_doubts
+from stickslip.study.analyses.waves.left_out import in_still_fluid
+from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.solve import Question, solve_wave
+from stickslip.study.analyses.waves.tables import SafeTable
+from stickslip.study.analyses.waves.texts import safe_tables
+from stickslip.study.store.netcdf import variable
+from stickslip.units import HZ, RPM
+
+
+def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
+    waves: Sequence[WaveModes] = solved.records
+    told = solved.notes["model"]
+    asked: SafeTable = solved.case.settings.safe
+    sectors = int(told["sectors"])
+    found = {
+        "frequency_hz": variable("wave mode", frequencies(waves), "Hz", "natural frequency"),
+        "growth": growth(waves),
+        "margin_percent": variable("", asked.margin_percent, "%", "margin of a near resonance"),
+    }
+    if not {w.wave_number for w in waves} >= set(Wheel(sectors, parted=False).numbers()):
+        return found, []  # the job ended without a solution
+    met = interference(waves, sectors, asked, float(told["speed_rpm"]) * RPM)
+    return found | _pairs(waves, met), list(safe_doubts(met))
+
+
+def interference(waves: Sequence[WaveModes], sectors: int, asked: SafeTable, speed: float) -> Safe:
+    """Return what the engine orders meet at a speed in rad/s."""
+    known = {w.wave_number: w.frequencies_hz for w in waves}
+    diameters = np.arange(sectors // 2 + 1)
+    backward = np.array([known[int(d)] for d in diameters])
+    forward = np.array([known.get(sectors - int(d), known[int(d)]) for d in diameters])
+    found = NodalDiameterMap(sectors, diameters, backward, forward)
+    grown = {w.wave_number: w.growth for w in waves}
+
+    def of_wave(number: int) -> FloatArray:
+        return grown.get(number, grown.get(sectors - number, np.zeros(0)))
+
+    margin = asked.margin_percent / 100
+    return safe(found, speed, asked.engine_orders, margin=margin, growth=of_wave)
+
+
+def _pairs(waves: Sequence[WaveModes], met: Safe) -> Variables:
+    numbers, sectors, pairs = [w.wave_number for w in waves], met.frequencies.sectors, met.points
+    known = [k if k in numbers else sectors - k for k in (p.wave_number for p in pairs)]
+    orders = np.array([p.engine_order for p in pairs])
+    near = [int(abs(p.margin) <= met.allowed) for p in pairs]
+    judged = [int(m not in met.not_judged) for m in orders]
+    unjudged = "0 if the engine order excites above the highest computed mode of its nodal diameter"
+    found = {
+        "wave": ([numbers.index(k) for k in known], "1", "index of the wave"),
+        "mode": ([p.mode for p in pairs], "1", "index of the mode"),
+        "engine_order": (orders, "1", "engine order"),
+        "frequency_hz": ([p.frequency_hz for p in pairs], "Hz", "natural frequency of the mode"),
+        "excitation_hz": (orders * met.speed_range[0] / HZ, "Hz", "frequency of the excitation"),
+        "resonance_rpm": ([p.speed / RPM for p in pairs], "rpm", "speed at which they meet"),
+        "margin": ([p.margin for p in pairs], "1", "that speed over the speed, less one"),
+        "near": (near, "1", "1 if the margin is within the limit"),
+        "judged": (judged, "1", unjudged),
+    }
+    return {f"pair_{name}": variable("pair", *of) for name, of in found.items()}
+
+
+class SafeDiagram(WaveAnalysis):
+    """The analysis ``safe``."""
+
+    name = "safe"
+    table = SafeTable
+    record = WaveModes
+    compared = frozenset({"engine_orders", "margin_percent"})
+    of_wave = staticmethod(solve_wave)
+    of_case = staticmethod(_of_case)
+    of_text = staticmethod(safe_tables)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: SafeTable = self.asked(case)
+        if model.sectors == 1:
+            raise input_error(
+                "safe",
+                "the model is a whole structure, not a sector",
+                "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
+            )
+        rpm = float(f"{model.speed / RPM:.12g}") if asked.speed_rpm is None else asked.speed_rpm
+        if rpm <= 0:
+            raise input_error(
+                "safe.speed_rpm", f"must be above zero, got {rpm:g}", "Give the speed at which the engine orders act."
+            )
+        at = rpm * RPM if model.rotates else 0.0
+        wheel = Wheel(model.sectors, model.coriolis and model.rotates)
+        still, left_out = in_still_fluid(model)
+        numbers = wheel.numbers()
+        return Question(still, asked.contacts, wheel, numbers, asked.modes, (at,), rpm=rpm, left_out=left_out)
+
+
+SAFE = SafeDiagram()

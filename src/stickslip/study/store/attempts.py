@@ -1,0 +1,78 @@
+"""Files of jobs at work that several processes may write at once: each has its own, and goes on from the furthest of all.
+
+No lock is needed, so this is good on shared folders whose locks are not to be relied on. What two processes find of the same job
+is the same to the last bit, so either may seal it.
+"""
+
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from uuid import uuid4
+
+from stickslip.errors import InputError
+from stickslip.study.store.journal import AT_WORK, BESIDE, JobJournal, read_place
+from stickslip.study.store.progress import LOG
+
+
+def file_at_work(sealed: Path, owner: str = "") -> Path:
+    """Return the name of the file of a job at work: ``KEY.part``, or ``KEY.OWNER.part``."""
+    return sealed.with_suffix(f".{owner}{AT_WORK}" if owner else AT_WORK)
+
+
+def new_owner() -> str:
+    """Return a name that no other process has."""
+    return uuid4().hex[:12]
+
+
+def left_behind(sealed: Path) -> list[Path]:
+    """Return all files of a job at work, the furthest first: they only grow."""
+    found = [p for p in sealed.parent.glob(f"{sealed.stem}.*") if p.suffix == AT_WORK]
+    return sorted(found, key=reached, reverse=True)
+
+
+def reached(path: Path) -> tuple[int, int, int]:
+    """Return how far a file has come: its size, and, as several small records fit into a page of it, what it holds."""
+    return (_size(path), *read_place(path))
+
+
+def begin(sealed: Path, own: Path, record: type) -> None:
+    """Make a file of a job at work from the furthest that is there, of this process or of any other."""
+    for path in sorted([*left_behind(sealed), sealed], key=reached, reverse=True):
+        if path == own or reached(path) <= reached(own):
+            return
+        if _copied(path, own, record):
+            return
+
+
+def clear(sealed: Path) -> None:
+    """Remove what is left of a job that is sealed, files beside one that another process has removed meanwhile, too."""
+    for end in (AT_WORK, f"{AT_WORK}{BESIDE}"):
+        for file in sealed.parent.glob(f"{sealed.stem}.*{end.removeprefix('.')}"):
+            with suppress(OSError):  # the next run in the folder does
+                file.unlink(missing_ok=True)
+
+
+def _copied(path: Path, own: Path, record: type) -> bool:
+    """Copy a file that may be written to meanwhile; say whether the copy is good."""
+    copy = file_at_work(own.with_name(own.name.partition(".")[0]), new_owner())
+    try:
+        # SQLite undoes in the copy what was cut off in the original
+        with suppress(FileNotFoundError):
+            shutil.copyfile(f"{path}{BESIDE}", f"{copy}{BESIDE}")
+        shutil.copyfile(path, copy)
+        with JobJournal(copy, record) as journal:
+            journal.check()
+        copy.replace(own)
+    except (OSError, InputError) as error:
+        LOG.info(f"{path} is passed over ({error})")
+        for file in (copy, Path(f"{copy}{BESIDE}")):
+            file.unlink(missing_ok=True)
+        return False
+    return True
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return -1

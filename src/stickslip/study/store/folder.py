@@ -1,0 +1,192 @@
+"""The results folder: made, tried out and locked before anything long begins."""
+
+import os
+import shutil
+import sqlite3
+from collections.abc import Container, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from stat import S_ISLNK, S_ISREG
+from uuid import uuid4
+
+from stickslip.errors import InputError, input_error
+from stickslip.study.store.atomic_write import REMEDIES, beside, unwritable, unwritable_database
+from stickslip.study.store.journal import AT_WORK, BESIDE, SEALED
+
+NEEDED_BYTES = 200_000_000  # results, jobs and parts of a usual run
+RESULT, REPORT, LOG_FILE, LOCK = "result.nc", "report.html", "run.log", "run.lock"
+JOBS, PARTS = "jobs", "parts"
+TRIAL = ".stickslip-trial"
+LONGEST_PATH = 512  # bytes of the path of an SQLite file
+LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # of such a file in a folder
+WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until they are whole
+OWN = (*WHOLE, *map(beside, WHOLE), *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)))
+LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
+SHARD_LOGS = "run-*-of-*.log"
+HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
+
+
+@contextmanager
+def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
+    """Make the folder, hold it for one run, or for all shards of one, and make sure that a run's files fit into it.
+
+    Raises
+    ------
+    InputError
+        If another run is at work in it, it cannot be made or written, or the disk is nearly full.
+    """
+    try:
+        for inner in (folder, folder / JOBS, folder / PARTS):
+            inner.mkdir(parents=True, exist_ok=True)
+        _refuse_long_path(folder)
+        _refuse_strangers(folder)
+        _try_out(folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    try:
+        lock = _locked(folder / LOCK, folder, shared=shared)
+    except sqlite3.DatabaseError as error:
+        no_lock = input_error(str(folder / LOCK), f"is no lock of a run ({error})", "Delete it.")
+        raise unwritable_database(folder / LOCK, error) or no_lock from None
+    with closing(lock):
+        if not shared:
+            for path in (path for pattern in LEFT for path in _found(folder, pattern)):
+                with suppress(OSError):
+                    path.unlink(missing_ok=True)
+        yield
+
+
+@contextmanager
+def token_file(folder: Path) -> Iterator[Path]:
+    """Give a file that is there while the block runs: other machines see by it that they see the folder, and that the run goes on."""
+    token = folder / f"run-{uuid4().hex[:12]}.on"
+    try:
+        token.touch(exist_ok=False)
+        yield token
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    finally:
+        token.unlink(missing_ok=True)
+
+
+def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] = ()) -> None:
+    """Remove what runs write, and no other file.
+
+    Parameters
+    ----------
+    folder
+        A results folder that is locked.
+    own
+        Names of further files that runs of this study write.
+    spared
+        Files that this run has written already.
+
+    Raises
+    ------
+    InputError
+        If a process of an earlier run is still at work on one of them; nothing is removed then.
+    """
+    patterns = (*OWN, *own, *map(beside, own))
+    found = [path for pattern in patterns for path in _found(folder, pattern)]
+    for path in folder.glob(f"{JOBS}/*{AT_WORK}"):  # a worker may outlive the run that was killed
+        with suppress(sqlite3.DatabaseError):
+            _locked(path, folder).close()
+    for path in found:
+        if path not in spared:
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise unwritable(path, error) from None
+
+
+def _refuse_strangers(folder: Path) -> None:
+    """Refuse links, folders and devices under names of ours: a run would write or delete through them."""
+    inner = [folder / name for name in (JOBS, PARTS)]
+    files = [path for pattern in (*OWN, *HELD) for path in _found(folder, pattern)]
+    for path in [*inner, *files]:
+        try:
+            mode = path.lstat().st_mode
+        except FileNotFoundError:
+            continue  # another shard has renamed or removed its file since it was listed
+        if S_ISLNK(mode):
+            raise _stranger(path, "is a link, which a run does not follow")
+        if path not in inner and not S_ISREG(mode):
+            raise _stranger(path, "is no file, but a run writes a file of that name")
+
+
+def _refuse_long_path(folder: Path) -> None:
+    """Refuse a folder in which SQLite could not open the files of jobs, before anything is computed."""
+    length = len(os.fsencode(folder.absolute()))
+    if length + LONGEST_NAME > LONGEST_PATH:
+        raise input_error(
+            f"output folder {folder}",
+            f"has a path of {length} bytes, and SQLite opens files of jobs in folders of up to {LONGEST_PATH - LONGEST_NAME}",
+            "Put the study into a folder with a shorter path.",
+        )
+
+
+def _stranger(path: Path, problem: str) -> InputError:
+    return input_error(str(path), problem, "Remove it, or name another folder under [output].")
+
+
+def _try_out(folder: Path) -> None:
+    trial = folder / f"{TRIAL}-{uuid4().hex[:12]}"
+    with trial.open("xb") as stream:
+        stream.write(b"x")
+        os.fsync(stream.fileno())
+    trial.unlink()
+    free = shutil.disk_usage(folder).free
+    if free < NEEDED_BYTES:
+        raise input_error(
+            f"output folder {folder}",
+            f"its disk has {free / 1e6:.0f} MB free, a run needs up to {NEEDED_BYTES / 1e6:.0f} MB",
+            "Make room, or put the study on another disk.",
+        )
+
+
+def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connection:
+    """Return what holds a file until it is closed or the process ends: SQLite locks files alike on all systems.
+
+    Shards share it, so that no other run begins meanwhile; where the folder's machine knows no locks, they do without.
+
+    Raises
+    ------
+    InputError
+        If another process holds it.
+    sqlite3.DatabaseError
+        If it is no such file.
+    """
+    db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+    try:
+        db.execute("begin" if shared else "begin exclusive")
+        if shared:
+            db.execute("select count(*) from sqlite_master").fetchone()
+    except sqlite3.DatabaseError as error:
+        if shared and "locked" not in str(error):
+            return db
+        db.close()
+        if "locked" in str(error):
+            raise input_error(str(folder), "another run is at work in it", "Wait for it, or stop it.") from None
+        raise
+    return db
+
+
+def _found(folder: Path, pattern: str) -> Iterator[Path]:
+    """Yield the entries of a folder that a pattern names, also links that lead nowhere."""
+    if "*" in pattern:
+        yield from folder.glob(pattern)
+    elif os.path.lexists(folder / pattern):
+        yield folder / pattern
+
+
+def _unwritable(folder: Path, error: OSError) -> InputError:
+    # of os.path, which says no where a name is too long to be looked up
+    ways = (folder / JOBS, folder / PARTS, folder, *folder.parents)
+    for path in ways:
+        if os.path.exists(path) and not os.path.isdir(path):  # noqa: PTH110, PTH112
+            return _stranger(path, "is a file, and a run makes a folder of that name")
+        if os.path.islink(path) and not os.path.exists(path):  # noqa: PTH110, PTH114
+            return _stranger(path, "is a link that leads nowhere, or to itself")
+    denied = "Change its permissions, or name another folder under [output]."
+    remedy = REMEDIES.get(error.errno or 0, denied)
+    return input_error(f"output folder {folder}", f"cannot be written ({error.strerror})", remedy)

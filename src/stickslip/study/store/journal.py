@@ -1,0 +1,262 @@
+"""The file of a job: everything it has finished, record by record.
+
+One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
+leaves whole records only. Every record and note ends with its checksum, and a sealed file holds one of all of them. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of
+several machines share the folder; sealed, it is ``<key>.job``.
+"""
+
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from hashlib import sha256
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from stickslip.errors import InputError, input_error
+from stickslip.study.store.archive import FORMAT, decode, decode_record, encode, encode_record
+from stickslip.study.store.atomic_write import unwritable, unwritable_database
+
+AT_WORK, SEALED = ".part", ".job"
+BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
+WHOLE = "whole"  # of a file that has been sealed: the checksum of all its records and notes
+DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
+MANY_EMPTY = 256  # pages of notes that were given up, 4 kB each, from which a file is packed
+PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
+ANEW = "Run anew with --fresh, which removes what runs wrote into the folder and no other file."
+FRESH = "Delete it, or start over with --fresh, which removes what runs wrote into the folder and no other file."
+TABLES = """
+create table if not exists meta (key text primary key, value text not null);
+create table if not exists record (
+    id integer primary key autoincrement,
+    arrived text not null default (strftime('%Y-%m-%dT%H:%M:%f', 'now')), payload blob not null);
+create table if not exists note (name text primary key, payload blob not null);
+"""
+
+
+class JobJournal:
+    """The open file of a job at work; use as a context manager. It is the job's `Notes`.
+
+    Parameters
+    ----------
+    path
+        The file, ``<key>.part``; created when it does not exist.
+    record_type
+        Dataclass of the records, of arrays, numbers, texts, enumerations and None; where records are read.
+
+    Raises
+    ------
+    InputError
+        If the file is in use, or cannot be read.
+    """
+
+    def __init__(self, path: Path, record_type: type[Any] = object) -> None:
+        self._path = path
+        self._type = record_type
+        with _named(path):
+            self._db = _opened(path)
+            try:
+                # held until the process ends, however it ends
+                self._db.execute("pragma locking_mode = exclusive")
+                self._db.execute("pragma journal_mode = delete")
+                self._db.execute("pragma synchronous = full")
+                self._db.executescript(TABLES)
+                self._db.execute("insert or ignore into meta values ('file', ?)", (_mark(path),))
+                self._db.execute("delete from meta where key = ?", (WHOLE,))
+                self._db.execute("update meta set value = value")  # takes the lock
+                _check_mark(self._db, path)
+            except BaseException:
+                self._db.close()
+                raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._db.close()
+
+    def add(self, record: object) -> None:
+        """Store a finished record; it is on the disk when this returns."""
+        payload = encode_record(record)
+        with _named(self._path):
+            self._db.execute("insert into record (payload) values (?)", (payload,))
+
+    def records(self) -> list[Any]:
+        """Return the finished records in the order in which they came."""
+        with _named(self._path):
+            return _records(self._db, self._type)
+
+    def put(self, name: str, values: Mapping[str, Any]) -> None:
+        """Store named arrays, numbers and texts under `name`."""
+        payload = encode(values)
+        with _named(self._path):
+            self._db.execute("insert or replace into note values (?, ?)", (name, payload))
+
+    def forget(self, name: str) -> None:
+        """Remove what `put` stored under `name`."""
+        with _named(self._path):
+            self._db.execute("delete from note where name = ?", (name,))
+
+    def get(self, name: str) -> dict[str, Any] | None:
+        """Return what `put` stored under `name`, or None."""
+        with _named(self._path):
+            return _note(self._db, name)
+
+    def notes(self) -> dict[str, dict[str, Any]]:
+        """Return all notes by name."""
+        with _named(self._path):
+            return _notes(self._db)
+
+    def check(self) -> None:
+        """Read everything, and refuse the file if any of it is damaged."""
+        with _named(self._path):
+            (said,) = self._db.execute("pragma integrity_check").fetchone()
+            if said != "ok":
+                raise ValueError(said)
+            _records(self._db, self._type)
+            _notes(self._db)
+
+    def died(self) -> int:
+        """Count one more end of the process at work; return how many there were since the last record or note."""
+        with _named(self._path):
+            (count,) = self._db.execute(PLACE).fetchone()
+            kept = dict(self._db.execute("select key, value from meta"))
+            deaths = int(kept[DEATHS]) + 1 if kept.get(DIED_AT) == count else 1
+            rows = [(DIED_AT, count), (DEATHS, str(deaths))]
+            self._db.executemany("insert or replace into meta values (?, ?)", rows)
+        return deaths
+
+    def seal(self) -> None:
+        """Close the file and give it the name of a finished job."""
+        with _named(self._path):
+            self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
+            self._db.execute("insert into meta values (?, ?)", (WHOLE, _checksum(self._db)))
+            (empty,) = self._db.execute("pragma freelist_count").fetchone()
+            if empty >= MANY_EMPTY:
+                self._db.execute("vacuum")
+            self._db.close()
+            self._path.replace(self._path.with_name(f"{_key(self._path)}{SEALED}"))
+
+
+def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str, dict[str, Any]]]:
+    """Return the records and the notes of a sealed job.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    with _named(path), _reading(path) as db:
+        (whole,) = db.execute("select value from meta where key = ?", (WHOLE,)).fetchone()
+        if whole != _checksum(db):
+            raise ValueError("holds other records or notes than were sealed")
+        return _records(db, record_type), _notes(db)
+
+
+def read_note(path: Path, name: str) -> dict[str, Any] | None:
+    """Return one note of a sealed job, or None; as `read_sealed`."""
+    with _named(path), _reading(path) as db:
+        return _note(db, name)
+
+
+def read_place(path: Path) -> tuple[int, int]:
+    """Return how many records the file of a job holds, and how many processes have ended after the last; zeros where it cannot be read."""
+    try:
+        with closing(_unlocked(path)) as db:
+            (records,) = db.execute("select count(*) from record").fetchone()
+            deaths = db.execute("select value from meta where key = ?", (DEATHS,)).fetchone()
+        return records, int(deaths[0]) if deaths else 0
+    except (sqlite3.Error, ValueError):
+        return 0, 0  # another process may be writing
+
+
+def _unlocked(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+    with closing(_unlocked(path)) as db:
+        _check_mark(db, path)
+        if db.execute("select value from meta where key = ?", (WHOLE,)).fetchone() is None:
+            raise input_error(str(path), "is the file of a job that has not ended", FRESH)
+        yield db
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """Open a file: without locks where nobody else writes to it, as not all shared folders have them."""
+    name, alone = str(path), path.stem != _key(path)
+    if alone:
+        name = f"{path.absolute().as_uri()}?nolock=1"
+    # autocommit: each insert is a transaction of its own
+    return sqlite3.connect(name, isolation_level=None, timeout=0.5, uri=alone)
+
+
+def _key(path: Path) -> str:
+    """Return what a job is called, whoever's file of it this is."""
+    return path.name.partition(".")[0]
+
+
+def _mark(path: Path) -> str:
+    return f"{FORMAT}:{_key(path)}"
+
+
+def _check_mark(db: sqlite3.Connection, path: Path) -> None:
+    """Refuse the file of another job, or of another layout."""
+    row = db.execute("select value from meta where key = 'file'").fetchone()
+    layout, _, key = str(row[0] if row else "").partition(":")
+    if layout.isdecimal() and int(layout) != FORMAT and key == _key(path):
+        problem = f"was written by another version of stickslip (layout {layout}, this one has {FORMAT})"
+        raise input_error(str(path), problem, ANEW)
+    if row is None or row[0] != _mark(path):
+        raise input_error(str(path), "is the file of another job", FRESH)
+
+
+def _checksum(db: sqlite3.Connection) -> str:
+    """Return the checksum of all records and notes, each under its number or name."""
+    found = sha256()
+    for rows in ("select id, payload from record order by id", "select name, payload from note order by name"):
+        for place, payload in db.execute(rows):
+            found.update(f"{place} {len(payload)} ".encode() + payload)
+    return found.hexdigest()
+
+
+def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
+    """Return the records, none of which is missing: they are numbered without gaps, and the last number is kept apart."""
+    rows = db.execute("select id, payload from record order by id").fetchall()
+    last = db.execute("select seq from sqlite_sequence where name = 'record'").fetchone()
+    if [number for number, _ in rows] != list(range(1, (last[0] if last else 0) + 1)):
+        raise ValueError("records are missing")
+    return [decode_record(payload, kind) for _, payload in rows]
+
+
+def _notes(db: sqlite3.Connection) -> dict[str, dict[str, Any]]:
+    rows = db.execute("select name, payload from note order by name")
+    return {name: decode(payload) for name, payload in rows}
+
+
+def _note(db: sqlite3.Connection, name: str) -> dict[str, Any] | None:
+    row = db.execute("select payload from note where name = ?", (name,)).fetchone()
+    return None if row is None else decode(row[0])
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Turn what a damaged file or a full disk makes the libraries say into a refusal that names the file."""
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        raise unwritable(path, error) from error
+    except (sqlite3.Error, ValueError, KeyError, TypeError, OverflowError) as error:
+        if "locked" in str(error):
+            raise input_error(
+                str(path.parent.parent), "another run is at work in it", "Wait for it, or stop it."
+            ) from None
+        refused = unwritable_database(path, error) if isinstance(error, sqlite3.Error) else None
+        if refused is not None:
+            raise refused from error
+        raise input_error(str(path), f"the file of a job cannot be used ({error})", FRESH) from error

@@ -1,0 +1,140 @@
+"""Labelled variables, and files of them that are always whole."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import BoolArray, IntArray
+from stickslip.errors import input_error
+from stickslip.model.checksum import Cut, check_file, with_checksum
+from stickslip.study.store.atomic_write import interrupted_later, write_whole
+from stickslip.study.store.netcdf4_file import of_file, root_attributes, to_bytes
+
+_AGAIN = (
+    "Give the result.nc that 'stickslip run' wrote, or its folder. Of a damaged one, run the study again: no finished point is "
+    "computed anew. With --fresh everything is, after what runs wrote into the folder is removed, and no other file."
+)
+_TOLD = {"xyz", "order"}  # dimensions of what one case tells of itself
+_MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": ""}
+
+
+def write_tree(tree: xr.DataTree, path: Path) -> None:
+    """Write netCDF-4 under another name, its sum behind it, and put it in place, so that `path` is always a whole file.
+
+    Readers of HDF5 pass over what stands behind the end that the file names itself.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
+    with interrupted_later():
+        write_whole(path, with_checksum(to_bytes(tree)))
+
+
+def read_tree(path: Path) -> xr.DataTree:
+    """Read a file that `write_tree` wrote, or another of its kind, into memory.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is not what was written.
+    """
+    try:
+        check_file(path)  # HDF5 may read damaged files for ever, or end the process
+    except ValueError as error:
+        raise input_error(str(path), str(error), _AGAIN) from None
+    try:
+        own = of_file(path)
+        if own is not None:
+            return own
+        with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
+            return tree.load()
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001  the libraries say it of wrong bytes in a dozen ways
+        said = " ".join(str(error).split())
+        raise input_error(str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN) from None
+
+
+def attributes_there(path: Path) -> dict[str, Any]:
+    """Return the attributes of the root of a file that `write_tree` wrote, whatever became of its checksum; none where there is no such file, or a damaged one."""
+    try:
+        check_file(path)
+    except Cut:
+        pass  # what stands before is whole, or HDF5 sees its end missing
+    except (OSError, ValueError):
+        return {}
+    try:
+        return root_attributes(path)
+    except Exception:  # noqa: BLE001  as in `read_tree`
+        return {}
+
+
+def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
+    """Return a variable over the dimensions named in `dims`, separated by spaces."""
+    return xr.Variable(tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name})
+
+
+def stacked(cases: Sequence[Mapping[str, xr.Variable]]) -> dict[str, xr.Variable]:
+    """Return the variables of all cases with the leading dimension ``case``.
+
+    Where cases differ in size, what is missing is NaN, -1 or an empty text; `one_case` leaves it out again.
+    """
+    sizes: dict[Hashable, int] = {}
+    for found in (v for case in cases for v in case.values()):
+        for dim, size in found.sizes.items():
+            sizes[dim] = max(size, sizes.get(dim, 0))
+    names = dict.fromkeys(name for case in cases for name in case)
+    return {name: _stack([case.get(name) for case in cases], sizes) for name in names}
+
+
+def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -> xr.Variable:
+    like = next(v for v in found if v is not None)
+    kind = np.result_type(*(v.dtype for v in found if v is not None))
+    shape = (len(found), *(sizes[dim] for dim in like.dims))
+    values = np.full(shape, _MISSING[kind.kind], dtype=kind)
+    for i, own in enumerate(found):
+        if own is not None:
+            at: tuple[int | slice, ...] = (i, *(slice(n) for n in own.shape))
+            values[at] = own.values
+    return xr.Variable(("case", *like.dims), values, like.attrs)
+
+
+def alike(data: xr.Dataset) -> list[list[int]]:
+    """Return the cases of a dataset in groups of the same content, whatever they are called: what is varied may not concern it."""
+    plain = data.drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
+    groups: list[list[int]] = []
+    for i in range(data.sizes["case"]):
+        case = plain.isel(case=i)
+        twins = next((g for g in groups if plain.isel(case=g[0]).equals(case)), None)
+        if twins is None:
+            groups.append([i])
+        else:
+            twins.append(i)
+    return groups
+
+
+def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
+    """Return one case of a dataset, without what other cases have more of; single numbers and texts become attributes."""
+    names = [name for name, v in data.variables.items() if "case" in v.dims]
+    case = data.isel(case=index)
+    kept: dict[Hashable, IntArray] = {}
+    for dim in case[names].dims:
+        there = [_there(case[name], dim) for name in names if dim in case[name].dims]
+        kept[dim] = np.flatnonzero(np.any(there, axis=0))
+    case = case.isel(kept)
+    told = {name: case[name].values.tolist() for name in names if set(case[name].dims) <= _TOLD}
+    return case.drop_vars(told).assign_attrs({**data.attrs, **told})
+
+
+def _there(found: xr.Variable | xr.DataArray, dim: Hashable) -> BoolArray:
+    """Return where along a dimension a variable holds anything."""
+    values = np.moveaxis(found.values, found.dims.index(dim), 0)
+    kind = values.dtype.kind
+    missing = np.isnan(values) if kind in "fc" else values == _MISSING[kind]
+    return np.asarray(~missing.all(axis=tuple(range(1, values.ndim))))

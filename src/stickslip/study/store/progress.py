@@ -1,0 +1,118 @@
+"""What a run says, by the standard logging: lines, warnings, and how much of a job is done.
+
+Records of progress carry ``fraction`` (0 to 1); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
+"""
+
+import logging
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+
+from stickslip.errors import StickslipError
+from stickslip.study.store.atomic_write import unwritable
+
+LOG = logging.getLogger("stickslip")
+DONE = "done"  # what is told of a job at its end
+OF_RECORDS = ("fraction", "job", "verdict", "sums_up")  # what records of ours carry beside their text
+_JOB = ContextVar("job", default="")
+
+
+class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
+    """The user stopped a run; what is finished is kept."""
+
+
+def advance(fraction: float, text: str) -> None:
+    """Tell how much of the job at work is done, and its state in words."""
+    LOG.info(text, extra={"fraction": fraction, "job": _JOB.get()})
+
+
+def tell(word: str, text: str) -> None:
+    """Tell a verdict with the word that begins it everywhere; a note is no warning."""
+    level = logging.INFO if word == "note" else logging.WARNING
+    LOG.log(level, text, extra={"verdict": word.upper()})
+
+
+def sum_up(text: str, line: str) -> None:
+    """Tell what came out of the job at work: in few words, and as a line."""
+    LOG.info(line, extra={"sums_up": text})
+
+
+def _of_job(record: logging.LogRecord) -> bool:
+    """Give a record the job that it is of."""
+    if not hasattr(record, "job"):
+        record.job = _JOB.get()
+    return True
+
+
+LOG.addFilter(_of_job)
+
+
+def head(record: logging.LogRecord) -> str:
+    """Return what a line begins with: the word of a verdict, ``WARNING`` of other warnings, or nothing."""
+    plain = "WARNING" if record.levelno >= logging.WARNING else ""
+    word = getattr(record, "verdict", plain)
+    return f"{word}: " if word else ""
+
+
+@contextmanager
+def at_work(job: str) -> Iterator[None]:
+    """Name the job whose progress is told."""
+    token = _JOB.set(job)
+    advance(0.0, job)
+    try:
+        yield
+        advance(1.0, DONE)
+    finally:
+        _JOB.reset(token)
+
+
+@contextmanager
+def written_down(path: Path) -> Iterator[None]:
+    """Write all lines of a run to a file; what tells progress alone stays out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, at any time.
+    """
+    try:
+        # names of files may hold bytes that are no UTF-8
+        handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        raise unwritable(path, error) from None
+    formatter = logging.Formatter("%(asctime)s %(head)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    handler.addFilter(_line)
+    level = LOG.level
+    LOG.addHandler(handler)
+    LOG.setLevel(min(LOG.getEffectiveLevel(), logging.INFO))
+    try:
+        yield
+    finally:
+        LOG.setLevel(level)
+        LOG.removeHandler(handler)
+        with suppress(OSError):  # what was not written has been told
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that stops the run when it cannot be written, where that of the library prints a traceback and goes on."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Refuse a full disk; where a thread hands on what workers say, this process's next line does."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, OSError):
+            super().handleError(record)
+        elif threading.current_thread() is threading.main_thread():
+            raise unwritable(Path(self.baseFilename), error) from None
+
+
+def _line(record: logging.LogRecord) -> bool:
+    """Say whether a record is a line of its own, and give it its head."""
+    record.head = head(record)
+    return not hasattr(record, "fraction")

@@ -1,0 +1,167 @@
+"""A job in a process of its own, that is watched: by the run, or by a worker on another machine, which loads no library for it."""
+
+import logging
+import pickle
+import socket
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from stickslip.errors import StickslipError
+from stickslip.study.store.attempts import clear, file_at_work, new_owner
+from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.progress import LOG, OF_RECORDS
+from stickslip.study.store.provenance import library_versions
+from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped
+
+ASIDE = "set aside"  # the note of a job that was
+TWICE = 2  # deaths of a job's process at the same place, after which it is set aside
+ON = 1.0  # seconds between two looks whether the run is still on
+UNKNOWN = (ImportError, AttributeError, pickle.PicklingError)  # what is not installed there
+
+
+@dataclass(frozen=True, eq=False)
+class Parcel:
+    """A job on its way: what solving it needs is unpacked in the process that solves it alone.
+
+    Parameters
+    ----------
+    content
+        What it is, and the function that solves it; pickled.
+    sealed
+        The file that it ends in.
+    label
+        What is said of it.
+    question
+        What it answers, in words.
+    limits
+        What it may take.
+    owner
+        Of its file at work; empty: the only process that may write it.
+    """
+
+    content: bytes
+    sealed: Path
+    label: str
+    question: str
+    limits: Limits
+    owner: str = ""
+
+    @property
+    def file(self) -> Path:
+        """Where it is at work."""
+        return file_at_work(self.sealed, self.owner)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What comes back from another machine: what the job said, and what it raised."""
+
+    host: str
+    lines: list[dict[str, Any]]
+    error: Exception | None = None
+
+
+def watched(
+    parcel: Parcel, cell: Cell, stopped: Callable[[], bool], hear: Callable[[logging.LogRecord], object]
+) -> None:
+    """Solve a job in a process of its own; set it aside where that takes too long, or ends twice at the same place."""
+    while True:
+        try:
+            cell.answer(unpacked, parcel, parcel.limits, stopped, hear)
+        except Stopped:
+            raise
+        except OutOfTime as ended:
+            return set_aside(parcel, str(ended))
+        except Ended as ended:
+            # kept in its file: the worker may be lost before it ends again
+            with JobJournal(parcel.file) as journal:
+                deaths = journal.died()
+            if deaths >= TWICE:
+                return set_aside(parcel, f"its process {ended}, twice at the same place")
+            hear(_line(f"{parcel.label}: its process {ended}; it is started again"))
+        else:
+            return None
+
+
+def unpacked(parcel: Parcel) -> None:
+    """Solve a job; runs in the process of its own."""
+    try:
+        solve, order = pickle.loads(parcel.content)
+    except UNKNOWN as error:
+        raise unknown(parcel.label, error) from None
+    solve(order, parcel.file)
+
+
+def unknown(label: str, error: Exception) -> StickslipError:
+    """Return what is said where a job cannot be unpacked."""
+    return StickslipError(
+        f"a worker cannot take {label}: {error}. The same versions of stickslip and of modules of your own have to be "
+        "installed where workers run."
+    )
+
+
+def set_aside(parcel: Parcel, why: str) -> None:
+    """Seal a job as it is, with the reason; the next run goes on with it."""
+    with JobJournal(parcel.file) as journal:
+        journal.put(ASIDE, {"text": f"the {parcel.question} job was set aside: {why}"})
+        journal.seal()
+    clear(parcel.sealed)
+
+
+def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: dict[str, str]) -> Answer:
+    """Solve a job on another machine, in a file of this attempt alone; end when the run has ended."""
+    lines: list[dict[str, Any]] = []
+    host = socket.gethostname()
+    own = replace(parcel, owner=new_owner())
+    try:
+        _refuse_stranger(token, versions, host)
+        with closing(Cell(threads)) as cell:
+            watched(own, cell, _over(token), lambda record: _keep(record, lines))
+    except Exception as error:  # noqa: BLE001  it is raised where the run is
+        error.__traceback__ = None
+        return Answer(host, lines, error)
+    return Answer(host, lines)
+
+
+def _refuse_stranger(token: Path, versions: dict[str, str], host: str) -> None:
+    """Refuse a machine that would give other numbers, or does not see the folder."""
+    if not token.exists():
+        raise StickslipError(
+            f"the worker on {host} does not see {token.parent}. Put the study into a folder that all machines share, under the "
+            "same name."
+        )
+    own = library_versions()
+    unlike = [f"{k} {own[k]} for {v}" for k, v in versions.items() if own[k] != v]
+    if unlike:
+        raise StickslipError(
+            f"the worker on {host} has other versions, whose numbers may differ: {', '.join(unlike)}. Install the same."
+        )
+
+
+def _over(token: Path) -> Callable[[], bool]:
+    """Return what says whether the run has ended: its token is gone, twice, as a shared folder may be slow."""
+    looked, missed = [monotonic()], [0]
+
+    def over() -> bool:
+        if monotonic() - looked[0] >= ON:
+            looked[0] = monotonic()
+            missed[0] = 0 if token.exists() else missed[0] + 1
+        return missed[0] > 1
+
+    return over
+
+
+def _keep(record: logging.LogRecord, lines: list[dict[str, Any]]) -> None:
+    """Keep a line for the way back; progress is of no use then."""
+    if not hasattr(record, "fraction"):
+        more = {key: vars(record)[key] for key in OF_RECORDS if key in vars(record)}
+        own = {"name": record.name, "levelno": record.levelno, "levelname": record.levelname}
+        lines.append({**own, **more, "msg": record.getMessage()})
+
+
+def _line(text: str) -> logging.LogRecord:
+    return logging.LogRecord(LOG.name, logging.INFO, "", 0, text, None, None)
