@@ -1,14 +1,17 @@
 """The comparison of two trees finds what differs, whichever door it comes through, and leaves out what no two runs share."""
 
+import sqlite3
 import subprocess
 import tomllib
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from evidence.baseline.__main__ import compared, differing_folders
+from evidence.baseline import interrupted
+from evidence.baseline.differences import compared, differing_folders
 from evidence.baseline.results import differing_results
 from evidence.baseline.studies import EXAMPLES, Example, changed, examples, toml_text
 from evidence.baseline.texts import differing_lines, page_lines, terminal_lines
@@ -25,7 +28,12 @@ SENTENCE = "a stable peak"
 
 
 def fake_tree(
-    folder: Path, second: float = 2.0, seconds: float = 2.5, sentence: str = SENTENCE, *, phase: bool = True
+    folder: Path,
+    second: float = 2.0,
+    seconds: float = 2.5,
+    sentence: str = SENTENCE,
+    *,
+    phase: bool = True,
 ) -> Tree:
     """Return sources whose every answer is two amplitudes, two phases, two times and a sentence."""
     node = xr.Dataset(
@@ -44,7 +52,11 @@ def fake_tree(
         f"<p>{sentence}</p><table><tr><th>peak</th><th>time (s)</th></tr><tr><td>1</td><td>{seconds}</td></tr></table>"
     )
     log = f"2026-11-27T11:00:{seconds:02.0f}+00:00 {sentence} ({seconds} s)"
-    answers = {"result.nc": (folder / "result.nc").read_bytes(), "report.html": page.encode(), "run.log": log.encode()}
+    answers = {
+        "result.nc": (folder / "result.nc").read_bytes(),
+        "report.html": page.encode(),
+        "run.log": log.encode(),
+    }
     sources = {"__init__.py": b"", "__main__.py": PACKAGE} | {
         f"answers/{name}": content for name, content in answers.items()
     }
@@ -56,26 +68,20 @@ def fake_tree(
     [
         ({}, []),
         ({"seconds": 31.0}, []),
-        (
-            {"second": 2.0000000000000004},
-            ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"],
-        ),
+        ({"second": 2.0000000000000004}, ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"]),
         ({"phase": False}, ["/forced_response/phase: no such variable any more"]),
         (
             {"sentence": "an unstable peak"},
             [
-                "-a stable peak",
-                "+an unstable peak",
+                "-a stable peak", "+an unstable peak",
                 "/forced_response@verdict: 1 of 1 values differ, first []: 'a stable peak', now 'an unstable peak'",
-                "-<time> a stable peak (<time>)",
-                "+<time> an unstable peak (<time>)",
-                "-<time> a stable peak (<time>)",
-                "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
             ],
         ),
     ],
     ids=["the same", "a time", "a bit", "a variable", "a sentence"],
-)
+)  # fmt: skip
 def test_two_trees_are_told_apart_by_all_but_times(tmp_path, changes, found):
     trees = (fake_tree(tmp_path), fake_tree(tmp_path, **changes))
     comparison = compared(Example("four_masses"), trees, tmp_path)
@@ -87,7 +93,10 @@ def test_a_file_that_one_tree_alone_writes_is_found(tmp_path):
     for side in ("old", "new"):
         (tmp_path / side).mkdir()
     (tmp_path / "old" / "report.html").write_text("<p>a page</p>")
-    assert differing_folders(tmp_path / "old", tmp_path / "new") == (["report.html: written by the old tree alone"], 0)
+    assert differing_folders(tmp_path / "old", tmp_path / "new") == (
+        ["report.html: written by the old tree alone"],
+        0,
+    )
 
 
 def test_kinds_dimensions_bits_and_texts_of_variables_count():
@@ -124,9 +133,8 @@ def test_a_table_of_the_terminal_is_the_same_whatever_its_time_makes_of_its_widt
     )
     assert differing_lines("t", one, slow) == []
     assert [line for line in differing_lines("t", one, other)[2:] if line[0] in "+-"] == [
-        "-load = 300 | 1.25 | <time>",
-        "+load = 300 | 1.26 | <time>",
-    ]
+        "-load = 300 | 1.25 | <time>", "+load = 300 | 1.26 | <time>"
+    ]  # fmt: skip
 
 
 def test_data_of_figures_and_columns_beside_a_time_count():
@@ -154,3 +162,27 @@ def test_sources_at_work_are_those_of_the_commit_where_nothing_was_changed():
 def changed_since_head():
     asked = ["git", "diff", "--name-only", "HEAD", "--", "src/stickslip"]
     return set(subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split())
+
+
+def journal(folder: Path, name: str, stamps: list[str]) -> None:
+    (folder / interrupted.JOBS).mkdir(parents=True, exist_ok=True)
+    with closing(sqlite3.connect(folder / interrupted.JOBS / name)) as database, database:
+        database.execute("create table record (id integer primary key, arrived text)")
+        database.executemany("insert into record (arrived) values (?)", [(one,) for one in stamps])
+
+
+def test_records_of_a_killed_run_that_are_solved_again_are_found(tmp_path):
+    for name, folder in (
+        ("a.part", "killed"),
+        ("b.job", "killed"),
+        ("a.job", "on"),
+        ("b.job", "on"),
+    ):
+        journal(tmp_path / folder, name, ["1", "2"] if name.startswith("a") else ["0"])
+    before = interrupted.arrivals(tmp_path / "killed")
+    assert interrupted.not_taken_over(before, interrupted.arrivals(tmp_path / "on")) == []
+    journal(tmp_path / "anew", "a.job", ["3", "4", "5"])
+    assert interrupted.not_taken_over(before, interrupted.arrivals(tmp_path / "anew")) == [
+        "job a: 2 records of the killed run were not taken over",
+        "job b: 1 records of the killed run were not taken over",
+    ]

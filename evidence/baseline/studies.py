@@ -11,7 +11,10 @@ from typing import Any
 from evidence.baseline.trees import ROOT
 
 EXAMPLES = ROOT / "examples"
-RUN = ("run", "study.toml")
+SMALL = Path(__file__).with_name("small.toml")
+RUN = "run study.toml"
+OF_THE_RUN = ("commands", "seconds")  # keys of an example in `SMALL` that are none of its study
+USUAL_SECONDS = 10.0  # of the processor for an example without a setting
 Settings = Mapping[str, Any]
 
 
@@ -24,7 +27,7 @@ class Example:
     name
         Folder of `EXAMPLES`.
     settings
-        Keys by their full names and what they are set to; None removes a key or table.
+        Keys by their full names and what they are set to.
     commands
         What is run in its folder, in this order.
     seconds
@@ -33,8 +36,8 @@ class Example:
 
     name: str
     settings: Settings = field(default_factory=dict)
-    commands: tuple[tuple[str, ...], ...] = (RUN,)
-    seconds: float = 10.0
+    commands: tuple[tuple[str, ...], ...] = (tuple(RUN.split()),)
+    seconds: float = USUAL_SECONDS
 
     def write(self, folder: Path) -> None:
         """Write the study and the files that it reads into a folder."""
@@ -44,59 +47,19 @@ class Example:
         path.write_text(toml_text(changed(tables, self.settings)), encoding="utf-8")
 
 
-COARSE_BLADES = {
-    "part.blades.airfoil_size_m": 0.012,
-    "part.blades.platform_size_m": 0.012,
-    "part.blades.foot_size_m": 0.016,
-}
-COARSE_SECTOR = {"part.blade.disk_size_m": 0.04, "part.blade.platform_size_m": 0.03, "part.blade.airfoil_size_m": 0.03}
-SMALL = {
-    one.name: one
-    for one in (
-        Example(
-            "two_blades",
-            COARSE_BLADES
-            | {"vary.load.shaker.ratio": [250, 4], "forced_response.points": 10, "forced_response.peak_points": 4},
-            seconds=40,
-        ),
-        Example(
-            "second_bending",
-            COARSE_BLADES
-            | {"vary.load.shaker.ratio": [100, 5], "forced_response.points": 8, "forced_response.peak_points": 4},
-            seconds=40,
-        ),
-        Example("friction_ring", {"vary.contact.groove.slip_limit_n": [1.0, 2.9, 20.0]}, seconds=40),
-        Example("mistuned_wheel", {"vary.contact.damper.slip_limit_n": [2.0], "forced_response.points": 8}, seconds=40),
-        Example(
-            "shrouded_sector",
-            COARSE_SECTOR | {"forced_response.points": 6, "campbell.points": 3, "safe.engine_orders": [4, 6, 12]},
-            seconds=40,
-        ),
-        Example(
-            "platform_damper",
-            {"vary.load.gas.force_n": [3.0], "forced_response.points": 6, "part.blade.disk_size_m": 0.04},
-            seconds=40,
-        ),
-        Example("own_blades", {"vary.load.shaker.ratio": [500], "forced_response.points": 8}, seconds=40),
-        Example("calculix_wheel", {"vary.load.gas.force_n": [2.0], "forced_response.points": 6}, seconds=40),
-        Example("sector_deck", {}, seconds=40),
-        Example("run_up", {"part.blade.disk_size_m": 0.04, "run_up.points": 6, "run_up.peak_points": 2}, seconds=40),
-        Example("root_joint", {"vary.load.shaker.force_n": [20.0], "forced_response.points": 6}, seconds=40),
-        Example(
-            "rubbing_beam",
-            {"vary.load.side.force_n": [1.0], "vary.load.up.force_n": [1.0], "forced_response.points": 10},
-            seconds=40,
-        ),
-        Example("two_tones", {"quasi_periodic.points": 3}, seconds=20),
-        Example("flutter_ring", {"limit_cycle.periods": 300}, seconds=20),
-    )
-}
-
-
 def examples() -> list[Example]:
-    """Return all example studies; one that has no setting here is run as it is."""
+    """Return all example studies; one that has no setting in ``small.toml`` is run as it is."""
     names = sorted(path.parent.name for path in EXAMPLES.glob("*/study.toml"))
-    return [SMALL.get(name, Example(name)) for name in names]
+    small = tomllib.loads(SMALL.read_text(encoding="utf-8"))
+    if unknown := set(small) - set(names):
+        raise KeyError(f"{SMALL}: no example is called {', '.join(sorted(unknown))}")
+    return [_example(name, small.get(name, {})) for name in names]
+
+
+def _example(name: str, small: Settings) -> Example:
+    own = {key: value for key, value in small.items() if key not in OF_THE_RUN}
+    commands = tuple(tuple(command.split()) for command in small.get("commands", [RUN]))
+    return Example(name, own, commands, small.get("seconds", USUAL_SECONDS))
 
 
 def changed(tables: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
@@ -105,7 +68,7 @@ def changed(tables: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     Raises
     ------
     KeyError
-        If a key or table that is to be removed, or the table of a key, is not there.
+        If there is no table of a key.
     """
     whole = json.loads(json.dumps(tables))
     for key, value in settings.items():
@@ -113,10 +76,7 @@ def changed(tables: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
         table = whole
         for name in way:
             table = table[name]
-        if value is None:
-            del table[last]
-        else:
-            table[last] = value
+        table[last] = value
     return whole
 
 
