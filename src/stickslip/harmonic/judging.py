@@ -1,13 +1,15 @@
-"""The harmonics towards which a solution is judged: those that a nonlinear force of its harmonics may feed first.
+"""The harmonics towards which a solution is judged: all multiples of their common divisor up to three times the highest.
 
 A force that is odd in one harmonic h answers in 3 h, one that is even in 2 h and in the mean; a product of two harmonics in their sum and their
-difference. A contact may see one kept harmonic alone, by its place in the shape or by the wave of a wheel, so that each of them counts by itself. A
-solution is exact if nothing acts on any harmonic of this set; no other set, and no name of a law, tells so.
+difference. All of these are in the set, and so is what lies between them, where a mode may make much of a small force. A contact may see one kept
+harmonic alone, by its place in the shape or by the wave of a wheel. A solution is exact if nothing acts on any harmonic of this set; no other
+set, and no name of a law, tells so.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
+from math import gcd
 
 import numpy as np
 
@@ -22,7 +24,7 @@ UNSEEN = float(np.finfo(float).tiny)
 
 
 def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
-    """Return 0 and, for all harmonics that are kept or driven, themselves, their doubles and triples, and their sums and differences.
+    """Return all multiples, 0 among them, of the common divisor of the harmonics that are kept or driven, up to three times the largest.
 
     Parameters
     ----------
@@ -31,12 +33,8 @@ def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
     driven
         Harmonics that the load acts in.
     """
-    own = sorted({*kept, *driven} - {0})
-    fed = {0, *own, *(3 * h for h in own)}
-    for i, one in enumerate(own):
-        for other in own[i:]:
-            fed |= {one + other, other - one}
-    return tuple(sorted(fed))
+    own = {*kept, *driven} - {0}
+    return tuple(range(0, REACH * max(own, default=0) + 1, gcd(*own) or 1))
 
 
 def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
