@@ -3,6 +3,7 @@
 Property tests are repeatable and have no time limit per example.
 """
 
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -20,3 +21,11 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One browser for all pages; see `needs_browser`."""
     with Browser(tmp_path_factory.mktemp("profile")) as started:
         yield started
+
+
+def pytest_collection_finish() -> None:
+    """Look at each figure of the report that a test draws, where a test file that was collected draws any."""
+    if "stickslip.report.plot" in sys.modules:
+        from drawn import look_at_each_plot
+
+        look_at_each_plot()

@@ -144,6 +144,31 @@ def public_things():
     return [(name, getattr(importlib.import_module(home), name)) for name, _, home in PUBLIC]
 
 
+# what follows the place in a refusal; a place itself is a key, a name or a file
+VERBS = re.compile(
+    r"(?:^|\s)(?:is|are|has|have|was|were|must|can|cannot|needs?|does|do|not|no|follows?|lacks?|gives?|lies|stands?|reach|reaches|names?|wants?) (?!= )"
+)
+
+
+def literal(node: ast.expr) -> str:
+    """Return the text of a string, with braces for its values; empty of anything else."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(literal(own) if isinstance(own, ast.Constant) else "{}" for own in node.values)
+    return str(node.value) if isinstance(node, ast.Constant) else ""
+
+
+def test_refusals_name_the_place_before_they_say_what_is_wrong_with_it():
+    calls = [
+        (path.name, node)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "input_error"
+    ]
+    found = [(name, node.lineno, *map(literal, node.args[:2])) for name, node in calls]
+    assert sum(bool(VERBS.search(what)) for *_, what in found) > len(found) / 2
+    assert [one for one in found if VERBS.search(one[2])] == []
+
+
 def test_public_names_have_docstrings():
     texts = {name: inspect.getdoc(thing) for name, thing in public_things()}
     assert texts

@@ -229,3 +229,6 @@ def test_contact_dofs_must_be_retained():
     system, load = free_body_3d()
     with pytest.raises(InputError, match=r"contact dofs \[1\] are not retained"):
         harmonic_balance(condense(system.structure, np.delete(np.arange(12), 1), load), system.interface, 1, 32)
+    # of many the first five are named
+    with pytest.raises(InputError, match=r"contact dofs \[0, 1, 2, 3, 4\] are not retained"):
+        harmonic_balance(condense(system.structure, np.arange(6, 12), load), system.interface, 1, 32)

@@ -89,6 +89,8 @@ def test_nonlinear_modes_are_drawn_over_each_other_and_told_in_one_table(tmp_pat
     found = ss.compare(mode(100.0), mode(80.0), names=("a", "b"))
     drawn = {t.name: np.asarray(t.y) for t in found.plot("compared_nonlinear_modes").data if t.showlegend}
     assert drawn["b, mode 1"].tolist() == [80.0, 72.0]
+    percent = [t.y for t in found.plot("compared_nonlinear_modes").data if not t.showlegend]
+    assert np.array(percent) == pytest.approx(np.full((2, 2), [1.0, 5.0]), rel=1e-14)
     page = found.report(tmp_path / "c.html").read_text(encoding="utf-8")
     assert page.count("reached") == 2
 

@@ -1,6 +1,9 @@
 """Jobs that run apart: limits, deaths, shards, files that several processes write, and what cannot be asked for."""
 
+import mmap
+import os
 import pickle
+import re
 import shutil
 import signal
 import time
@@ -25,7 +28,7 @@ from stickslip.study.store.attempts import begin, clear, file_at_work, left_behi
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.journal import JobJournal, read_sealed
 from stickslip.study.store.watch import solve_far, watched
-from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped
+from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped, memory_gb
 from stickslip.study.store.workers import check_kind, executor
 
 
@@ -39,6 +42,19 @@ def toy_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def never() -> bool:
     return False
+
+
+def test_the_memory_of_a_process_is_what_it_holds_and_not_what_it_might() -> None:
+    def held_gb() -> float:
+        said = Path("/proc/self/status").read_text(encoding="utf-8")
+        return 1024.0 * float(re.search(r"VmRSS:\s+(\d+)", said)[1]) / 1e9  # type: ignore[index]
+
+    before = memory_gb(os.getpid())
+    assert before == pytest.approx(held_gb(), rel=0.05)
+    untouched = mmap.mmap(-1, 1 << 30)
+    assert memory_gb(os.getpid()) < before + 0.2
+    untouched.close()
+    assert memory_gb(2**22) == 0.0  # no process has this number
 
 
 def test_process_is_watched_and_started_again() -> None:

@@ -8,6 +8,7 @@ from synthetic_result import synthetic_result
 from stickslip.assembly.mistuned import listed, of_all
 from stickslip.report.forced.curves import frequency_response
 from stickslip.report.forced.head import cards
+from stickslip.report.forced.wheel import blades
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced_response.curve import Curve, peak_output
 
@@ -79,3 +80,22 @@ def test_labels_of_all_blades_are_told_by_the_first_and_the_last() -> None:
     assert listed(of_all(("tip",), 3)) == "tip[0] to tip[2]"
     for few in (("tip[0].x", "tip[1].x"), ("a[0].x", "a[2].x", "a[3].x"), ("tip1.x", "L1.2.w")):
         assert listed(few) == ", ".join(few)
+
+
+@pytest.mark.parametrize("unknown", [0, 1])
+def test_the_wheel_with_all_sectors_alike_is_drawn_at_the_speeds_of_its_frequencies(
+    unknown: int,
+) -> None:
+    data = wheel()
+    rpm = 20.0 * data["frequency_hz"].values  # engine order 3
+    rpm[:unknown] = np.nan  # a point of which the speed is not known decides nothing
+    hertz = [150.0, 160.0, 155.0]
+    data["speed_rpm"], data["whitehead"] = ("point", rpm), ("case", [1.3, 1.3])
+    data["tuned_case"] = "tuned", [0, 0, 1]
+    data["tuned_frequency_hz"], data["tuned_amplitude"] = ("tuned", hertz), ("tuned", [1e-6, 2e-6, 3e-6])  # fmt: skip
+    plot = blades(Response(data))
+    assert plot is not None
+    alike = [t for t in plot.figure.data if t.name == "all sectors alike"]
+    assert [t.x.tolist() for t in alike] == [pytest.approx([3000.0, 3200.0]), pytest.approx([3100.0])]  # fmt: skip
+    size = np.concatenate([t.y for t in alike])
+    assert size / size[0] == pytest.approx([1.0, 2.0, 3.0])

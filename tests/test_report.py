@@ -446,6 +446,7 @@ def test_the_panels_of_harmonics_end_at_the_highest_that_is_kept() -> None:
     data.attrs.pop("high_harmonics", None)
     plot = kept_harmonics(Response(data))
     assert plot is not None
+    assert plot.figure.layout.showlegend is False  # the panels are called as the cases
     assert plot.figure.layout.yaxis.range[1] < HIGH + 1
     assert "; no point keeps 6 to 41." in plot.caption
     assert runs([1, 3, 4, 6, 7, 8, 10]) == "1, 3, 4, 6 to 8, 10"

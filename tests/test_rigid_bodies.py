@@ -15,6 +15,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.part import damper_part
 from stickslip.model.rigid.body import RigidBody, body_of_tensor
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
+from stickslip.model.rigid.sides import grow_within
 from stickslip.units import RPM
 
 DEG = math.pi / 180
@@ -164,6 +165,22 @@ def test_spin_softening_and_gyroscopic_matrix_are_derivatives_of_the_exact_energ
 def test_a_wedge_that_cannot_be_is_refused(change, match):
     with pytest.raises(InputError, match=match):
         replace(WEDGE, **change)
+
+
+@pytest.mark.parametrize(
+    ("places", "within"),
+    [
+        ((-1.0, 0.0, 3.0), True),
+        ((-1.0 - 1e-10, 3.0 + 1e-10), True),
+        ((-1.0 - 1e-8, 3.0), False),
+        ((-1.0, 3.0 + 1e-8), False),
+        ((0.0, 0.0), False),
+        ((1.0, 0.0), False),
+        ((0.5,), True),
+    ],
+)
+def test_places_lie_on_a_side_up_to_its_ends_and_grow(places, within):
+    assert grow_within(places, -1.0, 3.0) is within
 
 
 def test_axes_of_a_body_are_square_to_each_other():

@@ -494,6 +494,7 @@ def test_laws_without_finite_tangents_leave_the_verdict_undecided(monkeypatch):
     found = motion_stability(structure, Interface(("a",), (law,), operator), gaps, 1.1)
     assert found.verdict == "undecided"
     assert found.error == np.inf
+    assert found.errors.shape == found.floquet.multipliers.shape == (2,)
 
 
 def test_a_known_motion_with_more_harmonics_takes_the_place_of_a_newton_step():
