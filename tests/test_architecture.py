@@ -20,9 +20,8 @@ SOURCE = ROOT / "src" / "stickslip"
 MODULES = sorted(SOURCE.rglob("*.py"))
 STUBS = sorted(SOURCE.rglob("__init__.pyi"))
 MOST_NAMES = 45
-USUAL_FUNCTION = (
-    25  # lines of code without the docstring, at the 90th percentile; ruff limits the statements of each function
-)
+# lines of code without the docstring, at the 90th percentile; ruff limits the statements of each function
+USUAL_FUNCTION = 25
 
 
 def package_of(stub: Path) -> str:
@@ -97,6 +96,19 @@ def test_type_checking_imports_do_not_hide_from_the_contracts():
 def test_functions_are_short():
     lengths = sorted(body_lines(node) for path in MODULES for node in functions(path))
     assert lengths[int(0.9 * len(lengths))] <= USUAL_FUNCTION
+
+
+def test_constants_name_their_quantity():
+    empty = {"MOST", "FEWEST", "NEAR", "CLOSE", "SAME", "MUCH"}
+    found = [
+        f"{path.relative_to(SOURCE)}: {name.id}"
+        for path in MODULES
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        for name in ast.walk(node)
+        if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id.strip("_") in empty
+    ]
+    assert not found
 
 
 def test_no_module_for_leftovers():

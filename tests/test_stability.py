@@ -33,7 +33,7 @@ from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import motion_stability, stability
-from stickslip.response.stability.missing_harmonics import FARTHER, LEAST, corrected, solved_with
+from stickslip.response.stability.missing_harmonics import FARTHER, MIN_HARMONICS, corrected, solved_with
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
@@ -191,7 +191,7 @@ def test_newton_goes_on_where_a_step_leads_nowhere_and_its_change_counts_twice()
     farther = [(p, *more) for p, more in found if more and more[1] == FARTHER]
     assert farther
     for point, more, _ in farther:
-        assert more.order == LEAST
+        assert more.order == MIN_HARMONICS
         balance = with_stiffness(problem.balance(more.support))
         residual = balance.linearise(balance.unknowns(more.coefficients), more.omega).residual
         assert np.max(np.abs(residual)) < 1e-9

@@ -32,9 +32,8 @@ from stickslip.response.time.start import start_from_harmonics
 
 HZ = 2 * np.pi
 STEPS = 512  # of a period; the error of the step is printed
-PATIENCE = (
-    250  # periods that shooting takes, and the integrations that decide at which ratio there is a periodic motion
-)
+# periods that shooting takes, and the integrations that decide at which ratio there is a periodic motion
+PATIENCE = 250
 BRIEF = 40  # periods of the other integrations, where shooting fails
 ORBIT = 1e-6  # length of shooting's last correction, relative to the vibration
 Motion = Literal["periodic", "unstable", "settled", "not periodic", "overflow"]

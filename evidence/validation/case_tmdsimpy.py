@@ -11,9 +11,8 @@ from stickslip.harmonic.balance import HarmonicBalance
 SOURCE = "tmdsimpy, commit 17d5fc3"
 COLUMNS = ("x0", "y0", "x_h1", "y_h1", "x_h3", "y_h3")
 TOLERANCE = 4e-9  # of the largest amplitude of the dof: the accuracy that the curve's own check gives
-OMEGA_DIGITS = (
-    10  # printed; on the flank of the resonance half a unit of the last one changes an amplitude by 9e-9 of itself
-)
+# printed; on the flank of the resonance half a unit of the last one changes an amplitude by 9e-9 of itself
+OMEGA_DIGITS = 10
 
 
 def column_values(balance: HarmonicBalance, omega: float, x: FloatArray) -> FloatArray:

@@ -33,7 +33,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
 from stickslip.reduction.turning import dof_rotation
 
-NEAR = 1e-6  # m: partners node to node
+NODE_TO_NODE_DISTANCE_M = 1e-6  # m: partners node to node
 ROWS = {"tangential": 0, "normal": 2}
 
 
@@ -248,7 +248,7 @@ def _paired(
     if b is None:
         empty = scipy.sparse.csr_array(facing.displacement.shape)
         b = Surface(facing.points, empty, NO_FACETS)
-        held = named(key, contact, lambda: node_to_node(facing, b, tolerance=NEAR, direction=along))
+        held = named(key, contact, lambda: node_to_node(facing, b, tolerance=NODE_TO_NODE_DISTANCE_M, direction=along))
         return held, ()
     assert second is not None
     normals = facing.node_normals()[facing.used]
@@ -272,7 +272,7 @@ def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairin
     """Pair two surfaces as a contact or join says."""
     reach = contact.tolerance
     if contact.pairing == "node_to_node":
-        return node_to_node(a, b, tolerance=NEAR if reach is None else reach, direction=along)
+        return node_to_node(a, b, tolerance=NODE_TO_NODE_DISTANCE_M if reach is None else reach, direction=along)
     if contact.pairing == "node_to_segment":
         return node_to_segment(a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along)
     return segment_to_segment(a, b, reach=reach, direction=along)

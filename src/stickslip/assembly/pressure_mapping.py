@@ -10,7 +10,7 @@ from stickslip.contact.projection import closest, facet_balls
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
-NEAR = 8  # facets, by their middles, among which the one of a point is looked for
+CANDIDATE_FACETS = 8  # facets, by their middles, among which the one of a point is looked for
 ACROSS = 0.5  # cosine to a facet's normal below which a point rather belongs to another facet
 AVERTED = -0.2  # below this the facet belongs to the other side
 CLEAR = 0.5  # of the misfit of one sense of all normals to that of the other: there is no doubt
@@ -132,7 +132,7 @@ def between_sides(surface: Surface, feet: Feet, points: FloatArray, reach: float
 def _near(middle: FloatArray, points: FloatArray) -> IntArray:
     from scipy.spatial import cKDTree
 
-    count = min(NEAR, len(middle))
+    count = min(CANDIDATE_FACETS, len(middle))
     return np.asarray(cKDTree(middle).query(points, k=count)[1]).reshape(len(points), count)
 
 

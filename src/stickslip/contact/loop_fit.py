@@ -13,7 +13,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.loop_model import RIGID, Loop, LoopModel
 from stickslip.errors import input_error
 
-FEWEST = 8  # samples of a recording
+MIN_LOOP_SAMPLES = 8  # samples of a recording
 CLEAR = 25.0  # what slip, or stick, must take off the sum of squares, in variances of a sample
 SURE = 5.0  # standard deviations beyond which a slope has a sign
 FLOOR = 1e-9  # of the force's swing: residuals below are rounding
@@ -159,9 +159,9 @@ def _checked(loops: Sequence[Loop]) -> tuple[Loop, ...]:
         if x.ndim != 1 or x.shape != force.shape:
             problem = f"displacements have the shape {x.shape}, forces {force.shape}"
             raise input_error(place, problem, "Give two arrays of one length.")
-        if x.size < FEWEST:
+        if x.size < MIN_LOOP_SAMPLES:
             problem = f"has {x.size} samples"
-            raise input_error(place, problem, f"Give {FEWEST} at least, better a hundred a cycle.")
+            raise input_error(place, problem, f"Give {MIN_LOOP_SAMPLES} at least, better a hundred a cycle.")
         for what, values in (("displacement", x), ("force", force)):
             if not np.isfinite(values).all():
                 raise input_error(place, f"a {what} is not finite", "Leave such samples out.")

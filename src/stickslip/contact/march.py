@@ -21,9 +21,8 @@ from stickslip.contact.law import PAIRS
 MAX_PERIODS = 400
 ROUNDING = 1e-14  # change over a period that counts as none, as a share of the state's range
 SETTLED = 1e-12  # largest distance from the periodic state, in the same measure
-NOISE = (
-    10.0  # times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
-)
+# times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
+NOISE = 10.0
 ROWS = 1e3  # the same two numbers are larger by this factor for derivatives
 KEPT = 1e-11  # singular value below which a direction is said to keep its memory for ever
 

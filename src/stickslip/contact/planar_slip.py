@@ -19,7 +19,7 @@ from stickslip.contact.cache import njit
 SHALLOW = 1e-3  # relative change of the limit below which the series of its logarithm is better than the logarithm
 FAINT = 1e-290  # of a turning below which it has no direction
 UNKNOWN = 1e-16  # rounding of an angle
-_MOST = 60  # Newton steps of a scalar equation; it is nearly linear, and most take three
+_MAX_STEPS = 60  # Newton steps of a scalar equation; it is nearly linear, and most take three
 
 
 @njit(cache=True, error_model="numpy")
@@ -164,7 +164,7 @@ def grown(k_t, k_w, way_t, way_w, last):  # type: ignore[no-untyped-def]
         Derivatives of its angle by the way and the size.
     """
     multiplier = 0.0
-    for _ in range(_MOST):
+    for _ in range(_MAX_STEPS):
         d_t, d_w = last + k_t * multiplier, last + k_w * multiplier
         e_t, e_w = k_t * way_t / d_t, k_w * way_w / d_w
         size = math.hypot(e_t, e_w)

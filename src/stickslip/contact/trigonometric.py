@@ -14,9 +14,8 @@ CELLS_PER_ORDER = 8  # of the grid on which the search begins; fewer leave more 
 _NARROWEST = 1e-8  # width at which a cell is no longer cut: what it hides there is below round-off in the polynomial
 _ROUND_OFF = 4e-16
 _NOISE = 4e-16  # of the polynomial's bound, for each term of its sum: smaller values have no sign of their own and count as zero
-_MOST_CUTS = (
-    2000  # of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
-)
+# of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
+_MOST_CUTS = 2000
 _MOST_STEPS = 60
 DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
 

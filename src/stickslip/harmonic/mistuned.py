@@ -21,7 +21,7 @@ from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.sectors import circulant
 
 KEPT_BYTES = 2e8  # of condensed waves that are kept
-FEWEST = 8  # frequencies times harmonics that are kept at least
+MIN_KEPT_WAVES = 8  # frequencies times harmonics that are kept at least
 
 
 def by_sectors(wheel: MistunedWheel, retained: IntArray) -> bool:
@@ -89,7 +89,7 @@ class MistunedStiffness:
     def at(self, s: float) -> "At":
         """Return the wheel at ``s = hω`` in rad/s; the last ones are kept."""
         if s not in self.known:
-            most = max(FEWEST, int(KEPT_BYTES / (6 * self.wheel.waves[0].nbytes)))
+            most = max(MIN_KEPT_WAVES, int(KEPT_BYTES / (6 * self.wheel.waves[0].nbytes)))
             for old in [one for one in self.known if one][: max(len(self.known) - most, 0)]:
                 del self.known[old]
             self.known[s] = At.of(self, s)

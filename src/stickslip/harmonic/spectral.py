@@ -23,9 +23,8 @@ Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
 PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
 LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
-IN_MODES = (
-    1e-11  # share of the largest damping in a row by which a sum of products with the modes of the interior may round
-)
+# share of the largest damping in a row by which a sum of products with the modes of the interior may round
+IN_MODES = 1e-11
 FAST = 10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 
 

@@ -12,7 +12,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.reduction.turning import COMPONENTS, node_table
 
 TOLERANCE = 1e-5  # of the faces' size: coordinates in text files have six digits or more
-MOST = 0.8  # share of nodes with partners above which faces are the same, but for some nodes
+PARTNERED_NODES_SHARE = 0.8  # share of nodes with partners above which faces are the same, but for some nodes
 LISTED = 6  # unmatched nodes that a message names
 
 
@@ -166,7 +166,7 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
     shares = [_share(low, high, sign * 2 * math.pi / sectors, axis, reach) for sign in (1.0, -1.0)]
-    if sectors > 2 and shares[1] > MOST and shares[1] > 2 * shares[0]:
+    if sectors > 2 and shares[1] > PARTNERED_NODES_SHARE and shares[1] > 2 * shares[0]:
         return input_error(
             f"cyclic_sector: {names}",
             f"are swapped: {high.name!r} lies {pitch:.6g}° behind {low.name!r} about the axis {axis.direction}",

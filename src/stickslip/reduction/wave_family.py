@@ -23,7 +23,7 @@ from stickslip.reduction.basis import is_hermitian
 from stickslip.reduction.waves import wave
 
 LARGE = 20_000  # dofs below which a wave is factorised by itself: it takes a second
-SAME = 1e-12  # of the terms of an entry: a smaller difference is rounding
+ROUNDING_OF_TERMS = 1e-12  # of the terms of an entry: a smaller difference is rounding
 ALIKE = 1e-14  # of the diagonal: the same of sums of entries
 
 
@@ -158,7 +158,7 @@ def _without_rounding(matrix: Matrix, *terms: Matrix) -> Matrix:
     size = scipy.sparse.csr_array(sum(abs(term) for term in terms))
     found = scipy.sparse.coo_array(matrix)
     at = np.asarray(size[found.coords[0], found.coords[1]]).ravel()
-    keep = np.abs(found.data) > SAME * at
+    keep = np.abs(found.data) > ROUNDING_OF_TERMS * at
     entries = (found.data[keep], (found.coords[0][keep], found.coords[1][keep]))
     return scipy.sparse.csr_array(entries, shape=matrix.shape)
 

@@ -21,7 +21,7 @@ from time import perf_counter
 
 from stickslip.response.branch import Curve, Followed, Route
 from stickslip.response.continuation_steps import (
-    FEWEST,
+    MIN_LEVELS,
     accepted,
     again,
     beside,
@@ -42,7 +42,7 @@ LADDER = 1  # last level at which all that may help is tried: with more harmonic
 MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
 LATER = 0.2  # share of the effort at a value for when its neighbours are known, and for its motion in time
 LONGEST_CALM = 48  # the same after trials that failed
-MOST = 40  # multiples of the smallest number of points at which any branch ends
+MAX_BRANCH_LENGTH = 40  # multiples of the smallest number of points at which any branch ends
 
 
 def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterator[Followed]:
@@ -170,7 +170,7 @@ class _Walk:
         return levels_left(self.curve, self.route, len(self.branch) + 1, self.spent)
 
     def _spent_up(self) -> bool:
-        return self._levels() <= FEWEST < self.curve.levels
+        return self._levels() <= MIN_LEVELS < self.curve.levels
 
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
         """Go on with fewer harmonics where no more are left."""
@@ -308,7 +308,7 @@ class _Walk:
         if self.route.listed:
             return len(self.branch) >= len(self.route.listed)
         reached = self.branch[-1].point.p == self.route.last
-        return reached or self.taken > MOST * self.route.points
+        return reached or self.taken > MAX_BRANCH_LENGTH * self.route.points
 
     def _idle(self) -> bool:
         return not self.route.listed and self.route.idle([s.point.p for s in self.branch])

@@ -14,9 +14,8 @@ from stickslip.solve.newton_method import Newton, Solution
 
 LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
 IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
-PATIENCE = (
-    80  # points that it is given in any case: a sharp resonance takes some tens of them, however few were asked for
-)
+# points that it is given in any case: a sharp resonance takes some tens of them, however few were asked for
+PATIENCE = 80
 BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
 
 Kind = Literal["point", "audit", "trial", "found", "between"]

@@ -22,17 +22,17 @@ BACK = 0.3  # distance from the branch behind, as a share of the step, within wh
 # work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed;
 # every point adds its share, so that none is judged by how many others were asked for
 EFFORT = 8.0
-FEWEST = 2  # levels that are always allowed
+MIN_LEVELS = 2  # levels that are always allowed
 
 
 def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
     """Return how many levels may be used after so many points and so much work: all while less than half of it is done, then fewer and fewer."""
     levels = curve.levels
-    if levels <= FEWEST:
+    if levels <= MIN_LEVELS:
         return levels
     most = EFFORT * max(route.points, points) * curve.cost(levels - 1)
     over = int((spent / most - 0.5) * 2.0 * levels) + 1 if spent > 0.5 * most else 0
-    return max(levels - over, min(levels, FEWEST))
+    return max(levels - over, min(levels, MIN_LEVELS))
 
 
 def without_more(curve: Curve, levels: int, made: Followed) -> Followed:

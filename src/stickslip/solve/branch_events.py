@@ -32,7 +32,7 @@ class Mark:
 
 
 FOLD = Mark(name="fold", value=lambda point: float(point.tangent[-1]))
-CLOSE = 10.0  # tolerances that the neighbours of a mark may be apart
+NEIGHBOUR_TOLERANCES = 10.0  # tolerances that the neighbours of a mark may be apart
 HALVINGS = 60  # of the way between them
 
 
@@ -73,7 +73,7 @@ def located(problem: Problem, before: Point, after: Point, mark: Mark, following
         side = np.sign(mark.value(before))
         for _ in range(HALVINGS):
             measure = measure_at(low.x, following)
-            if measure.of(high.y - low.y) <= CLOSE * mark.tolerance:
+            if measure.of(high.y - low.y) <= NEIGHBOUR_TOLERANCES * mark.tolerance:
                 break
             # at a sharp corner planes meet both of its sides, and the neighbours found are far apart: each chord between the last
             # neighbours cuts off a part that has the corner in it

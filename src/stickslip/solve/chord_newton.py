@@ -20,7 +20,7 @@ from stickslip.solve.schur import Reduced
 from stickslip.solve.status import Status
 
 SMALLER = 0.5  # part of a correction that the next one by the same factors may be
-MOST = 7  # corrections by the same factors
+MAX_CHORD_STEPS = 7  # corrections by the same factors
 REFUSED = 2  # trials of one correction after which something else is tried
 
 
@@ -82,7 +82,7 @@ class KeptFactors:
     def _corrected(self, work: Work, solve: Inverse, step: FloatArray, here: Iterate) -> Iterate:
         """Go on from the end of a full Newton step by its factors; return the iterate with the smallest residual."""
         steps, best = [step], here
-        while len(steps) <= MOST and np.isfinite(here.norm) and here.norm > self._tolerance:
+        while len(steps) <= MAX_CHORD_STEPS and np.isfinite(here.norm) and here.norm > self._tolerance:
             next_one = work.timed(partial(solve, -here.at.residual))
             if next_one is None:
                 break

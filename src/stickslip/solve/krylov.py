@@ -17,7 +17,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.operators import Bordered, Corner, Jacobian, array_of, times
 from stickslip.solve.gmres import gmres
-from stickslip.solve.linear import MOST, Assembled, Dense, LinearSolver
+from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Dense, LinearSolver
 from stickslip.solve.preconditioned import Preconditioned, is_either, is_graded, is_preconditioned
 
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
@@ -306,7 +306,7 @@ class Automatic:
         if not is_either(inside):
             return by(self.krylov, jac)
         account = self.accounts.setdefault(inside.problem, {}).setdefault(self.krylov.tolerance, _Account())
-        costs, within = inside.costs, inside.shape[0] <= MOST
+        costs, within = inside.costs, inside.shape[0] <= MAX_ARRAY_UNKNOWNS
         if account.arrays > 0 or not costs.products_pay:
             account.arrays = max(account.arrays - 1, 0)
             if within:

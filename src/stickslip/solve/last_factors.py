@@ -10,7 +10,7 @@ from stickslip.solve.krylov import Automatic
 from stickslip.solve.linear import Dense, LinearSolver, Signed, factors_of, is_factorised
 from stickslip.solve.newton_method import Solution
 
-SAME = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
+KEPT_FACTORS_RESIDUAL = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
 
 
 @dataclass(eq=False)
@@ -57,7 +57,7 @@ class LastFactors:
     def at(self, solution: Solution) -> Signed | None:
         """Return the factors if they are those of the Jacobian at a solution, too."""
         before = float(np.abs(self.residual).max())
-        return self.inverse if solution.residual_norm <= SAME * before else None
+        return self.inverse if solution.residual_norm <= KEPT_FACTORS_RESIDUAL * before else None
 
     def _factorises(self, jac: Jacobian) -> bool:
         if isinstance(self.linear, Automatic):

@@ -22,7 +22,7 @@ from stickslip.solve.factors import lu_factors
 from stickslip.solve.schur import elimination_of, reduced_factors
 
 SOLUTIONS, PRODUCTS = (5, 10)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
-MOST = 8000  # unknowns of an array, which then takes half a GB
+MAX_ARRAY_UNKNOWNS = 8000  # unknowns of an array, which then takes half a GB
 
 
 class Assembling(JacobianOperator, Protocol):
@@ -184,7 +184,7 @@ def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
 def array_pays(jac: Jacobian) -> bool:
     """Whether a Jacobian known by its products is to be factorised for some right sides, and can be."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
-    if not is_assembling(inside) or inside.shape[0] > MOST:
+    if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return False
     costs = inside.costs
     return costs.array < costs.factors + SOLUTIONS * PRODUCTS * costs.product
@@ -218,7 +218,7 @@ class _Iterated:
 def assembled(jac: Jacobian) -> FloatArray | None:
     """Return a Jacobian known by its products as a new array, borders included; None where it cannot be put together, or is too large."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
-    if not is_assembling(inside) or inside.shape[0] > MOST:
+    if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return None
     array = inside.dense()
     return replace(jac.flat, jac=array).array() if isinstance(jac, Bordered) else array
@@ -234,7 +234,7 @@ def is_factorised(jac: Jacobian) -> bool:
     """Whether systems with a Jacobian are solved by LU, as it is an array or costs less as one."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if is_assembling(inside):
-        return inside.shape[0] <= MOST and not inside.costs.products_pay
+        return inside.shape[0] <= MAX_ARRAY_UNKNOWNS and not inside.costs.products_pay
     return isinstance(inside, np.ndarray)
 
 

@@ -8,7 +8,7 @@ from stickslip.solve.status import Status
 
 SHARES = tuple(0.5**k for k in range(31))  # of a Newton step, longest first
 CREEP = 1.01  # by how much the residual may grow on the far side of a kink
-NEAR = 1.0 / 64.0  # share of a Newton step from which on that is allowed
+MAX_CREEP_SHARE = 1.0 / 64.0  # share of a Newton step from which on that is allowed
 PATIENCE = 10  # crossings in a row without a smaller residual than any before
 SLOW = 0.9  # share of the residual left by a step that hardly helped: usually one that ends at a kink
 
@@ -58,7 +58,7 @@ class Kinks:
         for share in SHARES:
             trial = work.at(now.x + share * step)
             norm = float(np.linalg.norm(trial.at.residual))
-            if norm <= (1.0 - 1e-4 * share) * size or (share <= NEAR and norm <= CREEP * size):
+            if norm <= (1.0 - 1e-4 * share) * size or (share <= MAX_CREEP_SHARE and norm <= CREEP * size):
                 return trial
             work.rejected += 1
         return Status.STALLED

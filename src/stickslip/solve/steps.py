@@ -29,11 +29,12 @@ SHARP_TURN = 0.5  # cosine between successive tangents below which the step is s
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
 STRAIGHT = 0.97  # cosine above which a branch hardly turns
 EASY = 1  # Newton step
-CLOSE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
+TANGENT_DISTANCE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
 ASIDE = 0.3  # of a step: a parabola that leaves the tangent by more is none of the branch
 PATIENT = 8.0  # smallest steps below which no factors are kept
 LOOKS_AHEAD = (1.0, 4.0, 16.0, 64.0)  # smallest steps at which the far side of a corner is looked for
-NEAR = 2.0  # lengths of a step by which its end may be away: farther, it lies on another piece of the branch
+# lengths of a step by which its end may be away: farther, it lies on another piece of the branch
+MAX_END_DISTANCE = 2.0
 LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
 ROUND = 300  # Newton steps for the far side of a corner, after which none is looked for
 LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
@@ -103,13 +104,13 @@ def take_step(problem: Problem, point: Point, unit: FloatArray, step: float, end
     solution = newton(lambda v: across(latest, v, row, value), guess, own, kept, last)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
-    near = measure.of(solution.x - y) <= NEAR * reach and (p - end) * (point.p - end) >= 0.0
+    near = measure.of(solution.x - y) <= MAX_END_DISTANCE * reach and (p - end) * (point.p - end) >= 0.0
     found = replace(solution, x=x)
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status
         return replace(point, solution=replace(found, x=point.x, status=status))
     inverse = last.at(solution) if following.predictor != "secant" else None
-    if kept is not None and measure.of(solution.x - guess) < CLOSE * step:
+    if kept is not None and measure.of(solution.x - guess) < TANGENT_DISTANCE * step:
         inverse = kept.inverse
     known = None
     if inverse is not None:

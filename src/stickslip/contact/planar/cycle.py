@@ -28,7 +28,8 @@ from stickslip.contact.slider import PERIOD
 MAX_PERIODS = 400
 _ROUNDING = 1e-13  # change over a period that counts as none, as a share of the smaller of limit and motion
 _ROUND_OFF = 1e-15  # of the displacement
-_NEAR = 1e-7  # distance from the periodic state that the derivatives by the start bridge, in the same measure
+# distance from the periodic state that the derivatives by the start bridge, in the same measure
+_START_DIFFERENCE = 1e-7
 _NOTHING = 1e-13  # share of the largest limit at which a contact counts as just closing
 _LEAST_SHARE = 0.1  # of a step of Newton's method that is tried
 _KEPT = 1e-9  # singular value below which a direction keeps its memory for ever
@@ -234,7 +235,7 @@ def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # ty
             return period
         inverse, step_x, step_y = _newton(memory, dx, dy)
         distance = max(abs(step_x), abs(step_y))
-        if distance <= _NEAR * small and not beyond:
+        if distance <= _START_DIFFERENCE * small and not beyond:
             correction[0], correction[1] = step_x, step_y
             return period
         leads = np.isfinite(distance) and not beyond

@@ -13,7 +13,7 @@ from stickslip.contact.cache import njit
 from stickslip.contact.planar.motion import AT_LIMIT_RATE, AT_X_RATE, AT_Y_RATE, SHARE, SIN, TINY
 from stickslip.contact.planar.radau import BARYCENTRIC, BEND, FINE, INNER, NODES, PART, RATE, STAGES, TIMES, TO_FINE
 
-_CLOSE = 1e-5  # last step of Newton's method: what is left is its square
+_LAST_STEP = 1e-5  # last step of Newton's method: what is left is its square
 _MOST_STEPS = 12
 
 
@@ -152,7 +152,7 @@ def collocate(piece):  # type: ignore[no-untyped-def]
             return False
         for j in range(STAGES):
             piece.angle[j + 1] += piece.right[j]
-        if largest <= _CLOSE:
+        if largest <= _LAST_STEP:
             return True
     return False
 

@@ -13,7 +13,7 @@ from stickslip.contact.planar.radau import INNER
 
 _SHORTEST = 1e-10  # step past a place where rounding hides the sign
 _MOST_STEPS = 4000
-_CLOSE = 1e-8
+_TIME_TOLERANCE = 1e-8
 
 
 @njit(**INNER)
@@ -50,11 +50,11 @@ def _root(motion, z_x, z_y, left, right):  # type: ignore[no-untyped-def]
         new = tau - f / slope if slope > 0.0 else left
         if not left < new < right:
             tau = 0.5 * (left + right)
-            if right - left <= _CLOSE * _CLOSE:
+            if right - left <= _TIME_TOLERANCE * _TIME_TOLERANCE:
                 return tau
             continue
         # the error after a step of Newton's method is about its square
-        if abs(new - tau) <= _CLOSE or not left < new < right:
+        if abs(new - tau) <= _TIME_TOLERANCE or not left < new < right:
             return new
         tau = new
     return tau

@@ -27,7 +27,7 @@ from stickslip.model.blas_threads import threads_for
 Goal = Literal["motion", "amplitude"]
 SINGULAR = 1e-15  # smallest pivot over largest below which a Jacobian has no usable factors
 DOUBTFUL = 0.3  # distance of two changes over the later one above which a third one is asked for
-MOST = 3  # evaluations with all harmonics
+MAX_FULL_EVALUATIONS = 3  # evaluations with all harmonics
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +232,7 @@ def estimate(
         start = padded + change
         changes.append(_relative(high, omega, outputs, change))
         clear = len(changes) > 1 and _away(changes[-2], changes[-1], changes[-1]) <= DOUBTFUL
-        if clear or len(changes) == MOST:
+        if clear or len(changes) == MAX_FULL_EVALUATIONS:
             return Estimate(tuple(changes), start, at.residual, mean)
         jac = mean_jacobian(at.jac, high.linearise(start, omega).jac)
 

@@ -15,7 +15,7 @@ from stickslip.model.readers.text import SHOWN, read_text
 MOST_ROWS = 2_000_000
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 FORCES = {"n": 1.0, "kn": 1e3}
-SAME = 1e-9  # relative difference of two values that are one
+REPEATED_VALUE_RTOL = 1e-9  # relative difference of two values that are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def read_columns(path: Path) -> MeasuredColumns:
 
 def same(a: FloatArray | float, b: FloatArray | float) -> BoolArray:
     """Whether two values of a varied key are one: files round them."""
-    return np.asarray(np.isclose(a, b, rtol=SAME, atol=0.0))
+    return np.asarray(np.isclose(a, b, rtol=REPEATED_VALUE_RTOL, atol=0.0))
 
 
 def _check(path: Path, names: tuple[str, ...], table: list[tuple[int, list[str]]]) -> None:

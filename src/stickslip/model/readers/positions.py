@@ -15,8 +15,8 @@ from stickslip.model.structure import Structure
 
 BALANCED = 1e-4  # of the sum of a row's entries: rows that a rigid translation does not load
 STRAINED = 5e-3  # of the terms of a rotation; stresses of preload turn with it and leave some 1e-4
-MOST = 5000  # rows that are looked at
-FEWEST = 12  # dofs away from supports, from which positions are judged
+MAX_ROWS = 5000  # rows that are looked at
+MIN_FREE_DOFS = 12  # dofs away from supports, from which positions are judged
 READERS = {".inp": deck_nodes, ".frd": frd_nodes, ".csv": csv_nodes}
 
 
@@ -69,9 +69,9 @@ def doubt_about_positions(structure: Structure) -> str | None:
     row = np.asarray(abs(stiffness) @ np.ones(structure.n))
     balanced = (np.abs(stiffness @ translations) <= BALANCED * row[:, None]).all(axis=1)
     rows = np.flatnonzero(balanced)
-    if len(rows) < FEWEST:
+    if len(rows) < MIN_FREE_DOFS:
         return None
-    rows = rows[:: len(rows) // MOST + 1]
+    rows = rows[:: len(rows) // MAX_ROWS + 1]
     part = scipy.sparse.coo_array(stiffness[rows])
     # about each row's own node, so that only the places of its neighbours count
     turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=2)  # node, component, axis

@@ -18,7 +18,7 @@ from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_tick
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced_response.summary import amplitude_name
-from stickslip.study.analyses.forced_response.working_range import FEWEST
+from stickslip.study.analyses.forced_response.working_range import MIN_PEAKS
 from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
@@ -305,7 +305,7 @@ def optimisation(response: Response) -> Plot | None:
     known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
     cases = sorted(known, key=lambda c: c.value)
     measured = measured_of(response, key)
-    if not key or len(cases) < (1 if measured else FEWEST):
+    if not key or len(cases) < (1 if measured else MIN_PEAKS):
         return None
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)

@@ -15,7 +15,7 @@ from stickslip.report.quantities import joined, percent
 from stickslip.report.response import Response
 from stickslip.report.tiles import outlines, patches
 
-FEWEST = 9  # points that make a surface worth a map
+MIN_MAP_POINTS = 9  # points that make a surface worth a map
 THICK = 0.05  # second extent over the first, below which points stand in a line
 MOST_BESIDE = 3  # maps beside each other
 STEPS = 10  # of the colours of patches, from those that stick to those that slip all the time
@@ -61,7 +61,7 @@ def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
     found = {}
     for group, members in response.groups.items():
         points = np.array(members, dtype=np.int64)
-        if points.size < FEWEST or not np.isfinite(position[points]).all():
+        if points.size < MIN_MAP_POINTS or not np.isfinite(position[points]).all():
             continue
         arm = position[points] - position[points].mean(axis=0)
         extent = np.linalg.svd(arm, compute_uv=False)

@@ -13,7 +13,7 @@ from stickslip.report.response import Response
 from stickslip.study.analyses.forced_response.bounds import BOUND
 
 GAP = "gap in m"  # at the end of the name of a deviation that is no relative one
-FEWEST = 5  # cases from which on their amplifications make a histogram
+MIN_HISTOGRAM_CASES = 5  # cases from which on their amplifications make a histogram
 BLADE = "rgba(0, 114, 178, 0.25)"
 
 
@@ -224,7 +224,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
 
 def statistics(response: Response) -> Plot | None:
     """Draw how often which amplification occurs, where there are enough cases, as of several seeds."""
-    if not mistuned(response) or len(response.peaked) < FEWEST:
+    if not mistuned(response) or len(response.peaked) < MIN_HISTOGRAM_CASES:
         return None
     factors = np.array([response.number_of("amplification", case) for case in response.peaked])
     bound = response.number_of("whitehead", response.peaked[0])

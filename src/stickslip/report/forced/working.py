@@ -7,7 +7,7 @@ from stickslip.report.cases import first_number
 from stickslip.report.content import Words
 from stickslip.report.plot import GRID
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.working_range import FEWEST, working_ranges
+from stickslip.study.analyses.forced_response.working_range import MIN_PEAKS, working_ranges
 from stickslip.study.analyses.forced_response.working_words import TITLE, range_lines
 
 
@@ -22,9 +22,9 @@ def where_friction_works(response: Response) -> Words | None:
 def what_is_needed(response: Response) -> Words | None:
     """Say what optimisation curves need where a number is varied with too few values."""
     key, n = first_number(response.data)[0], len(response.cases)
-    if not key or n >= FEWEST:
+    if not key or n >= MIN_PEAKS:
         return None
-    text = f"Curves over {key}, and where friction works, need {FEWEST} values or more; there are {n}. Add values to [vary]."
+    text = f"Curves over {key}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
     return Words((text,))
 
 

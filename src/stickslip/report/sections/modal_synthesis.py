@@ -14,7 +14,7 @@ from stickslip.report.section import Block, Card, Section
 from stickslip.study.analyses.modal_synthesis.percents import percent
 
 NAME = "modal_synthesis"
-MOST = 24  # curves that get a name of their own
+MAX_NAMED_CURVES = 24  # curves that get a name of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ def responses(view: Synthesised) -> Plot | None:
             marker=ring(view.tint(i), 5, 0.8),
             hovertemplate=f"direct, level {number(float(view.levels[i]))}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
         )
-    every = -(-len(view.shown) // MOST)
+    every = -(-len(view.shown) // MAX_NAMED_CURVES)
     for k, i in enumerate(view.shown):
         label = f"level {number(float(view.levels[i]))}"
         doubt = ", doubtful" if view.answers[i] == "doubtful" else ""

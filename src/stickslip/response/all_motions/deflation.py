@@ -12,7 +12,7 @@ from stickslip.operators import array_of
 from stickslip.solve.iterate import Evaluation
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 
-SAME = 1e-4  # distance, relative to the size of the vibrations, within which two solutions are one
+SOLUTION_DISTANCE = 1e-4  # distance, relative to the size of the vibrations, within which two solutions are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Distance:
     def same(self, a: FloatArray, b: FloatArray) -> bool:
         """Whether two solutions are one."""
         near = min(float(np.linalg.norm(self.weights * v)) / self.size for v in (a, b))
-        return self.between(a, b) <= SAME * min(1.0, max(near, SAME))
+        return self.between(a, b) <= SOLUTION_DISTANCE * min(1.0, max(near, SOLUTION_DISTANCE))
 
 
 def distance_among(weights: FloatArray, known: Sequence[FloatArray]) -> Distance:

@@ -17,7 +17,7 @@ from stickslip.response.stability.settled import stability
 from stickslip.solve.branch import Point
 
 TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located
-MOST = 300  # motions whose multipliers are asked for
+MAX_EXAMINED_MOTIONS = 300  # motions whose multipliers are asked for
 LOOKING = 2 / 3  # share of these that the points of the branch may take; locating what they show has the others
 JUMP = 5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
 BESIDE = (
@@ -43,7 +43,7 @@ def bifurcations(
     *,
     examine: Examine | None = stability,
     tolerance: float = TOLERANCE,
-    most: int = MOST,
+    most: int = MAX_EXAMINED_MOTIONS,
 ) -> Bifurcations:
     """Locate the bifurcations along a branch of a forced response.
 

@@ -20,7 +20,7 @@ from stickslip.units import HZ, millimetres
 POINTS = 80  # of a branch, at most
 ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
 CLOSED = 0.5  # steps by which the line between two points may miss the first one where a branch closes
-FEWEST = 6  # points before which it does not
+MIN_POINTS_BEFORE_CLOSING = 6  # points before which it does not
 TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
 SHORT = 0.02  # that share
 CLOSES = "it closes in itself"
@@ -301,7 +301,7 @@ class _Way:
             passed = 0.0 <= share <= 1.0
             near = measure.of(left - share * step) <= CLOSED * length
             alike = measure.cosine(first.tangent, after.tangent) > 0.0
-            return CLOSES if count[0] >= FEWEST and passed and near and alike else ""
+            return CLOSES if count[0] >= MIN_POINTS_BEFORE_CLOSING and passed and near and alike else ""
 
         return stop
 

@@ -35,7 +35,7 @@ ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
 AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
 DOUBT = 2.0  # times the second step, by which a prediction may be off
 NEARLY = 8  # iterations to a solution with fewer harmonics that is near
-NEAR = 0.3  # relative difference of motions that stand on the same sheet
+SAME_SHEET_RTOL = 0.3  # relative difference of motions that stand on the same sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,7 @@ class ForcedCurve:
 
     def near(self, fewer: Followed, more: Followed) -> bool:
         """Whether the motions differ by so little that they cannot stand on different sheets."""
-        return self.change(fewer, more) <= NEAR
+        return self.change(fewer, more) <= SAME_SHEET_RTOL
 
     def change(self, fewer: Followed, more: Followed) -> float:
         """Return the largest relative difference between two motions, a fraction."""

@@ -24,7 +24,7 @@ NO_MOTION = (StickslipError, np.linalg.LinAlgError, FloatingPointError)
 ANOTHER = 0.01  # relative difference of amplitudes of two motions
 NEWTON_STEPS = 30  # from each start
 FEW = 3  # harmonics with which a start is tried first: most lead back to the motion that is known, or nowhere
-SAME = 1e-3  # relative difference of two motions with few harmonics that are one
+SAME_MOTION_RTOL = 1e-3  # relative difference of two motions with few harmonics that are one
 STEPS = 256  # of a period in time: Newton's method makes the motion exact
 PERIODS = 60  # marched from rest, at most
 FEWEST_PERIODS = 12  # fewer lead nowhere
@@ -115,7 +115,7 @@ def _linear_starts(problem: ForcedProblem, point: ForcedPoint, options: Newton) 
         if known is not None:
             found = _solved(few, point.omega, x, options)
             motion = few.coefficients(found.x)
-            apart = np.linalg.norm(motion - known) > SAME * np.linalg.norm(known)
+            apart = np.linalg.norm(motion - known) > SAME_MOTION_RTOL * np.linalg.norm(known)
             if not (found.status.converged and apart):
                 continue
             x = found.x

@@ -20,7 +20,7 @@ from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start
 ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
-CLOSE = 1.0  # relative distance from a repeat beside a frequency within which it leads there at once
+REPEAT_DISTANCE_RTOL = 1.0  # relative distance from a repeat beside a frequency within which it leads there at once
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -121,7 +121,7 @@ def _leading(balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]
         if known.order < balance.order:
             continue
         away = np.linalg.norm(known.coefficients[1 : len(low)] - low[1:])
-        if away < CLOSE * np.linalg.norm(low[1:]):
+        if away < REPEAT_DISTANCE_RTOL * np.linalg.norm(low[1:]):
             return balance.unknowns(known.coefficients)
     return None
 

@@ -23,7 +23,7 @@ NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
 WALK = 6  # points beyond the bracket, each twice as far, until the peak lies within
 PEAK_CHANGE = 0.005  # relative change of a peak by more harmonics that ends its audit
 ALMOST = 0.95  # share of the peak above which points get its harmonics
-SAME = 1e-5  # relative distance of frequencies at which another point would tell nothing
+FREQUENCY_RTOL = 1e-5  # relative distance of frequencies at which another point would tell nothing
 PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 
 
@@ -259,4 +259,4 @@ def _vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | N
     if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
         return wider
     vertex = float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
-    return wider if abs(vertex - b) < SAME * b else vertex
+    return wider if abs(vertex - b) < FREQUENCY_RTOL * b else vertex

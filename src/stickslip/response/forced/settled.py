@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.harmonic.harmonic_set import Harmonics, multiples
 from stickslip.harmonic.judging import REACH, SAMPLES_A_HARMONIC
 from stickslip.response.forced.accepted import audits_by_frequency
-from stickslip.response.forced.along import AGREE, NEAR, SAFETY, SMALL
+from stickslip.response.forced.along import AGREE, SAFETY, SAME_SHEET_RTOL, SMALL
 from stickslip.response.forced.choices import RUNGS, Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.verification import own_error, with_waves
@@ -20,9 +20,8 @@ from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most
-WORK = (
-    2000.0  # Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
-)
+# Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
+WORK = 2000.0
 # share of the threshold above which a prediction that nothing has confirmed is not believed
 BELIEVED = 0.5
 CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
@@ -209,7 +208,7 @@ class _Settling:
             off = self.problem.real_error(here, found) if found.converged else np.inf
             if off < change:
                 more, change = found, off
-            if change <= NEAR:
+            if change <= SAME_SHEET_RTOL:
                 break
         return more, change
 

@@ -11,7 +11,7 @@ from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
 TWICE = 2.0
-SAME = 1e-9  # relative difference of contact forces that counts as none
+CONTACT_FORCE_RTOL = 1e-9  # relative difference of contact forces that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = Non
     motion = last.coefficients[: balance.order + 1, balance.linear.retained]
     one, two = (_forces(balance, factor * motion, last.omega) for factor in (1.0, TWICE))
     size = float(np.max(np.abs(two), initial=0.0))
-    return bool(np.max(np.abs(two - TWICE * one), initial=0.0) <= SAME * size)
+    return bool(np.max(np.abs(two - TWICE * one), initial=0.0) <= CONTACT_FORCE_RTOL * size)
 
 
 def _forces(balance: HarmonicBalance, motion: ComplexArray, omega: float) -> FloatArray:

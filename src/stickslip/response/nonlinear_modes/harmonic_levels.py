@@ -26,7 +26,7 @@ GROWTH = 2.5  # of steps beyond a corner, where they have become short
 MORE = 2  # times the harmonics, and one, from one level to the next
 SAFETY = 1.25
 AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
-NEAR = 0.3
+SAME_SHEET_RTOL = 0.3
 FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
 SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
 
@@ -188,7 +188,7 @@ class ModeCurve(Curve):
 
     def near(self, fewer: Followed, more: Followed) -> bool:
         """Whether two motions differ by so little that they cannot stand on different sheets."""
-        return self._between(fewer, more) <= NEAR
+        return self._between(fewer, more) <= SAME_SHEET_RTOL
 
     def height(self, found: Followed) -> float:
         """Return the damping ratio."""

@@ -12,7 +12,7 @@ from stickslip.response.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.nonlinear_modes.modal_amplitude import Size, by_energy
-from stickslip.response.nonlinear_modes.sdof_oscillator import FEWEST, modal_oscillator
+from stickslip.response.nonlinear_modes.sdof_oscillator import MIN_BACKBONE_POINTS, modal_oscillator
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.solve.branch import Point
@@ -43,7 +43,7 @@ def refined(
         Points added at most, where the curve is the least known first.
     """
     known = list(backbone.solutions)
-    if len(known) < FEWEST:
+    if len(known) < MIN_BACKBONE_POINTS:
         return backbone
     own = _Solver.of(backbone, how or Discretisation())
     wanted = _doubted(backbone, load, known, tolerance)

@@ -23,8 +23,8 @@ from stickslip.response.nonlinear_modes.synthesis import checked_level, motions_
 
 CELLS = 4096  # of the table of the oscillator over ln a
 PER_BEAT = 24  # moments that are kept of a beat between the force and the mode, about
-FEWEST, MOST = 400, 20_000  # moments that are kept
-NEAR = 0.5  # share of the peak above which a passage is judged
+MIN_MOMENTS, MAX_MOMENTS = 400, 20_000  # moments that are kept
+JUDGED_PEAK_SHARE = 0.5  # share of the peak above which a passage is judged
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,11 +153,11 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
     )
     last = float(solved.t[-1])
     beats = abs(sweep.ends[1] - sweep.ends[0]) * sweep.seconds / (4 * np.pi)
-    time = np.linspace(0.0, last, int(np.clip(PER_BEAT * beats, FEWEST, MOST)))
+    time = np.linspace(0.0, last, int(np.clip(PER_BEAT * beats, MIN_MOMENTS, MAX_MOMENTS)))
     y = solved.sol(time)
     amplitude, along = y[0] + 1j * y[1], first + rate * time
     size = np.abs(amplitude)
-    near = size > NEAR * size.max()
+    near = size > JUDGED_PEAK_SHARE * size.max()
     moves = [abs(table.slope(w, a, level)) / (w * abs(a)) for w, a in zip(along[near], amplitude[near], strict=True)]
     place = np.clip(np.log(size) - table.first, *oscillator.ends)
     return Passage(time, along, place, size, np.angle(amplitude), solved.status == 0, float(max(moves)))

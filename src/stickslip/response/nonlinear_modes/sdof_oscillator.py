@@ -23,7 +23,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint
 
-FEWEST = 4  # points of a backbone between which there is something to interpolate
+MIN_BACKBONE_POINTS = 4  # points of a backbone between which there is something to interpolate
 LINEAR = 1e-3  # relative difference of frequency and damping from those of the linear mode at which a backbone counts as begun in it
 BELOW = 1e-6  # times the first amplitude: how far a linear mode is continued
 STEPS_TO_LEAST = 6  # of Newton to the frequency that needs the least force
@@ -208,10 +208,10 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
         points that converged.
     """
     points = [p for p in backbone.points if p.status.converged]
-    if len(points) < FEWEST:
+    if len(points) < MIN_BACKBONE_POINTS:
         raise input_error(
             "modal_synthesis",
-            f"the backbone has {len(points)} points that converged, and {FEWEST} are the fewest",
+            f"the backbone has {len(points)} points that converged, and {MIN_BACKBONE_POINTS} are the fewest",
             "Follow it over more amplitudes, or with more points.",
         )
     force = _driving(backbone, load)

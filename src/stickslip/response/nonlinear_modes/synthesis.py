@@ -20,7 +20,7 @@ from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
 REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root
 DIFFERENCE = 1e-5  # of the place, over which derivatives are taken
-CLOSE = 1e-9  # of the place, in finding a peak
+PEAK_PLACE_RTOL = 1e-9  # of the place, in finding a peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
         def more(place: float) -> float:
             return float(np.log(oscillator.needed(np.array([place]))[0] / level))
 
-        place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=CLOSE))
+        place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=PEAK_PLACE_RTOL))
         here = oscillator.at(np.array([place]))
         omega = float(here.resonance()[0])
         found.append(Resonance(level, place, omega, float(here.amplitude[0]), bool(excess[i] < 0.0)))

@@ -22,7 +22,7 @@ STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields o
 STEP = 1e-5  # relative step of stiffness, and of the motion for the amplitude: central differences
 APART = 1e-4  # relative distance of two frequencies whose slopes are compared
 TINY = float(np.finfo(float).tiny)
-NEAR = 0.005  # relative distance from a solved point within which its peak lies
+PEAK_DISTANCE_RTOL = 0.005  # relative distance from a solved point within which its peak lies
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def stiffness_slope(
     step = beside.omega - point.omega
     curved = (there.by_omega - here.by_omega) / step
     turned = (there.by_stiffness - here.by_stiffness) / step
-    if not curved < 0.0 or abs(here.by_omega / curved) > NEAR * point.omega:
+    if not curved < 0.0 or abs(here.by_omega / curved) > PEAK_DISTANCE_RTOL * point.omega:
         return fixed
     way = -here.by_omega / curved
     height = here.amplitude + 0.5 * here.by_omega * way

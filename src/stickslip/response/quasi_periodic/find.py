@@ -23,7 +23,8 @@ from stickslip.response.stability import stability
 ORDER = 7  # harmonics of the motion whose multipliers are looked at
 HIGHEST = 3  # harmonic beside which a frequency is looked for
 TRIED = 3  # frequencies
-WIDE, NEAR = (0.3, 1e-3)  # of a frequency: from how far a branch is followed to it, and how near its points may be
+# of a frequency: from how far a branch is followed to it, and how near its points may be
+WIDE, POINT_DISTANCE_RTOL = 0.3, 1e-3
 NARROW = 1e-6  # half width of the range about a frequency that is solved alone
 
 
@@ -110,7 +111,7 @@ def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[Compl
         except (StickslipError, FloatingPointError, np.linalg.LinAlgError):
             continue
         for point in points:
-            if point.converged and abs(point.omega / omega - 1.0) < NEAR:
+            if point.converged and abs(point.omega / omega - 1.0) < POINT_DISTANCE_RTOL:
                 yield forced.low.linear.recover(point.omega, point.coefficients)[:, retained]
 
 

@@ -21,7 +21,7 @@ from stickslip.response.time.step_choice import FINE, with_enough_steps
 
 KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared
-LEAST, MOST = 128, 2048  # periods
+MIN_PERIODS, MAX_PERIODS = 128, 2048  # periods
 ALIKE = 0.02  # relative spread between windows that counts as none
 WORK = 8e10  # floating point operations of a march, 20 s of them as a rule
 PEAKS = 6  # of a spectrum that are told
@@ -127,8 +127,8 @@ def course(  # noqa: PLR0913
     *,
     steps: int = 512,
     work: float = WORK,
-    least: int = LEAST,
-    most: int = MOST,
+    least: int = MIN_PERIODS,
+    most: int = MAX_PERIODS,
 ) -> Course:
     """March until windows of the later half are alike, or the work is done.
 

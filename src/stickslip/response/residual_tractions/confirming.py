@@ -21,7 +21,7 @@ from stickslip.solve.newton_method import newton
 
 SAMPLES = 1024  # of the march
 ALIKE = 1e-3  # relative difference of the amplitudes by march and by events that sampling explains
-NEAR = 0.05  # of the amplitude in time that the missing harmonics of a bound may account for
+MISSING_HARMONICS_SHARE = 0.05  # of the amplitude in time that the missing harmonics of a bound may account for
 
 
 @dataclass(frozen=True)
@@ -101,5 +101,5 @@ def confirmed(
     )
     known = result.harmonics if result.settled else result.averages
     transient = float(np.linalg.norm(known[driven, 0]))
-    near = bool(abs(bound.amplitude / transient - 1.0) <= NEAR)
+    near = bool(abs(bound.amplitude / transient - 1.0) <= MISSING_HARMONICS_SHARE)
     return Confirmation(resolved, transient, result.status, result.periods, same and near)

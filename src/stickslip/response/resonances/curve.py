@@ -22,7 +22,7 @@ from stickslip.solve.newton_method import Solution
 FEW = 12  # iterations of a corrector along the curve
 SHORTEST = 0.004  # step, in arc length, below which a curve is taken up further on
 BEYOND = 0.5  # of the span by which a corrector may go beyond it
-MOST = 10  # multiples of the smallest number of points at which a curve ends
+MAX_CURVE_LENGTH = 10  # multiples of the smallest number of points at which a curve ends
 
 
 @by_one_thread
@@ -82,7 +82,7 @@ def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, 
     for made in follow(curve, route):
         if made.kind != "point":
             continue
-        if route.before(made.p, first) or (count := count + 1) > MOST * points:
+        if route.before(made.p, first) or (count := count + 1) > MAX_CURVE_LENGTH * points:
             return
         yield _told(equation, tracker, made)
 

@@ -28,7 +28,7 @@ STEPS = 12  # of Newton from peak to peak
 EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
 EXACT = 1e-12  # relative residual of sensitivities that are found by iteration ...
 STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
-CLOSE = 1e-6  # in ln ω: at a fold a peak may lie beyond both of its neighbours by as much
+FOLD_OVERLAP_LOG_OMEGA = 1e-6  # in ln ω: at a fold a peak may lie beyond both of its neighbours by as much
 SAG = 0.02  # between two points of a sweep a peak stands above both by less: 0.5 % at most of 80 peaks
 STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
 
@@ -219,8 +219,8 @@ def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]
 def _goes_over(log_omega: FloatArray, log_height: FloatArray, peak: PeakPoint) -> bool:
     """Whether a curve of points goes over a peak: two of them next to each other on its sides, at its height."""
     place, height = np.log(peak.omega), np.log(peak.amplitude)
-    low = np.minimum(log_omega[:-1], log_omega[1:]) - CLOSE
-    high = np.maximum(log_omega[:-1], log_omega[1:]) + CLOSE
+    low = np.minimum(log_omega[:-1], log_omega[1:]) - FOLD_OVERLAP_LOG_OMEGA
+    high = np.maximum(log_omega[:-1], log_omega[1:]) + FOLD_OVERLAP_LOG_OMEGA
     above = np.maximum(log_height[:-1], log_height[1:])
     return bool(np.any((low <= place) & (place <= high) & (np.abs(above - height) <= SAG)))
 

@@ -20,7 +20,7 @@ FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was foun
 BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
 SEARCH = 60  # solutions that may be spent on a bracket
 FAR = 2.0  # steps beyond the last peak up to which a line through the last two is gone on
-SAME = 1e-6  # relative distance of frequencies of two solutions that are one peak
+PEAK_FREQUENCY_RTOL = 1e-6  # relative distance of frequencies of two solutions that are one peak
 
 
 @dataclass(slots=True)
@@ -204,7 +204,7 @@ def _is_another(one: Tracker, made: list[Tracker]) -> bool:
         return False
     others = [other.problem.omega(other.reached(value).x) for other in made]
     omega = one.problem.omega(found.x)
-    return all(abs(omega - other) > SAME * other for other in others)
+    return all(abs(omega - other) > PEAK_FREQUENCY_RTOL * other for other in others)
 
 
 def represented_as(search: PeakSearch, point: PeakPoint, how: Discretisation) -> PeakPoint:

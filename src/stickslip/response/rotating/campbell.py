@@ -18,7 +18,8 @@ CLEAR = 0.7  # modal assurance below which a step in speed is halved
 HALVINGS = 5  # of a step: a veering narrower than a thirtieth of it counts as a crossing
 SPARE = 4  # modes beyond those followed, so that one that rises among them can leave
 NEARNESS = 1e-3  # weight of a relative step in frequency beside the assurance: it decides where shapes do not
-SAME = 1e-6  # relative distance of frequencies whose shapes are one space: equal blades, a wheel's pairs
+# relative distance of frequencies whose shapes are one space: equal blades, a wheel's pairs
+EQUAL_FREQUENCY_RTOL = 1e-6
 
 StructureAt = Callable[[float], Structure]
 
@@ -261,7 +262,7 @@ def _matched(before: _Spectrum, after: _Spectrum) -> _Spectrum:
 
 
 def _equal(one: FloatArray, other: FloatArray) -> BoolArray:
-    return np.abs(one[:, None] - other) <= SAME * (np.abs(one[:, None]) + np.abs(other))
+    return np.abs(one[:, None] - other) <= EQUAL_FREQUENCY_RTOL * (np.abs(one[:, None]) + np.abs(other))
 
 
 def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> _Spectrum:

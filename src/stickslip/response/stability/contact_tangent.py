@@ -14,7 +14,7 @@ from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.contact_states import ContactStates
 
 SMALL = 1e-3  # |z L| below which (1 - e^{-zL}) / z is taken from its series
-SAME = 1e-12  # of the largest stiffness: what changes less does not change
+UNCHANGED_STIFFNESS_SHARE = 1e-12  # of the largest stiffness: what changes less does not change
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, lis
     mean = np.tensordot(lengths / PERIOD, contacts.stiffness, axes=1)
     springs = np.diagonal(mean, axis1=1, axis2=2)
     changes = contacts.stiffness - np.eye(3) * springs[:, None, :]
-    felt = np.abs(changes) > SAME * np.max(np.abs(contacts.stiffness), initial=0.0)
+    felt = np.abs(changes) > UNCHANGED_STIFFNESS_SHARE * np.max(np.abs(contacts.stiffness), initial=0.0)
     used = np.any(felt, axis=(0, 3)) | np.any(felt, axis=(0, 2))
     used.flat[contacts.rows] = True
     used.flat[contacts.normals[np.any(contacts.by_normal != 0.0, axis=0)]] = True

@@ -25,18 +25,25 @@ from stickslip.response.stability.waves import WaveDisturbance
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
 
-FACTOR, MORE = 2, 3  # disturbances have FACTOR times the harmonics of the motion and MORE,
-LEAST, MOST = 8, 20  # at least and at most these,
-ROWS = 1300  # and no more than make matrices of so many rows,
-FEWEST = 5  # but these
-MUCH = 700  # rows up to which their number is doubled where those beyond matter, and up to which modes ring in one that contacts may make grow
-CHEAP = 400  # rows up to which harmonics are added until every mode rings in one
-SMALL = 700  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
-ABOVE = 3e-4  # of a multiplier: what modes may do that ring above all harmonics that are solved; measured: 9e-5
-DECIDING, CLOSE = (-0.03, 3e-3)  # real part of exponents that decide; what harmonics beyond may change in these
-FURTHER_MOTIONS = 2  # with more harmonics, where a verdict stays open
-COMPARED = 3  # of them, those that grow most,
-NEAR = 0.95  # and the others count with the largest change of those that are as near to the largest one, or farther from it
+# harmonics of disturbances: so many times those of the motion, and more, within the limits, and few enough for the rows
+HARMONICS_FACTOR, HARMONICS_MORE = 2, 3
+MIN_HILL_HARMONICS, MAX_HILL_HARMONICS = 8, 20
+MAX_ROWS = 1300
+MIN_HARMONICS_OF_MANY_ROWS = 5
+# rows up to which harmonics are added until every mode rings in one
+MAX_RINGING_ROWS = 400
+# rows up to which harmonics are doubled where those beyond matter, and added until modes ring that contacts may make grow
+MAX_DOUBLED_ROWS = 700
+# rows up to which all waves of a wheel are compared with those of the motion as it was solved; of larger ones those that grow most
+MAX_ROWS_OF_COMPARED_WAVES = 700
+COMPARED_WAVES = 3
+# relative size from which a wave's exponent counts as one of the largest: the others take the largest change among these
+NEAR_LARGEST_SHARE = 0.95
+# of a multiplier: what modes may do that ring above all harmonics that are solved; measured 9e-5
+RINGING_ABOVE = 3e-4
+# real part from which exponents decide, and what harmonics beyond may change in these
+DECIDING_REAL_PART, DECIDED_CHANGE = -0.03, 3e-3
+FURTHER_MOTIONS = 2  # motions with more harmonics that are tried where a verdict stays open
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,11 +176,11 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
     """Return the exponents with so many harmonics that those beyond hardly change what decides, as far as that can be had."""
     found = exponents(hill)
     while True:
-        deciding = np.max(found.errors[found.values.real > DECIDING], initial=0.0)
+        deciding = np.max(found.errors[found.values.real > DECIDING_REAL_PART], initial=0.0)
         more = replace(hill, order=2 * hill.order)
-        known = found.missing == 0 and deciding < CLOSE
+        known = found.missing == 0 and deciding < DECIDED_CHANGE
         in_vain = more.order < hill.reach
-        if known or in_vain or more.rows > MUCH:
+        if known or in_vain or more.rows > MAX_DOUBLED_ROWS:
             return hill, found
         hill, found = more, exponents(more)
 
@@ -222,26 +229,26 @@ def _order(hill: Hill, motion: int) -> int:
     """Return how many harmonics are solved: so many that each mode rings in one of them, or each that may grow, if that is cheap."""
     ports = max(hill.side.ports.size, 1)
     ratios = hill.side.modes(0, 0).ratios
-    least = min(max(FACTOR * motion + MORE, LEAST), MOST)
+    least = min(max(HARMONICS_FACTOR * motion + HARMONICS_MORE, MIN_HILL_HARMONICS), MAX_HILL_HARMONICS)
     highest = float(np.max(ratios[np.isfinite(ratios)], initial=0.0))
-    for top, rows in ((max(highest, hill.reach), CHEAP), (hill.reach, MUCH)):
+    for top, rows in ((max(highest, hill.reach), MAX_RINGING_ROWS), (hill.reach, MAX_DOUBLED_ROWS)):
         order = int(np.ceil(top)) + 1
         if order > least and (2 * order + 1) * ports <= rows:
             return order
-    return max(min(least, (ROWS // ports - 1) // 2), FEWEST)
+    return max(min(least, (MAX_ROWS // ports - 1) // 2), MIN_HARMONICS_OF_MANY_ROWS)
 
 
 def _changes(found: Exponents, solved: Hill) -> FloatArray:
     """Return how far each multiplier of a motion is from that of the motion as it was solved, of a large wheel by a few waves."""
     waves = solved.side.waves
-    if waves <= COMPARED or solved.rows <= SMALL:
+    if waves <= COMPARED_WAVES or solved.rows <= MAX_ROWS_OF_COMPARED_WAVES:
         return _distances(found, exponents(solved, segments_of(solved)), solved)
     standing = np.minimum(found.waves, waves - found.waves) % waves
-    first = list(dict.fromkeys(standing.tolist()))[:COMPARED]
+    first = list(dict.fromkeys(standing.tolist()))[:COMPARED_WAVES]
     other = exponents(solved, [s for s in segments_of(solved) if s.wave in first])
     known, size = np.isin(standing, first), np.abs(found.multipliers)
     change = np.where(known, _distances(found, other, solved), 0.0)
-    for alike in (size > NEAR * np.max(size), size <= NEAR * np.max(size)):
+    for alike in (size > NEAR_LARGEST_SHARE * np.max(size), size <= NEAR_LARGEST_SHARE * np.max(size)):
         some = known & alike
         most = np.max(change[some] / size[some], initial=0.0) if np.any(some) else 1.0
         change = np.where(alike & ~known, most * size, change)
@@ -263,7 +270,7 @@ def _judged(found: Exponents, change: FloatArray, states: ContactStates, hill: H
     errors = change + 2.0 * np.pi * np.abs(values) * found.errors
     ratios = hill.side.modes(0, 0).ratios
     if np.any(ratios[np.isfinite(ratios)] > hill.order) and hill.tangents:
-        errors = errors + ABOVE * np.abs(values)
+        errors = errors + RINGING_ABOVE * np.abs(values)
     if found.missing is None or found.missing:
         # what was not found does not make those stable that are known to grow
         errors = np.where(np.abs(values) > 1.0, errors, np.inf)

@@ -10,11 +10,9 @@ from stickslip.response.stability.hill_segment import HALF, Hill, Segment, fitte
 from stickslip.response.stability.hill_zeros import Matrix, Zeros, turning, zeros_near
 
 WIDE, HIGH = 0.3, 0.32  # half axes of the ellipse about a segment
-LEFT, SURE = (
-    -0.12,
-    0.04,
-)  # beside a segment: left of which exponents are not sought, and right of which they are solved again
-ROUNDS, STEP, CLOSE, FAR = 8, 1e-6, 1e-8, 0.1  # of Newton's method on the matrix itself
+# beside a segment: left of which exponents are not sought, and right of which they are solved again
+LEFT, SURE = -0.12, 0.04
+ROUNDS, STEP, LAST_CHANGE, MAX_CHANGE = 8, 1e-6, 1e-8, 0.1  # of Newton's method on the matrix itself
 EDGE = 5e-3  # beyond the ends of a segment that exponents may lie
 ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
 PATH = 65  # values of a determinant along a segment
@@ -192,9 +190,9 @@ def _solved(
         slope = np.vdot(left, (beside.whole / scale - whole) @ right) / STEP
         change = -np.vdot(left, whole @ right) / slope
         sigma += change
-        if abs(sigma - start) > FAR:
+        if abs(sigma - start) > MAX_CHANGE:
             return None
-        if abs(change) < CLOSE:
+        if abs(change) < LAST_CHANGE:
             return sigma, right, left, here.beyond / scale, complex(slope)
     return None
 

@@ -13,10 +13,10 @@ from stickslip.arrays import ComplexArray, FloatArray
 POINTS = 64  # of a contour
 RANK = 1e-10  # singular value of the first moment, over the largest, that is none
 ROUNDS = 6  # of Newton's method
-CLOSE = 1e-9  # change of a zero that ends it
+LAST_CHANGE = 1e-9  # change of a zero that ends it
 NUDGE = 1e-9  # beside a zero, where the matrix can be solved
 OUTSIDE = 1.5  # squared size of the ellipse beyond which the integral shows nothing
-FAR = 0.05  # a zero that Newton's method moves farther was none
+MAX_CHANGE = 0.05  # a zero that Newton's method moves farther was none
 LARGEST_TURN = 2.0  # rad between two values of a determinant, beyond which its turns are not counted
 
 Matrix = Callable[[ComplexArray], ComplexArray]  # (k,) exponents -> (k, s, s)
@@ -85,7 +85,7 @@ def _polished(matrix: Matrix, slope: Matrix, starts: ComplexArray, vectors: Comp
     now, right = starts.astype(complex), vectors.copy()
     change = np.full_like(now, np.inf)
     for _ in range(ROUNDS):
-        moving = np.flatnonzero(np.abs(change) >= CLOSE)
+        moving = np.flatnonzero(np.abs(change) >= LAST_CHANGE)
         if not moving.size:
             break
         # no zero itself, where nothing could be solved
@@ -94,10 +94,10 @@ def _polished(matrix: Matrix, slope: Matrix, starts: ComplexArray, vectors: Comp
         following = np.linalg.solve(matrix(near), moved[:, :, None])[:, :, 0]
         share = np.einsum("ki,ki->k", right[moving].conj(), following)
         step = NUDGE - 1.0 / np.where(share != 0.0, share, 1.0)
-        step *= np.minimum(1.0, FAR / np.maximum(np.abs(step), FAR))
+        step *= np.minimum(1.0, MAX_CHANGE / np.maximum(np.abs(step), MAX_CHANGE))
         now[moving], change[moving] = now[moving] + step, step
         right[moving] = following / np.linalg.norm(following, axis=1, keepdims=True)
-    kept = (np.abs(change) < CLOSE) & (np.abs(now - starts) < FAR)
+    kept = (np.abs(change) < LAST_CHANGE) & (np.abs(now - starts) < MAX_CHANGE)
     now, right = now[kept], right[kept]
     slopes = slope(now)
     adjoint, other = matrix(now + NUDGE).conj().transpose(0, 2, 1), right

@@ -13,14 +13,14 @@ from stickslip.harmonic.selection.alert import silent
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.solve.newton_method import newton
 
-FACTOR, MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and MORE,
-MOST = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
+HARMONICS_FACTOR, HARMONICS_MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and MORE,
+MAX_SOLVED_HARMONICS = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
 FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harmonics beyond it change as much again
 STEP_WORK = 1e6  # floating point operations of a Newton step for each of its unknowns
 MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
 MOST_ROWS = 4500  # and of its unknowns
 SOLUTIONS = 10  # of a point, at most
-LEAST = 11  # and at least these: after H = 1, five are too few to see what closings do
+MIN_HARMONICS = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
     if step is not None:
         return step.point, 1.0
     fed = judging_set_of(with_stiffness(problem.balance(point.support)))
-    order = max(LEAST, FACTOR * point.order + MORE, fed[-1])
-    more = None if order > MOST else solved_with(problem, point, order)
+    order = max(MIN_HARMONICS, HARMONICS_FACTOR * point.order + HARMONICS_MORE, fed[-1])
+    more = None if order > MAX_SOLVED_HARMONICS else solved_with(problem, point, order)
     return None if more is None else (more.point, FARTHER)
 
 
@@ -51,7 +51,7 @@ def corrected_by_step(problem: ForcedProblem, point: ForcedPoint) -> Corrected |
     """Return a point after a Newton step with more harmonics; itself where no force acts on these; None where the step leaves a larger residual."""
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
-    fed = {*judging_set_of(low), *harmonics_of(max(LEAST, FACTOR * low.order + MORE))}
+    fed = {*judging_set_of(low), *harmonics_of(max(MIN_HARMONICS, HARMONICS_FACTOR * low.order + HARMONICS_MORE))}
     high = _more(problem, tuple(sorted(fed)))
     x, padded = low.unknowns(point.coefficients), high.unknowns(point.coefficients)
     period = high.forces(padded, omega, problem.step(low, x, omega).events)
@@ -80,7 +80,7 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
 
 def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
     """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
-    reached, order = point, max(FACTOR * point.order + MORE, LEAST)
+    reached, order = point, max(HARMONICS_FACTOR * point.order + HARMONICS_MORE, MIN_HARMONICS)
     for _ in range(SOLUTIONS):
         order = min(order, MOST_HARMONICS)
         if order <= reached.order or problem.system.retained.size * (2 * order + 1) > MOST_ROWS:
@@ -92,7 +92,7 @@ def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corre
         if more.point.order <= reached.order:
             return  # a wheel has no more waves
         yield more
-        reached, order = more.point, FACTOR * order + MORE
+        reached, order = more.point, HARMONICS_FACTOR * order + HARMONICS_MORE
 
 
 def newton_work(rows: int) -> float:

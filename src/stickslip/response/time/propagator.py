@@ -14,9 +14,8 @@ from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.response.time.time_step import StepOperators
 
-FAST = (
-    10.0  # times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
-)
+# times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
+FAST = 10.0
 
 COUPLED = 1e-12  # of a mode's motion that a step gives to another: less is rounding
 

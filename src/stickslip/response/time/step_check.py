@@ -13,7 +13,7 @@ from stickslip.response.time.settling import period_harmonics
 from stickslip.response.time.step_tangent import tangent_operators
 
 COARSE = 0.01  # of the largest harmonic: a step that errs by more has not found the motion
-CLOSE = 0.05  # distance of the growth from 1 below which its error is looked for
+NEUTRAL_DISTANCE = 0.05  # distance of the growth from 1 below which its error is looked for
 JUMP = 1.5  # times the largest friction force: a change within a step that passes over stick
 TURNS = 2.0  # the same of first order: of the derivative, which feels where in a step a slider turns
 RICHARDSON = 4.0 / 3.0  # error of a method of second order over its change when the step is halved
@@ -69,7 +69,7 @@ def step_errors(
     opens = _opens(image) or _opens(moved)
     if RICHARDSON * change > COARSE or not opens:
         error = np.inf if jumps or opens else 0.0
-        if error == 0.0 and abs(growth - 1.0) < CLOSE:
+        if error == 0.0 and abs(growth - 1.0) < NEUTRAL_DISTANCE:
             error = TURNS * abs(fine.floquet(fine.derivative(there)).growth - growth)
         return StepErrors(RICHARDSON * change, error)
     motions, growths = [known], [growth]

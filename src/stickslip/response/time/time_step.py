@@ -29,9 +29,8 @@ from stickslip.response.time.contact_step import (
 )
 from stickslip.response.time.step_newton import back_substitute, dot, factor_anew, factor_slopes, newton_work, slopes
 
-FULL_STEPS = (
-    12  # Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
-)
+# Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
+FULL_STEPS = 12
 NEWTON_STEPS = 60
 GAP_TOLERANCE = 1e-12  # of the largest gap: some hundred roundings
 

@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.errors import StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation, Bifurcations
-from stickslip.response.bifurcations.locate import MOST, bifurcations
+from stickslip.response.bifurcations.locate import MAX_EXAMINED_MOTIONS, bifurcations
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability import Stability, hill_stability, stability
@@ -27,7 +27,7 @@ from stickslip.units import HZ
 COUNTS = ("resting", "grazing", "transitions")  # of a stability
 LEAVES = ("period doubling", "branch point")  # kinds from which a periodic branch is followed
 MOST_FOLLOWED = 6  # bifurcations of a case from which branches are followed
-FEWEST = 40  # motions of a wheel that Hill's method looks at, however long it takes,
+MIN_WHEEL_MOTIONS = 40  # motions of a wheel that Hill's method looks at, however long it takes,
 HILL_SECONDS = 1800.0  # and in how long, by its estimate, it looks at more
 NOT_FOLLOWED = "what leaves there is not followed: every sector of so large a wheel would count for itself"
 
@@ -94,9 +94,9 @@ def _by_hill(problem: ForcedProblem, point: ForcedPoint, pieces: Pieces) -> Stab
 def _most(question: Question) -> int:
     """Return how many motions of a case are examined at most."""
     if not by_hill(question.model.system):
-        return MOST
+        return MAX_EXAMINED_MOTIONS
     seconds = hill_work(question.model.system) / FLOPS
-    return int(np.clip(HILL_SECONDS / seconds, FEWEST, MOST))
+    return int(np.clip(HILL_SECONDS / seconds, MIN_WHEEL_MOTIONS, MAX_EXAMINED_MOTIONS))
 
 
 def followed(question: Question, found: Bifurcations) -> list[tuple[Bifurcation, SideBranch]]:

@@ -21,7 +21,7 @@ HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand
 UNSTABLE = MOTION["unstable"]
 CHECKS = ("verify", "stability")  # whose rows speak of single points
 CARRIED = 2  # the number of motion_stability_basis
-SAME = 1e-9  # relative difference of frequencies that are one
+FREQUENCY_RTOL = 1e-9  # relative difference of frequencies that are one
 
 
 def motion_of(said: Mapping[str, Any]) -> str:
@@ -286,13 +286,13 @@ class Curve:
     def outside(self) -> bool:
         """Whether the peak lies beyond the frequencies that were asked for, where a branch goes round a fold."""
         low, high = self.number("lowest_hz"), self.number("highest_hz")
-        return bool(self.peak_hz < low * (1 - SAME) or self.peak_hz > high * (1 + SAME))
+        return bool(self.peak_hz < low * (1 - FREQUENCY_RTOL) or self.peak_hz > high * (1 + FREQUENCY_RTOL))
 
     @property
     def at_the_end(self) -> bool:
         """Whether the peak is the end of the sweep, or the last point that was found there."""
         ends = [self.hz.min(), self.hz.max(), self.number("lowest_hz"), self.number("highest_hz")]
-        return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= SAME * self.peak_hz))
+        return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= FREQUENCY_RTOL * self.peak_hz))
 
     @property
     def range_key(self) -> str:
@@ -325,7 +325,7 @@ class Curve:
     def _points_of(self, word: str) -> Iterator[tuple[int, dict[str, Any]]]:
         for said in self.rows(word):
             off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
-            near = np.flatnonzero(self.converged & (off <= SAME))
+            near = np.flatnonzero(self.converged & (off <= FREQUENCY_RTOL))
             # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
             told = MOTION.get(str(said.get("stability_verdict")), -1)
             other = self.floats("motion_stability") != told

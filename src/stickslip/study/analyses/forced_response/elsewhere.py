@@ -10,7 +10,7 @@ from stickslip.study.analyses.forced_response.stable import examine
 from stickslip.study.analyses.forced_response.values import Values, texts
 from stickslip.units import HZ
 
-NEAR = 0.005  # relative distance of frequencies within which a motion of the response is the same one
+SAME_FREQUENCY_RTOL = 0.005  # relative distance of frequencies within which a motion of the response is the same one
 ALIKE = 0.03  # relative difference of its amplitude
 
 
@@ -37,7 +37,7 @@ def motions_elsewhere(question: Question, response: Response) -> Values:
 def _on_branch(response: Response, other: OtherMotion) -> bool:
     """Whether the response passes the motion elsewhere on its branch, as round a fold."""
     return any(
-        abs(a.point.omega / other.point.omega - 1.0) <= NEAR
+        abs(a.point.omega / other.point.omega - 1.0) <= SAME_FREQUENCY_RTOL
         and abs(response.amplitude(a) / other.amplitude - 1.0) <= max(ALIKE, ANOTHER)
         for a in response.accepted
         if a.fields is not None

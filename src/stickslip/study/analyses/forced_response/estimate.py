@@ -11,14 +11,13 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
-from stickslip.solve.linear import MOST
+from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS
 from stickslip.study.file.loads import Limits
 from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
-NEWTON_A_POINT = (
-    6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
-)
+# repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+NEWTON_A_POINT = 6
 FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
 AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
@@ -126,7 +125,7 @@ def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
     """Return how many numbers a Newton step holds at once."""
     if sectors > 1:  # a factor of each harmonic and the wheel's matrices
         return 12 * (unknowns + 4 * coordinates) * coordinates
-    if unknowns <= MOST:  # an array of all harmonics together, and its factors
+    if unknowns <= MAX_ARRAY_UNKNOWNS:  # an array of all harmonics together, and its factors
         return 6 * unknowns**2
     # the structure's matrices and a factor of each harmonic at most; 2.1 GB with 1000 contacts and H = 5, reduction included
     return 8 * coordinates**2 + unknowns * coordinates

@@ -4,7 +4,7 @@ from stickslip.assembly.unreduced import KEPT
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.contact_states import is_located
-from stickslip.response.stability.hill import MOST, ROWS
+from stickslip.response.stability.hill import MAX_HILL_HARMONICS, MAX_ROWS
 from stickslip.response.stability.hill_segment import NODES
 from stickslip.response.system import System
 from stickslip.response.time.sectors import different_sectors
@@ -67,8 +67,8 @@ def hill_work(system: System) -> float:
     """Return the most operations that an examination of a wheel by Hill's method takes, one sector at a time, whatever contacts slip."""
     side = system.structure
     sectors = side.sectors if isinstance(side, TunedWheel) else 1
-    rows = min(ROWS, (2 * MOST + 1) * 3 * system.interface.n_contacts)
-    each = 8.0 * rows**3 / 3.0 + (2 * MOST + 1) * 4.0 * float(side.n) ** 3
+    rows = min(MAX_ROWS, (2 * MAX_HILL_HARMONICS + 1) * 3 * system.interface.n_contacts)
+    each = 8.0 * rows**3 / 3.0 + (2 * MAX_HILL_HARMONICS + 1) * 4.0 * float(side.n) ** 3
     return MOTIONS * 2.0 * sectors / 2.0 * NODES * each
 
 

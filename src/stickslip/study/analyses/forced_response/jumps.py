@@ -9,9 +9,8 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 
 JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
 LOSS_JUMP = 10.0  # ratio of neighbouring dissipations ...
-LOSS_STEP = (
-    4.0  # ... whose difference is so many times those beside it: where slip begins they grow from one to the next
-)
+# ... whose difference is so many times those beside it: where slip begins they grow from one to the next
+LOSS_STEP = 4.0
 LOSS_COUNTS = 0.01  # share of the largest dissipation below which it does not matter
 LOSS_SEEN = 1e-6  # share of the energy that the contacts store below which it is rounding
 

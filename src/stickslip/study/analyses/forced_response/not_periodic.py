@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.quasi_periodic.in_time import KEPT, LEAST, MOST, PEAKS, Course, course, statistics
+from stickslip.response.quasi_periodic.in_time import KEPT, MAX_PERIODS, MIN_PERIODS, PEAKS, Course, course, statistics
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.study.analyses.forced_response.in_time import GOLDEN, KICK
@@ -21,11 +21,9 @@ from stickslip.units import HZ, millimetres, millimetres_between
 STEPS = 512  # in a period, at least
 AGREE = 0.1  # relative difference of a root mean square with half the step that counts as none
 TURNS = 128  # periods whose amplitudes are kept for the picture
-SAME = 1e-3  # relative difference of the amplitudes of all periods that counts as none
-NEAR, AT = (
-    0.05,
-    0.01,
-)  # of its vibration: what is nearer to the balance may not have left it, and what has had the time to leave is still at it
+EQUAL_AMPLITUDE_RTOL = 1e-3  # relative difference of the amplitudes of all periods that counts as none
+# of its vibration: what is nearer to the balance may not have left it, and what has had the time to leave is still at it
+ESTIMATED_DISTANCE, ATTAINED_DISTANCE = 0.05, 0.01
 MARGIN = 1.5  # times the periods in which a kick grows to the size of the motion: the later half is compared
 MOST_PERIODS = 20_000
 MULTIPLE = 0.02  # of the frequency: a line of the spectrum that is farther from every multiple is another frequency
@@ -87,7 +85,7 @@ class _March:
     @property
     def stayed(self) -> bool:
         """Whether it is still the motion it began on, as far as can be told."""
-        return self.away < (NEAR if self.course.periods < self.needed else AT)
+        return self.away < (ESTIMATED_DISTANCE if self.course.periods < self.needed else ATTAINED_DISTANCE)
 
 
 def without_periodic(
@@ -167,13 +165,13 @@ def _marched(question: Question, response: Response, omega: float, work: float, 
         start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
         start = _disturbed(start, omega * np.abs(motion[1:]).sum(axis=0))
     needed = _needed(multiplier)
-    least = LEAST if np.isinf(needed) else int(np.clip(needed, LEAST, MOST_PERIODS))
+    least = MIN_PERIODS if np.isinf(needed) else int(np.clip(needed, MIN_PERIODS, MOST_PERIODS))
     march = partial(course, structure, contacts, load, omega, system.outputs)
-    most = max(MOST, min(2 * least, MOST_PERIODS))
+    most = max(MAX_PERIODS, min(2 * least, MOST_PERIODS))
     found = march(start, steps=STEPS, work=work, least=least, most=most)
     finer = None
     if found.angle > 0.0 and not found.overflowed:  # what opens and closes may depend on the step
-        finer = march(found.final, steps=2 * found.steps, work=work, most=LEAST)
+        finer = march(found.final, steps=2 * found.steps, work=work, most=MIN_PERIODS)
     away = np.nan
     if near is not None and motion is not None and near.point.omega == omega:
         away = _away(found, motion[:, system.outputs])
@@ -210,13 +208,13 @@ def _told(question: Question, response: Response, omega: float, why: str, march:
         said = (
             f"in time it grew beyond all numbers in {found.periods} periods"
             if found.overflowed
-            else (f"the time was too short: {found.periods} of at least {LEAST} periods")
+            else (f"the time was too short: {found.periods} of at least {MIN_PERIODS} periods")
         )
         return _nothing(omega, why, count, said)
     last = found.amplitude[-TURNS:, own]
     amplitudes = np.full(TURNS, np.nan)
     amplitudes[: last.size] = last
-    alike = bool(np.all(of.largest - of.least <= SAME * of.largest.max(initial=0.0)))
+    alike = bool(np.all(of.largest - of.least <= EQUAL_AMPLITUDE_RTOL * of.largest.max(initial=0.0)))
     lines = of.hertz[own]
     strange = [f"{hz:.2f} Hz" for hz in lines if _off(hz, omega / HZ)]
     label = question.model.output_labels[own]

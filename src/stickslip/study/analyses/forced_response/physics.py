@@ -20,9 +20,8 @@ from stickslip.units import HZ
 
 PHYSICS = "physics"  # the note of a job
 BESIDE = 0.01  # of a frequency: a resonance stands so near to the mode that it belongs to
-STEADY = (
-    0.5  # half the range of a normal force over its mean above which the estimate of what friction can do does not hold
-)
+# half the range of a normal force over its mean above which the estimate of what friction can do does not hold
+STEADY = 0.5
 NAMED_MODES = 3  # that a sentence lists
 GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
 

@@ -22,7 +22,7 @@ from stickslip.study.analyses.verdict import LEVELS
 Regime = Literal["stuck", "stiffens", "works", "lets go"]
 REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a dataset is its place
 HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
-FEWEST = 3  # peaks of a curve
+MIN_PEAKS = 3  # peaks of a curve
 HELD_BY = (
     "ratio",
     "friction_coefficient",
@@ -240,7 +240,7 @@ def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | No
 def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | None:
     """Put a curve over a key in order and judge it; None where there are too few peaks, or no friction."""
     rising = sorted(peaks, key=lambda p: p.value)
-    if len(rising) < FEWEST or all(p.contacts.linear or p.loss == 0.0 for p in rising):
+    if len(rising) < MIN_PEAKS or all(p.contacts.linear or p.loss == 0.0 for p in rising):
         return None
     end = sticks_at(rising, key)
     if end is None:

@@ -11,7 +11,7 @@ from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.units import millimetres
 
-CLOSE = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
+IN_TIME_RTOL = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
 MORE = "Raise limit_cycle.most_harmonics."
 
 
@@ -163,7 +163,7 @@ def _of_time(label: str, what: str, case: Mapping[str, xr.Variable], c: int) -> 
     amplitude, hertz = (float(case[f"cycle_{n}"].values[c]) for n in ("amplitude", "frequency_hz"))
     there = float(case["cycle_time_amplitude"].values[c])
     away = abs(there / amplitude - 1.0)
-    if not np.isfinite(away) or away <= CLOSE:
+    if not np.isfinite(away) or away <= IN_TIME_RTOL:
         return []
     why = f"{what} is {100 * away:.2g} % off where time integration was at its end"
     return [Verdict("doubtful", label, hertz, why, "Give it more limit_cycle.periods, or look at its stability.")]

@@ -14,9 +14,9 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.units import RPM
 
 NOTE = "fast"
-MOST = 7  # harmonic beyond which a fast run-up does not go, but for those that loads drive
+MAX_FAST_HARMONIC = 7  # harmonic beyond which a fast run-up does not go, but for those that loads drive
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
-NEAR = 0.5  # share of the peak above which the second derivative is held against the first
+JUDGED_PEAK_SHARE = 0.5  # share of the peak above which the second derivative is held against the first
 
 
 def fast_run_ups(question: Question, points: Sequence[RunUpPoint], notes: Notes) -> None:
@@ -43,7 +43,7 @@ def name_of(order: int, rate: float) -> str:
 def _order(along: Along, points: Sequence[RunUpPoint]) -> int:
     """Return the highest harmonic that the steady points of an engine order keep, and the load drives."""
     own = [p.order for p in points if p.engine_order == along.order and p.converged]
-    return max(min(max(own, default=1), MOST), *along.problem.driven)
+    return max(min(max(own, default=1), MAX_FAST_HARMONIC), *along.problem.driven)
 
 
 def _swept(along: Along, rate: float, order: int) -> dict[str, Any]:
@@ -112,7 +112,7 @@ def neglected(time: FloatArray, amplitude: ComplexArray, omega: FloatArray) -> f
     first = (before * slopes[1:] + after * slopes[:-1]) / (before + after)
     second = 2 * (slopes[1:] - slopes[:-1]) / (before + after)
     size = np.abs(amplitude[1:-1])
-    near = size > NEAR * size.max()
+    near = size > JUDGED_PEAK_SHARE * size.max()
     weight = (before + after)[near]  # so that many short steps do not count more
     there = np.sum(weight * np.abs(second[near]) ** 2)
     here = np.sum(weight * np.abs(2 * omega[1:-1][near] * first[near]) ** 2)
