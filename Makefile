@@ -26,7 +26,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Each worker gets tests in one piece: what the tests of a file share is made, and what they compile compiled, once.
 TESTS := pytest -n $(WORKERS) --dist worksteal --durations=20
 
-.PHONY: help install run test test-kernels coverage optional test-optional test-cluster lint docs-tools docs release figures second-damper reconstruction bench bench-rival calculix validate validate-tests validate-faults validate-kernels validate-literature validate-in-time validate-mutants baseline strategies alarms sections trust mutants lock clean
+.PHONY: help install run test test-kernels coverage optional test-optional test-cluster lint docs-tools docs release pages bench bench-rival calculix validate validate-tests validate-faults validate-kernels validate-literature validate-in-time validate-mutants baseline trust mutants lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -87,8 +87,16 @@ docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
 	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html in a browser."
 
-figures: $(DOCS_INSTALLED)  ## draw the figures of Gastaldi & Berruti (2017) for the own two blades; writes docs/seed_figures.md (some minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.figures
+# the modules of evidence/ that write pages of docs/
+PAGE_figures = figures
+PAGE_strategies = strategies compare
+PAGE_alarms = strategies alarms
+PAGE_second-damper = second_damper
+PAGE_reconstruction = reconstruction
+PAGE_sections = sections
+
+pages: $(DOCS_INSTALLED)  ## write a page of docs/ and its pictures anew: NAME=figures, strategies, alarms, second-damper, reconstruction or sections (five to thirty minutes)
+	$(ONE_THREAD) $(BIN)/python -m evidence.$(or $(PAGE_$(NAME)),$(error NAME=figures, strategies, alarms, second-damper, reconstruction or sections))
 
 bench: $(INSTALLED)  ## run every benchmark; writes evidence/benchmarks/out/results.json
 	$(ONE_THREAD) $(BIN)/python -m evidence.benchmarks
@@ -99,21 +107,6 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 	$(PYTHON) -m venv .venv-rival
 	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r evidence/benchmarks/requirements.lock
 	@touch $@
-
-strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.strategies compare
-
-second-damper: $(INSTALLED)  ## look for a damper for the second bending mode; writes docs/second_damper.md (some fifteen minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.second_damper
-
-reconstruction: $(INSTALLED)  ## look for the two blades and damper that show most of what the paper tells; writes docs/reconstruction.md (some thirty minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.reconstruction
-
-alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.strategies alarms
-
-sections: $(DOCS_INSTALLED)  ## two blades with 1 to 15 sections of contact points; writes docs/contact_points_numbers.md and its picture (some ten minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.sections
 
 trust: $(INSTALLED)  ## hold what a response trusts on random machines against a judge of its own (SEED=1 SYSTEMS=60, ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.trust --seed $(or $(SEED),1) --systems $(or $(SYSTEMS),60) --workers $(WORKERS)

@@ -1,4 +1,4 @@
-"""The table that `make figures` writes, on the lumped blades of benchmark B6, where the published rule is known to miss a frequency."""
+"""The table that `make pages NAME=figures` writes, on the lumped blades of benchmark B6, where the published rule is known to miss a frequency."""
 
 import re
 from dataclasses import replace

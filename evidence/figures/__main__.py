@@ -25,7 +25,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m evidence.figures",
         description="Draw the counterparts of the figures of Gastaldi & Berruti (2017) for the two cases of evidence/figures/model.py into docs/images, "
-        "and write docs/seed_figures.md. Takes some minutes; needs matplotlib, which `make figures` installs.",
+        "and write docs/seed_figures.md. Takes some minutes; needs matplotlib, which `make pages NAME=figures` installs.",
     )
     parser.add_argument("--into", type=Path, default=DOCS, help="another folder than docs, for a trial")
     docs: Path = parser.parse_args().into
@@ -36,7 +36,7 @@ def main() -> int:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.split(".")[0] != "matplotlib":
             raise
-        print("The figures need matplotlib: `make figures` (or `make docs`) installs it and runs this.")
+        print("The figures need matplotlib: `make pages NAME=figures` (or `make docs`) installs it and runs this.")
         return 1
     say("meshing and reducing both models")
     evidence = gather(model(FIRST), model(SECOND), FIRST_PLAN, SECOND_PLAN, say)

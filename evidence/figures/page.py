@@ -10,13 +10,13 @@ from evidence.figures.timing import LEAST
 
 HEAD = """# The figures of Gastaldi and Berruti
 
-This page is for readers of the paper: does what it says hold for an open case? Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make figures` draws the counterparts of their figures for this
+This page is for readers of the paper: does what it says hold for an open case? Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make pages NAME=figures` draws the counterparts of their figures for this
 package's own two blades. It judges every statement of the paper about its figures on the case that tests it, and writes numbers, verdicts and reasons.
 
 - **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz): {first}.
 - **Figures 9 to 11** ({mode}, {second_hertz[0]:g} to {second_hertz[1]:g} Hz): {second}.
 
-Both are on the meshes of these studies. The paper leaves dimensions, masses and damping open. A search chose both cases so that they show part of its findings (`make reconstruction`, {{doc}}`second_damper`). A row that was a goal of this search shows that such a case exists; it is no test of the paper. The alert is the
+Both are on the meshes of these studies. The paper leaves dimensions, masses and damping open. A search chose both cases so that they show part of its findings (`make pages NAME=reconstruction`, {{doc}}`second_damper`). A row that was a goal of this search shows that such a case exists; it is no test of the paper. The alert is the
 published rule (`jacobian_alert`, threshold 5 %), not this package's default, and the harmonics of the repeats are the published five. Time integration is shooting with {steps} steps a period, begun at the balance with five
 harmonics, and plain integration where shooting fails. The paper compares with it at {paper:g}; here it is {in_time}. A motion is given up after {patience} periods there.
 

@@ -56,7 +56,7 @@ def _head(number: int, full: int) -> list[str]:
     lines = " or ".join(f"{1e3 * a:g} and {1e3 * b:g}" for a, b in FLAT)
     return [
         "# A closer reconstruction of the paper's case\n",
-        "*Written by `make reconstruction`; do not edit.*\n",
+        "*Written by `make pages NAME=reconstruction`; do not edit.*\n",
         (
             "Gastaldi & Berruti {cite}`gastaldi2017` give stiffnesses, friction, pull, angles of 45° and their findings, but not their blades and damper. The open quantities decide more than "
             f"physics. This page shows which choices agree best with the paper, and why `examples/two_blades` is one of them. `evidence/reconstruction` varies the open quantities and asks of each choice which of the paper's statements it *tests* and shows. It tries damping ratios of {damping} %, places of the force "

@@ -82,7 +82,7 @@ def page(
     lines = [
         "# A damper for the second bending mode",
         "",
-        "*Written by `make second-damper`; do not edit.*",
+        "*Written by `make pages NAME=second-damper`; do not edit.*",
         "",
         f"The second damper of {{cite:t}}`gastaldi2017` (sections 5.4 and 7, figures 9 to 11) works at the second bending mode of the same blades. This page describes the search for a damper that behaves like it; `examples/second_bending` is the result. The paper gives the behaviour of the damper, but not its angles and lines. `evidence/second_damper` varies these on the blades of `examples/two_blades` with elements {COARSER:g} times as large, with their damping ({damping:g} %) and the place of their force. The damper is a full prism of steel, {1e3 * LENGTH:g} mm long, with the section that follows from its lines and angles. R stands where the pull without friction would press L1 and L2 equally. *Seated* dampers begin from a static state that was found with {100 * (SHARES[1] or 0):g} % of the friction (`static_friction_share`), as if vibration had let them slide into place. The others begin from unstretched springs, as in the paper.",
         "",

@@ -18,7 +18,7 @@ def main() -> None:
     argparse.ArgumentParser(
         prog="python -m evidence.sections",
         description="Convergence of the two blades with contact points and sections (Gastaldi & Berruti 2017, section 5.1): writes "
-        "docs/contact_points_numbers.md and its picture. Takes some ten minutes; needs matplotlib, which `make sections` installs.",
+        "docs/contact_points_numbers.md and its picture. Takes some ten minutes; needs matplotlib, which `make pages NAME=sections` installs.",
     ).parse_args()
     try:
         from evidence.sections import (
@@ -27,7 +27,7 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.split(".")[0] != "matplotlib":
             raise
-        sys.exit("The picture needs matplotlib: `make sections` installs it and runs this.")
+        sys.exit("The picture needs matplotlib: `make pages NAME=sections` installs it and runs this.")
     found = solve(say)
     page.write(found)
     figure.draw(found)

@@ -14,7 +14,7 @@ HEIGHT, PLACE = (0.01, 0.001)  # of amplitude and of frequency, from which on a 
 
 def write(found: Found, path: Path = NUMBERS) -> None:
     """Write what the page takes in."""
-    made = "<!-- made by `make sections`; the text stands in evidence/sections/page.py -->"
+    made = "<!-- made by `make pages NAME=sections`; the text stands in evidence/sections/page.py -->"
     parts = [made, _setting(), _table(found), *_said(found), _of_lines(found), _of_sharing(found)]
     path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 

@@ -23,7 +23,7 @@ def main() -> None:
     commands.add_parser(
         "compare",
         help="cost and error of all strategies on four cases; writes docs/strategies.md, which takes in the alarms, "
-        "and its figure (some ten minutes; needs matplotlib, which `make strategies` installs)",
+        "and its figure (some ten minutes; needs matplotlib, which `make pages NAME=strategies` installs)",
     )
     given = parser.parse_args()
     if given.command == "alarms":
@@ -36,7 +36,7 @@ def main() -> None:
         except ModuleNotFoundError as error:
             if error.name is None or error.name.split(".")[0] != "matplotlib":
                 raise
-            sys.exit("The comparison needs matplotlib: `make strategies` installs it and runs this.")
+            sys.exit("The comparison needs matplotlib: `make pages NAME=strategies` installs it and runs this.")
         found = compare.run()
         page.write(found)
         figure.draw(found)

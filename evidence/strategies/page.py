@@ -14,7 +14,7 @@ SMALLEST = 1e-5  # error below which digits are those of the solver
 
 BEFORE = """# All strategies on the same cases
 
-This page compares all ways of choosing harmonics on the same four cases. Read it to choose `selection`. It is made by `make strategies`, in one process. Every strategy goes through the same equally spaced frequencies, with harmonics 0 and 1 at the least and 0 to 5 at the most, and with its default parameters:
+This page compares all ways of choosing harmonics on the same four cases. Read it to choose `selection`. It is made by `make pages NAME=strategies`, in one process. Every strategy goes through the same equally spaced frequencies, with harmonics 0 and 1 at the least and 0 to 5 at the most, and with its default parameters:
 
 * `jacobian_alert` is the rule as published, in both passages ({doc}`theory/selection`).
 * `guarded_alert` ({doc}`theory/guarded_alert`) and `goal_oriented` ({doc}`theory/goal_oriented`) verify as it does.
@@ -81,7 +81,7 @@ def heading(comparison: Comparison) -> list[str]:
 def page(found: Sequence[Comparison], after: str) -> str:
     """Return the page: frame, figure, a table for each case, what it says, and the alarms where they were counted."""
     lines = [
-        "<!-- made by `make strategies`; the text stands in evidence/strategies/page.py and evidence/strategies/findings.md -->",
+        "<!-- made by `make pages NAME=strategies`; the text stands in evidence/strategies/page.py and evidence/strategies/findings.md -->",
         BEFORE,
         "![error at resonance against harmonic-unknowns and CPU time](images/strategies.png)",
         "",
