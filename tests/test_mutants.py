@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from evidence.mutants.__main__ import key, told
+from evidence.mutants.__main__ import judged, key, told
 from evidence.mutants.judge import Copy
 from evidence.mutants.points import Mutant, drawn, is_another, mutants_of
 from evidence.mutants.reach import Reach, names_of, record
@@ -34,7 +34,10 @@ def clipped(values, sign=-1):
 
 def twice(x):
     """Return a number twice."""
-    return _step(x)
+    return _step(x) + 0 * len(FIRST)
+
+
+FIRST = ("a", "b", "c")[7 % 3]
 '''
 TESTS = """from stickslip.small import clipped, twice
 
@@ -136,6 +139,11 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
             assert ("SURVIVED" in text) == (not by)
             assert by or (f"+        {after}" in text.replace("return ", "") or key(mutant) in text)
         assert copy.passes(one, 1.0)
+        monkeypatch.undo()
+        assert copy.collected() == {one, other}
+        # a mutant with which the module cannot be imported is noticed, though no test of it has failed
+        broken = judged(copy, reach, mutant_of(source, "7 % 3", "((7) * (3))"), 10.0)
+        assert broken.by.startswith("pytest cannot begin")
     finally:
         copy.close()
     # a test file that has changed is not known, and is taken whole where it imports the module

@@ -68,13 +68,14 @@ class Copy:
         self.known: dict[str, bool] = {}
         self.package = folder / "src" / "stickslip"
         paths = os.pathsep.join([str(folder / "src"), str(folder)])
+        self.environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
         self.server = subprocess.Popen(
             [sys.executable, str(Path(__file__).with_name("server.py")), *loaded],
             cwd=folder,
             text=True,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"},
+            env=self.environment,
         )
         self.compiled = {file: (file.read_bytes(), file.stat()) for file in self.package.rglob("*.nb[ic]")}
 
@@ -124,6 +125,12 @@ class Copy:
         answer = json.loads(self.server.stdout.readline())
         text = said.read_text(encoding="utf-8", errors="replace")
         return _what_failed(answer["code"], answer["failed"], text)
+
+    def collected(self) -> set[str]:
+        """Return the tests that pytest finds without a mutant."""
+        asked = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "-p", "no:cov"]
+        done = subprocess.run(asked, cwd=self.root, env=self.environment, capture_output=True, text=True, check=True)
+        return {line for line in done.stdout.splitlines() if line.startswith("tests/") and "::" in line}
 
     def passes(self, test: str, cpu_s: float) -> bool:
         """Return whether a test passes here without a mutant; asked once of each."""
