@@ -65,7 +65,13 @@ def test_between_the_rows_of_the_table_and_outside_of_it():
     assert "nearest" in told.value.remedy
     held = replace(own, beyond="nearest")
     np.testing.assert_array_equal(held.at(150.0), held.at(130.0))
-    assert not held.slope(150.0).any()
+    # what holds beyond the table or at any frequency does not change, in each coefficient
+    constant = InfluenceCoefficients(own.distances, own.values[:, :1])
+    for flat in (held, constant):
+        assert flat.slope(150.0).shape == flat.at(150.0).shape
+        assert flat.slope_of_wave(0.7, 150.0).shape == flat.of_wave(0.7, 150.0).shape
+        assert not flat.slope(150.0).any()
+        assert not flat.slope_of_wave(0.7, 150.0).any()
     speeds = InfluenceCoefficients([0], np.array([1.0, 3.0 - 2j]).reshape(2, 1, 1, 1, 1), speeds=np.array([1.0, 2.0]))
     assert speeds.at_speed(1.25).at(7.0).item() == pytest.approx(1.5 - 0.5j)
     with pytest.raises(ss.InputError, match="turns at"):

@@ -202,6 +202,18 @@ def test_badly_scaled(name):
     assert np.allclose(solution.x, [1.098159e-5, 9.106146], rtol=1e-6)
 
 
+@pytest.mark.parametrize("name", CORRECTORS)
+@pytest.mark.parametrize("seed", range(3))
+def test_of_a_linear_problem_no_step_is_refused(name, seed):
+    # a step reduces a linear residual exactly as much as it promises, however long it is
+    rng = np.random.default_rng(seed)
+    matrix, right = np.asfortranarray(np.eye(6) + 0.3 * rng.standard_normal((6, 6))), rng.standard_normal(6)
+    options = Newton(globalisation=name, max_iterations=60, tolerance=1e-8)
+    solution = newton(lambda x: At(matrix @ x - right, matrix.copy(order="F")), np.zeros(6), options)
+    assert solution.status is Status.CONVERGED
+    assert solution.rung is Rung.FULL_STEPS
+
+
 # ---- smooth problems with singular Jacobians ----------------------------------------------------------------------------
 
 
