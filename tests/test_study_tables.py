@@ -143,7 +143,17 @@ def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "most"), [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80), ("root_joint", 60)]
+    ("name", "most"),
+    [
+        ("two_blades", 80),
+        ("four_masses", 24),
+        ("shrouded_sector", 80),
+        ("root_joint", 60),
+        ("backbone", 40),
+        ("load_levels", 25),
+        ("kept_forces", 35),
+        ("third_frequency", 25),
+    ],
 )
 def test_the_examples_are_short_and_good(name, most):
     path = EXAMPLES / name / "study.toml"
