@@ -64,6 +64,17 @@ class Side:
     def multipliers(self):
         return np.zeros(0, dtype=np.int64)
 
+    @property
+    def reduced(self):
+        return True
+
+    @property
+    def harmonics(self):
+        return None
+
+    def at_frequency(self, omega):
+        return self
+
     def of_harmonic(self, harmonic):
         return self.structures[harmonic]
 

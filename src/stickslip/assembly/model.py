@@ -26,7 +26,7 @@ from stickslip.assembly.statics import StaticState, static_state
 from stickslip.assembly.surface_checks import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.ties import Ties, tie_joins
 from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import held_stiffness
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
@@ -296,18 +296,12 @@ class Model:
             tie = way if tie is None else tie @ way
         holds = np.full(len(self.pairs.names), contacts == "stuck") if isinstance(contacts, str) else contacts
         largest = float(np.abs(structure.stiffness.diagonal()).max())
-        stiffness = np.where(np.repeat(holds, 3), self._springs(holds, STIFF * largest), 0.0)
+        stiffness = np.where(np.repeat(holds, 3), held_stiffness(self.pairs.laws, holds, STIFF * largest), 0.0)
         if holds.any():
             structure = with_springs(structure, operators[0] + phase * operators[1], stiffness)
         structure = structure if tie is None else replace(structure, basis=tie)
         loose = self._loose(holds)
         return without_bodies(structure, {self.places.dofs.part[dof] for dof in loose})
-
-    def _springs(self, holds: BoolArray, stiff: float) -> FloatArray:
-        """Return the (3 p,) stiffnesses t, w, n of contacts that hold; `stiff` of rigid ones."""
-        laws = [law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in self.pairs.laws]
-        rows = [law.stuck_stiffness() if hold else np.zeros(3) for law, hold in zip(laws, holds, strict=True)]
-        return np.array(rows, dtype=float).reshape(-1)
 
     def _loose(self, holds: BoolArray) -> IntArray:
         """Return the dofs of rigid bodies that no contact or join holds."""

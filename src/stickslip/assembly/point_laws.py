@@ -7,9 +7,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
-from stickslip.contact.law import ContactLaw, scaled
+from stickslip.contact.law import ContactLaw, Rigid, scaled
 from stickslip.contact.laws import LAWS, law_name
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError, input_error
 
@@ -19,10 +18,14 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
     law: Any = contact.law
     if contact.preload == 0.0 and contact.gap == 0.0:
         return contact.law
-    if isinstance(law, RigidCoulomb):
-        if contact.preload > 0.0:
-            return replace(law, preload=contact.preload)
-        return replace(law, initial_gap=law.initial_gap + contact.gap)
+    if isinstance(contact.law, Rigid):
+        pressed = contact.preload > 0.0
+        changed: ContactLaw = (
+            replace(law, preload=contact.preload)
+            if pressed
+            else replace(law, initial_gap=law.initial_gap + contact.gap)
+        )
+        return changed
     own = {entry.name for entry in fields(law)} if is_dataclass(law) else set()
     missing = [n for n in ("preload", "k_n") if n not in own or getattr(law, n) is None]
     if missing:
@@ -74,7 +77,7 @@ def _at_rest_alike(
 def shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tuple[ContactLaw, ...]:
     """Return the law of each point."""
     p, known = len(area), bool(np.all(np.isfinite(area)))
-    alike = isinstance(law, RigidCoulomb) and law.preload is None  # nothing of it is shared
+    alike = isinstance(law, Rigid) and law.preload is None  # nothing of it is shared
     if contact.share == "point" or alike:
         return (law,) * p
     if contact.share == "interface":

@@ -8,8 +8,8 @@ import scipy
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.assembly.model import Model
 from stickslip.assembly.pairs import Pairs
+from stickslip.contact.law import Rigid
 from stickslip.contact.laws import law_name
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, input_error
 from stickslip.model.structure import Structure
 from stickslip.reduction.relative import in_relative_coordinates
@@ -107,14 +107,14 @@ def held_gaps(model: Model, gaps: Matrix) -> int:
 
 
 def _rigid(pairs: Pairs) -> BoolArray:
-    return np.array([isinstance(law, RigidCoulomb) for law in pairs.laws], dtype=bool)
+    return np.array([isinstance(law, Rigid) for law in pairs.laws], dtype=bool)
 
 
 def refuse_rigid(model: Model) -> None:
     """Refuse rigid contacts that cannot be solved: of free rigid bodies, and single dofs that nothing presses."""
     pairs, laws = model.pairs, dict(zip(model.pairs.groups, model.pairs.laws, strict=True))
     for name, law in laws.items():
-        if not isinstance(law, RigidCoulomb):
+        if not isinstance(law, Rigid):
             continue
         rows = np.repeat([group == name for group in pairs.groups], 3)
         used = np.unique(np.concatenate([m[rows].nonzero()[1] for m in (pairs.own, pairs.following)]))

@@ -8,8 +8,7 @@ import scipy
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.assembly.unconstrained_bodies import free_motions
-from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import ContactLaw, softened
 from stickslip.errors import input_error
 from stickslip.response.static_contact_state import opening
 
@@ -38,7 +37,7 @@ def refuse_pulled(model: Model, static: Mapping[str, FloatArray]) -> None:
     loaded = {key: force for key, force in static.items() if np.any(force)}
     if not loaded:
         return
-    laws = [law.softened(1.0) if isinstance(law, RigidCoulomb) else law for law in model.pairs.laws]
+    laws = softened(model.pairs.laws, 1.0)
     can = opening(laws)
     moves = free_motions(model, ~can)
     work = np.array([force @ moves for force in loaded.values()])

@@ -11,8 +11,7 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.clamped_rim import clamped_rim
 from stickslip.assembly.contact import NEXT, Contact, Join
 from stickslip.assembly.locations import Places, Spot
-from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import ContactLaw, Rigid
 from stickslip.contact.pairing import Pairing
 from stickslip.contact.projection import facet_balls
 from stickslip.contact.surface import Surface
@@ -163,7 +162,7 @@ def refuse_held(key: str, operator: Matrix) -> None:
 
 def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]:
     """Warn of a contact with normal stiffness of which no point can move along its normal."""
-    rigid = isinstance(law, RigidCoulomb)
+    rigid = isinstance(law, Rigid)
     if abs(operator[2::3]).max() > FLAT or not (rigid or law.stuck_stiffness()[2] > 0):
         return ()
     text = (

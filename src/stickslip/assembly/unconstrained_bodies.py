@@ -7,9 +7,8 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.locations import picked
 from stickslip.assembly.model import Model
-from stickslip.contact.law import holding_directions
+from stickslip.contact.law import Rigid, holding_directions
 from stickslip.contact.laws import law_name
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
 from stickslip.model.rigid.motion import in_words, loose_motions
@@ -177,7 +176,7 @@ def _inside(vector: FloatArray, motions: FloatArray) -> bool:
 def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
     """Return rows on the dofs of all parts that vanish where nothing is strained."""
     pairs, ties = model.pairs, model.ties
-    stiff = [np.ones(3, dtype=bool) if isinstance(law, RigidCoulomb) else holding_directions(law) for law in pairs.laws]
+    stiff = [np.ones(3, dtype=bool) if isinstance(law, Rigid) else holding_directions(law) for law in pairs.laws]
     rows = np.flatnonzero(np.repeat(holds, 3) & np.array(stiff, dtype=bool).reshape(-1))
     n = model.places.n
     found = [

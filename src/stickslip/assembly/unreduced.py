@@ -7,8 +7,8 @@ from stickslip.arrays import Matrix
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.locations import stacked
 from stickslip.assembly.model import Model
+from stickslip.contact.law import Rigid
 from stickslip.contact.laws import law_name
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import LARGEST_INTERIOR
 from stickslip.harmonic.linear import LinearSide
@@ -55,8 +55,8 @@ def refuse_rigid(model: Model, side: LinearSide) -> None:
     InputError
         That names the contact.
     """
-    rigid = [n for n, one in model.contacts.items() if isinstance(one.law, RigidCoulomb)]
-    if rigid and isinstance(side, Unreduced):
+    rigid = [n for n, one in model.contacts.items() if isinstance(one.law, Rigid)]
+    if rigid and not side.reduced:
         raise input_error(
             f"contact.{rigid[0]}.law",
             f"is {law_name(model.contacts[rigid[0]].law)}, which needs a reduced model: {KEPT}",
@@ -84,7 +84,7 @@ def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
 
 def unreduced_line(model: Assembled) -> tuple[str, ...]:
     """Return how a model is solved of which nothing is condensed; nothing of others."""
-    if not isinstance(model.system.structure, Unreduced):
+    if model.system.structure.reduced:
         return ()
     text = (
         f"nothing is condensed: {KEPT}, all {model.system.structure.n} dofs are unknown in each harmonic. Their matrices stay sparse, Newton "

@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.build import holding_points
 from stickslip.assembly.forces import output_labels
 from stickslip.assembly.mistuned import AllSectors, all_sectors, pairs_of_all
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.reduced import Store, in_memory
 from stickslip.assembly.response_request import Asked
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import held_stiffness
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
@@ -90,18 +90,12 @@ def _bound(model: Model, contacts: ContactsAs, store: Store) -> tuple[AllSectors
     none = Asked(None, {}, {}, labels, (), NO_PLACES)
     wheel = all_sectors(model, none, store)
     structure = wheel.side.of_harmonic(0)
-    stiffness = _springs(model, structure, np.tile(holding_points(model, contacts), model.sectors))
+    rigid = STIFF * float(np.abs(structure.stiffness.diagonal()).max())
+    holds = np.tile(holding_points(model, contacts), model.sectors)
+    stiffness = held_stiffness(pairs_of_all(model).laws, holds, rigid)
     if stiffness.any():
         structure = with_springs(structure, wheel.gaps, stiffness)
     return wheel, structure
-
-
-def _springs(model: Model, structure: Structure, holds: BoolArray) -> FloatArray:
-    """Return the (3 p n_s,) stiffnesses of contacts that hold, each sector's own."""
-    stiff = STIFF * float(np.abs(structure.stiffness.diagonal()).max())
-    laws = [law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in pairs_of_all(model).laws]
-    rows = [law.stuck_stiffness() if hold else np.zeros(3) for law, hold in zip(laws, holds, strict=True)]
-    return np.array(rows, dtype=float).reshape(-1)
 
 
 def _shares(model: Model, wheel: AllSectors, hertz: FloatArray, shapes: FloatArray) -> WheelModes:

@@ -10,8 +10,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.cache import njit
 from stickslip.contact.compiled import CompiledContacts, checked_weights, compile_contacts
 from stickslip.contact.evaluators import Evaluator
-from stickslip.contact.law import PAIRS, ContactLaw
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import PAIRS, ContactLaw, Rigid, softened
 from stickslip.errors import input_error
 
 _PAIRS = np.array(PAIRS)
@@ -96,12 +95,11 @@ class Interface:
     @property
     def rigid(self) -> bool:
         """Whether a contact is rigid, so that its force is no function of its gap."""
-        return any(isinstance(law, RigidCoulomb) for law in self.laws)
+        return any(isinstance(law, Rigid) for law in self.laws)
 
     def sprung(self, stiffness: float) -> "Interface":
         """Return the interface with springs of a stiffness (N/m) in place of rigid contacts."""
-        laws = (law.softened(stiffness) if isinstance(law, RigidCoulomb) else law for law in self.laws)
-        return replace(self, laws=tuple(laws))
+        return replace(self, laws=softened(self.laws, stiffness))
 
     def coordinates(self) -> IntArray:
         """Return the structure's dofs that take part in a gap."""

@@ -5,7 +5,7 @@ owns nothing, so that the same law serves harmonic balance and the static preloa
 signature, and takes the step as a first-class function; a law of a user's script costs its own compilation and nothing else.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
 from functools import cached_property
 from importlib import import_module
@@ -104,6 +104,46 @@ def holding_directions(law: ContactLaw) -> BoolArray:
     """Return the (3,) directions t, w, n along which a contact that sticks and is closed holds what it touches."""
     holds = law.stuck_stiffness() > 0.0
     return holds | law.restores() if isinstance(law, Restoring) else holds
+
+
+@runtime_checkable
+class Rigid(Protocol):
+    """A law whose force is no function of its gap: while it sticks nothing moves; solvers find its force as a reaction.
+
+    Attributes
+    ----------
+    mu
+        Friction coefficient.
+    preload
+        Constant normal load, N; None: the normal force is a reaction, too.
+    initial_gap
+        Normal gap at zero displacement, m.
+    """
+
+    @property
+    def mu(self) -> float: ...  # noqa: D102
+
+    @property
+    def preload(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def initial_gap(self) -> float: ...  # noqa: D102
+
+    def softened(self, stiffness: float) -> ContactLaw:
+        """Return the law with springs (N/m) that tends to this one as they stiffen."""
+        ...
+
+
+def softened(laws: Iterable[ContactLaw], stiffness: float) -> tuple[ContactLaw, ...]:
+    """Return laws with springs of a stiffness (N/m) in place of rigid ones."""
+    return tuple(law.softened(stiffness) if isinstance(law, Rigid) else law for law in laws)
+
+
+def held_stiffness(laws: Iterable[ContactLaw], holds: BoolArray, rigid: float) -> FloatArray:
+    """Return the (3 p,) stiffnesses t, w, n in N/m of p contacts: zero where a contact does not hold (p,), `rigid` of rigid laws."""
+    own = zip(softened(laws, rigid), holds, strict=True)
+    rows = [law.stuck_stiffness() if held else np.zeros(3) for law, held in own]
+    return np.array(rows, dtype=float).reshape(-1)
 
 
 @runtime_checkable

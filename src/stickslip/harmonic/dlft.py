@@ -16,9 +16,8 @@ from stickslip.contact.compiled import CompiledContacts, compile_contacts
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.contact.intervals import prefix_sums
-from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS
+from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS, Rigid
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.rigid import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
@@ -307,7 +306,7 @@ def dynamic_lagrangian(
     InputError
         If no contact is rigid, or a gap of one is no coordinate, or there are fewer samples than coefficients.
     """
-    rigid = np.array([i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)], dtype=np.int64)
+    rigid = np.array([i for i, law in enumerate(interface.laws) if isinstance(law, Rigid)], dtype=np.int64)
     if not rigid.size:
         raise input_error("dynamic_lagrangian", "no contact is rigid", "Use harmonic_balance.")
     if penalty is not None and not (np.isfinite(penalty) and penalty > 0.0):

@@ -38,6 +38,20 @@ class LinearSide(Protocol):
         """Coordinates that are never condensed: forces of constraints, or all where nothing is reduced."""
         ...
 
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates away from the contacts are condensed."""
+        ...
+
+    @property
+    def harmonics(self) -> int | None:
+        """Highest temporal harmonic for which there are matrices; None: any."""
+        ...
+
+    def at_frequency(self, omega: float) -> "LinearSide":
+        """Return what vibrates at a frequency in rad/s; another one only where the speed follows the frequency."""
+        ...
+
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
         ...

@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.interface import Interface
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import Rigid
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 
@@ -66,7 +66,7 @@ def rigid_contacts(interface: Interface, rigid: IntArray, balance: HarmonicBalan
         twice = column[np.argmax(np.bincount(column)[column] > 1)]
         names = [interface.names[rigid[c]] for c in contact[column == twice]]
         raise _no_coordinate(" and ".join(names), "share one coordinate")
-    laws = [law for law in interface.laws if isinstance(law, RigidCoulomb)]
+    laws = [law for law in interface.laws if isinstance(law, Rigid)]
     gaps = np.array([law.initial_gap for law in laws]) / length
     constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
     return RigidContacts(
@@ -88,13 +88,13 @@ def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int,
     for d in range(3):
         row = interface.gap_operator[[3 * contact + d]]
         columns = row.indices
-        constant = isinstance(law, RigidCoulomb) and law.preload is not None
+        constant = isinstance(law, Rigid) and law.preload is not None
         if columns.size == 0 or (d == NORMAL and constant):
             continue
         if columns.size > 1:
             raise _no_coordinate(name, "has a gap between several coordinates")
         found.append((d, int(columns[0]), float(row.data[0])))
-    if isinstance(law, RigidCoulomb) and law.preload is None and NORMAL not in [d for d, _, _ in found]:
+    if isinstance(law, Rigid) and law.preload is None and NORMAL not in [d for d, _, _ in found]:
         raise input_error(
             f"contact {name}",
             "is unilateral and has no normal gap",

@@ -52,6 +52,19 @@ class Unreduced:
         """Dofs that are never condensed: all of them."""
         return np.arange(self.n)
 
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates are condensed: none are (see `LinearSide`)."""
+        return False
+
+    @property
+    def harmonics(self) -> None:
+        """There are matrices for any harmonic (see `LinearSide`)."""
+
+    def at_frequency(self, omega: float) -> "Unreduced":
+        """Return itself at every frequency (see `LinearSide`)."""
+        return self
+
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure: it vibrates as itself in every harmonic."""
         return self.structure.of_harmonic(harmonic)

@@ -87,6 +87,19 @@ class Structure:
         """No coordinate is the force of a constraint (see `LinearSide`)."""
         return np.zeros(0, dtype=np.int64)
 
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        return True
+
+    @property
+    def harmonics(self) -> None:
+        """There are matrices for any harmonic (see `LinearSide`)."""
+
+    def at_frequency(self, omega: float) -> "Structure":
+        """Return itself at every frequency (see `LinearSide`)."""
+        return self
+
     def of_harmonic(self, harmonic: int) -> "Structure":
         """Return the structure: it vibrates as itself in every harmonic (see `LinearSide`)."""
         return self

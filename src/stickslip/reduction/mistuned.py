@@ -63,6 +63,19 @@ class MistunedWheel:
         """No coordinate is the force of a constraint."""
         return self.structure.multipliers
 
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        return True
+
+    @property
+    def harmonics(self) -> None:
+        """There are matrices for any harmonic (see `LinearSide`)."""
+
+    def at_frequency(self, omega: float) -> "MistunedWheel":
+        """Return itself at every frequency (see `LinearSide`)."""
+        return self
+
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the wheel: it vibrates as itself in every harmonic."""
         return self.structure

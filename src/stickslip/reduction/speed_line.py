@@ -105,7 +105,16 @@ class SpeedLine:
     @property
     def harmonics(self) -> int | None:
         """Highest harmonic for which there are matrices; None: any."""
-        return self.top.harmonics if isinstance(self.top, TunedWheel) else None
+        return self.top.harmonics
+
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        return True
+
+    def at_frequency(self, omega: float) -> AtRest:
+        """Return what vibrates at a frequency in rad/s, at the speed of this frequency."""
+        return self.at(self.speed(omega))
 
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure of a harmonic at the highest speed."""

@@ -72,6 +72,15 @@ class TunedWheel:
             f"waves {waves}; {self.n} coordinates>"
         )
 
+    @property
+    def reduced(self) -> bool:
+        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        return True
+
+    def at_frequency(self, omega: float) -> "TunedWheel":
+        """Return itself at every frequency (see `LinearSide`)."""
+        return self
+
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as.
 

@@ -18,7 +18,6 @@ from stickslip.harmonic.travelling import condense_side
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 
 NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -57,7 +56,7 @@ class System:
                 f"the gap operator has {self.interface.gap_operator.shape[1]} columns for {self.structure.n} dofs",
                 "Build the interface on the joined structure.",
             )
-        if isinstance(self.structure, Unreduced) and self.interface.rigid:
+        if not self.structure.reduced and self.interface.rigid:
             raise input_error(
                 "System",
                 "has a rigid contact on an unreduced structure",
@@ -93,14 +92,13 @@ class System:
 
     def at(self, omega: float) -> "System":
         """Return the system as it is at a frequency in rad/s; another one only along an engine-order line, at the speed of the frequency."""
-        side = self.structure
-        return replace(self, structure=side.at(side.speed(omega))) if isinstance(side, SpeedLine) else self
+        side = self.structure.at_frequency(omega)
+        return self if side is self.structure else replace(self, structure=side)
 
     def condensed(self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS) -> DynamicStiffness:
         """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`; of a wheel that has them for all waves towards which these are judged."""
         side, retained = self.structure, np.union1d(self.retained, more)
-        made = side.harmonics if isinstance(side, TunedWheel | SpeedLine) else None
-        order = max(order, min(REACH * order, made or 0))
+        order = max(order, min(REACH * order, side.harmonics or 0))
         if isinstance(side, SpeedLine):
             return condense_line(side, retained, load, order)
         return condense_side(side, retained, load, order)

@@ -10,7 +10,6 @@ from stickslip.errors import StickslipError
 from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
@@ -72,7 +71,7 @@ def other_motions(
     output
         Position of the output whose amplitude counts.
     """
-    if problem.system.interface.rigid or isinstance(problem.system.structure, Unreduced):
+    if problem.system.interface.rigid or not problem.system.structure.reduced:
         return
     allowed = _allowed(problem, solved_points)
     options = replace(problem.sweep.newton, max_iterations=NEWTON_STEPS)

@@ -16,8 +16,6 @@ from stickslip.harmonic.harmonic_set import ByDof, Harmonics, is_full, kept_by_d
 from stickslip.harmonic.harmonics_per_dof import AnyBalance, LocalBalance
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import Judged, following_vibration
 from stickslip.response.forced.amplitude import amplitudes, error_measure
 from stickslip.response.forced.choices import Stage
@@ -292,7 +290,7 @@ class ForcedProblem:
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
     refuse_ill_posed(system)
-    if sweep.auto and isinstance(system.structure, TunedWheel | SpeedLine) and system.structure.harmonics:
+    if sweep.auto and system.structure.harmonics:
         sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
     first, reference = sweep.first_harmonics, sweep.high_harmonics
     for h, force in load.harmonics.items():

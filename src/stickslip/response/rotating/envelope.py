@@ -20,7 +20,6 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.structured import real_matrix
-from stickslip.reduction.speed_line import SpeedLine
 from stickslip.response.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
@@ -207,8 +206,7 @@ class _Flow:
 
     def _condensed(self, omega: float, now: float, known: ComplexArray) -> "_Condensed":
         """Return the equations of a step on the retained coordinates; the derivative of amplitudes is ``now q + known``."""
-        side = self.system.structure
-        side = side.at(side.speed(omega)) if isinstance(side, SpeedLine) else side
+        side = self.system.structure.at_frequency(omega)
         force = self.balance.linear.load_at(omega).coefficients(self.balance.order)
         rate, parts = self.sweep.signed_rate, []
         for h in range(self.balance.order + 1):

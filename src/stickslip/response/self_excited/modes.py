@@ -7,7 +7,6 @@ import scipy.sparse
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.harmonic.linear import one_structure
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
@@ -97,7 +96,7 @@ def sprung_modes(
     whole
         Coordinates up to which eigenvalues are those of all motions.
     """
-    if isinstance(system.structure, Unreduced):
+    if not system.structure.reduced:
         one_structure(system.structure, "stuck_modes")
     own = system.structure.of_harmonic(harmonic)
     bound = with_springs(own, system.interface.gap_operator, springs)

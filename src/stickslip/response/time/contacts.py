@@ -8,8 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.addresses import law_address
 from stickslip.contact.compiled import checked_weights
-from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.law import ContactLaw, Rigid
 from stickslip.errors import input_error
 from stickslip.response.time.contact_step import JAC, STATES, ContactTable
 
@@ -70,7 +69,7 @@ def time_contacts(laws: Sequence[ContactLaw], weights: FloatArray | None, caller
     InputError
         If a contact is rigid, or a weight is not positive.
     """
-    if any(isinstance(law, RigidCoulomb) for law in laws):
+    if any(isinstance(law, Rigid) for law in laws):
         raise input_error(
             f"{caller}: laws",
             "got RigidCoulomb, which has no stiffness: its force is no function of the gap",

@@ -1,7 +1,6 @@
 """What an examination of the stability costs, and whether it is begun: all sectors of a wheel count, each of which may do something else."""
 
 from stickslip.assembly.unreduced import KEPT
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.contact_states import is_located
 from stickslip.response.stability.hill import MAX_HILL_HARMONICS, MAX_ROWS
@@ -44,7 +43,7 @@ def too_long(system: System, *, forced: bool) -> str:
     forced
         Whether a load drives it.
     """
-    if isinstance(system.structure, Unreduced):
+    if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"
     side, work = system.structure, examination_work(system)
     wheel = isinstance(side, TunedWheel)
@@ -77,7 +76,7 @@ def by_hill(system: System) -> bool:
     interface, side = system.interface, system.structure
     large = isinstance(side, TunedWheel) and bool(too_long(system, forced=True))
     return (
-        not isinstance(side, Unreduced)
+        side.reduced
         and (large or side.of_harmonic(1).loss is not None)
         and not interface.rigid
         and all(is_located(law) for law in interface.laws)

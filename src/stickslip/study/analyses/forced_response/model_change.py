@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.response.forced.resonance import peak_from
 from stickslip.response.forced.response import (
     ForcedPoint,
@@ -89,8 +88,7 @@ def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
 def _coarser(question: Question) -> tuple[System, int] | None:
     """Return the model with half the points of meshed contacts, and how many are left out."""
     model, table = question.model, question.model.contacts
-    whole = isinstance(model.system.structure, Unreduced)
-    if model.blades is not None or whole or model.system.interface.rigid:
+    if model.blades is not None or not model.system.structure.reduced or model.system.interface.rigid:
         return None
     return halved(model.system, table.groups, table.position, table.area)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.response.physics.damper import DampedMode, damped_modes
 from stickslip.response.physics.friction import Friction, friction_of
 from stickslip.response.physics.modes import UNDAMPED_RATIO, Range, RangeMode, range_modes, springs_of
@@ -75,7 +74,7 @@ def physics_of(question: Question) -> Physics | None:
     """
     model = question.model if question.model.blades is None else question.model.blades.tuned
     system, load = model.system, model.load
-    if isinstance(system.structure, Unreduced) or not system.interface.n_contacts:
+    if not system.structure.reduced or not system.interface.n_contacts:
         return None
     within = Range(*sorted(question.sweep.omega_range))
     friction = friction_of(system.springs, model.static_gap, model.static_force)

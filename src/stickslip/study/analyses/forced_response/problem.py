@@ -20,7 +20,6 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
-from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
@@ -143,7 +142,7 @@ class Question:
 def too_large(question: Question) -> str:
     """Return how many coordinates are too many to be integrated in time; empty where they are not."""
     system = question.model.system
-    if isinstance(system.structure, Unreduced):
+    if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"
     sectors = sectors_in_time(system)
     size, kept = sectors * system.structure.n, sectors * len(system.retained_labels)
