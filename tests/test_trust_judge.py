@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evidence.trust.ask import model_of
+from evidence.trust.ask import asked, model_of
 from evidence.trust.draw import Contact, Machine, draw
 from evidence.trust.march import Judge
 
@@ -175,6 +175,31 @@ def test_the_package_tells_the_multiplier_of_a_pad_that_lifts() -> None:
     error = float(data.stability_multiplier_error[own]) + 3 * found.multiplier_error
     assert error < 0.03  # a landing that does not move in time takes 0.036 off
     assert abs(float(data.stability_multiplier[own]) - found.multiplier) <= error
+
+
+@pytest.mark.parametrize(("number", "hz"), [(7, 385.9525), (18, 73.3909)])
+def test_a_stable_point_beside_a_fold_is_the_motion_that_is_stable(number: int, hz: float) -> None:
+    """Seed 115006: few harmonics lay nearer to the unstable motion (multipliers 1.010 and 1.292), and more led to the stable one."""
+    machine = draw(115006, number)
+    told = asked(machine)
+    at = int(np.argmin(np.abs(told.hz - hz)))
+    assert told.hz[at] == pytest.approx(hz, rel=1e-6)
+    assert told.stability[at] == "stable"
+    found = Judge(machine, 2 * np.pi * told.hz[at]).orbit(told.motion[at])
+    assert found is not None
+    assert found.multiplier < 1.0 - 3 * found.multiplier_error
+    np.testing.assert_allclose(found.motion[1], told.motion[at][1], atol=0.01 * np.abs(found.motion[1]).max())
+
+
+def test_an_unstable_stretch_between_stable_points_with_too_few_harmonics_is_found() -> None:
+    """Seed 117001, machine 11: both ends needed more harmonics, and between them the multiplier is 1.042; nothing is carried from such ends."""
+    machine = draw(117001, 11)
+    told = asked(machine)
+    at = int(np.argmin(np.abs(told.hz - 85.2808)))
+    found = Judge(machine, 2 * np.pi * told.hz[at]).orbit(told.motion[at])
+    assert found is not None
+    assert found.multiplier > 1.0 + 3 * found.multiplier_error
+    assert told.stability[at] == "unstable"
 
 
 def test_machines_are_the_same_whenever_they_are_drawn() -> None:

@@ -15,6 +15,7 @@ from stickslip.response.time.sectors import all_in_time
 
 ROUGHLY = 3.0  # times the change by one Newton step that a multiplier may be off
 FIRST = 2.0  # times the change from the motion as it was solved
+SAME_MOTION = 0.1  # of the threshold: a motion with more harmonics that is nearer is the point itself
 OTHER = 2.0  # times more for either where the numbers of transitions differ
 
 
@@ -36,8 +37,8 @@ class Settled:
     stability
         Of the motion with more harmonics.
     motion
-        That motion, where the point as it was solved lies on the other side of the unit circle; its predicted error is its change from
-        fewer harmonics. None where both lie on the same side.
+        That motion, where the point as it was solved lies on the other side of the unit circle, or is not the same motion; its predicted
+        error is its change from fewer harmonics. None else.
     """
 
     stability: Stability
@@ -102,11 +103,19 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
 
 
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
-    """Return a verdict with its motion, where the point as it was solved has another; that nothing is known where that motion is no neighbour."""
-    grows = first.stability.grows
-    if last is first or found.verdict not in ("stable", "unstable") or grows == (found.verdict == "unstable"):
+    """Return a verdict with its motion, where the point as it was solved has another or lies away; that nothing is known where that motion is no neighbour.
+
+    Beside a fold a stable and an unstable motion lie within a percent of each other. A point with few harmonics may be nearer to the one, and
+    the motion with more harmonics be the other: the verdict then goes with its own motion.
+    """
+    if last is first or found.verdict not in ("stable", "unstable"):
         return Settled(found)
-    if problem.real_error(first.point, last.point) > problem.strategy.threshold:
+    threshold, away = problem.strategy.threshold, problem.real_error(first.point, last.point)
+    same_side = first.stability.grows == (found.verdict == "unstable")
+    raises = problem.sweep.auto and problem.strategy.verifies
+    if same_side and not (raises and away > SAME_MOTION * threshold):
+        return Settled(found)
+    if away > threshold:
         return Settled(replace(_unsure(first), work=found.work))
     bound = SAFETY[1] * last.change
     own = last.point

@@ -158,7 +158,9 @@ class _Search:
             return False
         ends = (self.found[a], self.found[b])
         far = all(e.verdict == "stable" and e.multiplier + e.error < CARRIED for e in ends)
-        return far and self.course.like(a, b) and _inside_between(*ends)
+        # where more harmonics lead to another motion, its transitions are not those of the points between as they were solved
+        as_solved = all(e.raised is None for e in ends)
+        return far and as_solved and self.course.like(a, b) and _inside_between(*ends)
 
     def _carried(self, place: int, a: int, b: int) -> Examined:
         ends = (self.found[a], self.found[b])
