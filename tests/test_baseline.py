@@ -68,20 +68,26 @@ def fake_tree(
     [
         ({}, []),
         ({"seconds": 31.0}, []),
-        ({"second": 2.0000000000000004}, ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"]),
+        (
+            {"second": 2.0000000000000004},
+            ["/forced_response/amplitude: 1 of 2 values differ, first [1]: 2.0, now 2.0000000000000004"],
+        ),
         ({"phase": False}, ["/forced_response/phase: no such variable any more"]),
         (
             {"sentence": "an unstable peak"},
             [
-                "-a stable peak", "+an unstable peak",
+                "-a stable peak",
+                "+an unstable peak",
                 "/forced_response@verdict: 1 of 1 values differ, first []: 'a stable peak', now 'an unstable peak'",
-                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
-                "-<time> a stable peak (<time>)", "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)",
+                "+<time> an unstable peak (<time>)",
+                "-<time> a stable peak (<time>)",
+                "+<time> an unstable peak (<time>)",
             ],
         ),
     ],
     ids=["the same", "a time", "a bit", "a variable", "a sentence"],
-)  # fmt: skip
+)
 def test_two_trees_are_told_apart_by_all_but_times(tmp_path, changes, found):
     trees = (fake_tree(tmp_path), fake_tree(tmp_path, **changes))
     comparison = compared(Example("four_masses"), trees, tmp_path)
@@ -133,8 +139,9 @@ def test_a_table_of_the_terminal_is_the_same_whatever_its_time_makes_of_its_widt
     )
     assert differing_lines("t", one, slow) == []
     assert [line for line in differing_lines("t", one, other)[2:] if line[0] in "+-"] == [
-        "-load = 300 | 1.25 | <time>", "+load = 300 | 1.26 | <time>"
-    ]  # fmt: skip
+        "-load = 300 | 1.25 | <time>",
+        "+load = 300 | 1.26 | <time>",
+    ]
 
 
 def test_data_of_figures_and_columns_beside_a_time_count():

@@ -121,6 +121,9 @@ class Kept(dict):
     def put(self, name, values):
         self[name] = dict(values)
 
+    def forget(self, name):
+        self.pop(name, None)
+
 
 def test_an_interrupted_search_asks_for_no_multipliers_again(monkeypatch):
     asked, response = asked_of(EXAMPLE)

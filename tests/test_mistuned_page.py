@@ -92,10 +92,10 @@ def test_the_wheel_with_all_sectors_alike_is_drawn_at_the_speeds_of_its_frequenc
     hertz = [150.0, 160.0, 155.0]
     data["speed_rpm"], data["whitehead"] = ("point", rpm), ("case", [1.3, 1.3])
     data["tuned_case"] = "tuned", [0, 0, 1]
-    data["tuned_frequency_hz"], data["tuned_amplitude"] = ("tuned", hertz), ("tuned", [1e-6, 2e-6, 3e-6])  # fmt: skip
+    data["tuned_frequency_hz"], data["tuned_amplitude"] = ("tuned", hertz), ("tuned", [1e-6, 2e-6, 3e-6])
     plot = blades(Response(data))
     assert plot is not None
     alike = [t for t in plot.figure.data if t.name == "all sectors alike"]
-    assert [t.x.tolist() for t in alike] == [pytest.approx([3000.0, 3200.0]), pytest.approx([3100.0])]  # fmt: skip
+    assert [t.x.tolist() for t in alike] == [pytest.approx([3000.0, 3200.0]), pytest.approx([3100.0])]
     size = np.concatenate([t.y for t in alike])
     assert size / size[0] == pytest.approx([1.0, 2.0, 3.0])

@@ -134,6 +134,9 @@ class Kept(dict[str, Any]):
     def put(self, name: str, values: Mapping[str, Any]) -> None:
         self[name] = dict(values)
 
+    def forget(self, name):
+        self.pop(name, None)
+
 
 def test_a_curve_by_arc_length_goes_round_its_fold(tmp_path: Path) -> None:
     # softening: in quadrature, with one harmonic, force = 2 ζ a √(1 - ¾ c a²), largest at a² = 2/(3 c)

@@ -199,6 +199,9 @@ class Kept(dict):
     def put(self, name, values):
         self[name] = values
 
+    def forget(self, name):
+        self.pop(name, None)
+
 
 def case_of(path):
     (tables,) = read_file(path).cases

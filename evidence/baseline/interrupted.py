@@ -65,9 +65,14 @@ def _written(folder: Path) -> int:
 def _killed(tree: Tree, folder: Path, enough: float) -> bool:
     """Begin a run and kill it once its journals hold `enough` bytes while a job is at work; return whether that was so."""
     process = subprocess.Popen(
-        tree.command(RUN), cwd=folder, env=tree.environment(), stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        tree.command(RUN),
+        cwd=folder,
+        env=tree.environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     end = time.monotonic() + MAX_TIME
     while process.poll() is None and time.monotonic() < end:
         sizes = {path: _size(path) for path in (folder / JOBS).glob("*") if path.suffix in (AT_WORK, SEALED)}

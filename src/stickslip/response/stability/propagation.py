@@ -15,9 +15,21 @@ ACCURACY = 1e-14  # of the last term of the series, relative to the result
 TOO_FAST = "the linear motion between contacts' changes is too fast for a number"
 RATIONAL = 5.37  # |A| times the length up to which the rational function is exact to rounding
 NUMERATOR = (
-    64764752532480000.0, 32382376266240000.0, 7771770303897600.0, 1187353796428800.0, 129060195264000.0, 10559470521600.0,
-    670442572800.0, 33522128640.0, 1323241920.0, 40840800.0, 960960.0, 16380.0, 182.0, 1.0,
-)  # fmt: skip  # of the diagonal Padé approximant of order 13, by the power of its argument
+    64764752532480000.0,
+    32382376266240000.0,
+    7771770303897600.0,
+    1187353796428800.0,
+    129060195264000.0,
+    10559470521600.0,
+    670442572800.0,
+    33522128640.0,
+    1323241920.0,
+    40840800.0,
+    960960.0,
+    16380.0,
+    182.0,
+    1.0,
+)  # of the diagonal Padé approximant of order 13, by the power of its argument
 
 
 def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: FloatArray, length: float) -> FloatArray:
