@@ -69,7 +69,8 @@ def _of_blades(case: str) -> list[Record]:
     ratio = found / real
     far = np.mean((ratio[near] < 0.5) | (ratio[near] > 2.0))
     under = np.max((real / found)[real > 0.01])
-    missed = np.count_nonzero((real > LIMIT) & (found < BELIEVED * LIMIT))
+    missed, believed = (np.count_nonzero((real > LIMIT) & (found < below)) for below in (LIMIT, BELIEVED * LIMIT))
+    false = np.mean((both[:, 1] < LIMIT) & (both[:, 0] > LIMIT))
     stuck = predicted_and_real(CASES["two_blades_stuck"]())
     return [
         record(
@@ -80,11 +81,18 @@ def _of_blades(case: str) -> list[Record]:
             0.01,
             SOURCE,
         ),
+        record(case, f"median of predicted over real, {name}", np.median(ratio), 1.0, 0.01, SOURCE),
         bound(
             case, f"share off by more than a factor of two, predicted below {2 * LIMIT:.0%}, {name}", far, 0.1, SOURCE
         ),
         bound(case, f"real over predicted at most, errors above 1 %, {name}", under, 2.0, SOURCE),
-        bound(case, f"points whose error exceeds {LIMIT:.0%} and is believed to be small, {name}", missed, 0.0, SOURCE),
+        bound(case, f"points whose error exceeds {LIMIT:.0%} and is predicted below, {name}", missed, 0.0, SOURCE),
+        bound(
+            case, f"points whose error exceeds {LIMIT:.0%} and is believed to be small, {name}", believed, 0.0, SOURCE
+        ),
+        bound(
+            case, f"share of points whose error is below {LIMIT:.0%} and predicted above, {name}", false, 0.1, SOURCE
+        ),
         bound(case, "predicted error, two_blades_stuck", stuck[:, 0].max(), 1e-12, SOURCE),
         bound(case, "real error, two_blades_stuck", stuck[:, 1].max(), 1e-9, SOURCE),
     ]
