@@ -249,6 +249,20 @@ def test_the_peak_is_the_largest_motion_that_is_not_unstable() -> None:
     assert with_stable_peak(response, [replace(grown, verdict="undecided")]) is response
 
 
+def test_a_motion_that_has_become_the_largest_is_examined() -> None:
+    """Motions with more harmonics may take the place of the peak, and another point is then the largest."""
+    asked = rubbed()
+    response = response_of(asked)
+    found = [
+        replace(e, verdict="not examined", basis="not examined") if e.position == response.peak else e
+        for e in looked_at(asked, response).values()
+    ]
+    told = with_stability._with_peak(response, found, lambda accepted: examine(asked, accepted))
+    assert [e.position for e in told] == sorted(e.position for e in found)
+    peak = next(e for e in told if e.position == response.peak)
+    assert (peak.verdict, peak.basis) == ("stable", "examined")
+
+
 def test_a_neighbour_of_what_time_attained_is_not_doubted() -> None:
     asked = lifted(low=7, high=7)
     response = response_of(asked)

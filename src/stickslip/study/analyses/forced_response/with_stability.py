@@ -1,7 +1,7 @@
 """The response of a case with what is known of its stability: each point examined once, an undecided peak integrated in time, points told by motions whose stability is known."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.study.analyses.analysis import Notes
@@ -25,21 +25,35 @@ def with_stability(
     notes.put("finished", ended)
     solved, raised = list(points[: ended["points"]]), list(points[ended["points"] :])
     response = collect(question.problem, solved, question.model.peak_output)
-    examined = _examined(question, response, notes)
+    look = Looked(question, notes)
+    examined = _examined(question, response, notes, look)
     for point in with_raised([a.point for a in response.accepted], examined)[len(raised) :]:
         raised.append(point)
         yield point
     if raised:
         response = collect(question.problem, [*solved, *raised], question.model.peak_output)
+        examined = _with_peak(response, examined, look)
     return with_stable_peak(response, examined), examined
 
 
-def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:
+def _with_peak(response: Response, examined: list[Examined], look: Looked) -> list[Examined]:
+    """Examine the largest motion, too, where another one has become it since motions took the places of points."""
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, examined)
+        known = {e.position for e in examined if e.basis != "not examined"}
+        if peak.top is None or peak.peak in known:
+            break
+        found = replace(look(peak.top), position=peak.peak, raised=None)
+        others = [e for e in examined if e.position != peak.peak]
+        examined = sorted([*others, found], key=lambda e: e.position)
+    return examined
+
+
+def _examined(question: Question, response: Response, notes: Notes, look: Looked) -> list[Examined]:
     """Examine the stability; what an interrupted run has examined is not done again.
 
     Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
     """
-    look = Looked(question, notes)
     found = examined_points(question, response, look)
     look.tell()
     for _ in range(MOST_PEAKS):
