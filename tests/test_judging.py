@@ -10,6 +10,7 @@ import stickslip as ss
 from evidence.models.lumped import chain_stiffness, jenkins, lumped, system
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set
+from stickslip.harmonic.ringing import loudest, ringing
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
@@ -254,3 +255,33 @@ def test_bounds_over_residual_tractions_hear_the_third_harmonic():
     assert abs(few.most.amplitude / many.most.amplitude - 1.0) > 0.1
     assert min(few.most.error, few.reference.error) > 0.05
     assert max(many.most.error, many.reference.error) < 0.02
+
+
+def test_a_harmonic_beyond_the_set_that_meets_a_mode_is_judged() -> None:
+    """A stop's harmonics fall with their order, but the 16th meets the second mode, of ratio 0.001."""
+    stiff = np.diag([1.0, 256.0])
+    made = system(
+        lumped(np.eye(2), np.diag([0.1, 0.032]), stiff),
+        [ss.UnilateralSpring(k_n=20.0, initial_gap=0.5)],
+        np.array([[0.0, 0.0], [0.0, 0.0], [-1.0, -1.0]]),
+    )
+    load = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.1 + 0j, 0.0])})
+    sweep = ss.Sweep(omega_range=(0.99, 1.01), low=5, high=5, at=(1.0,), peak_points=0)
+    problem = ss.response.forced_problem(made, load, sweep)
+    (point,) = ss.response.accepted_points(list(ss.forced_response(made, load, sweep)))
+    low = problem.balance(harmonics_of(5))
+    assert 16 in ringing(low, low.unknowns(point.coefficients), point.omega)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "found"),
+    [
+        ([1.0, 0.5, 0.3, 0.2, 0.1], ()),
+        ([1.0, 0.5, 0.7, 0.2, 0.3], (17, 19)),
+        ([1.0, 0.5e-4, 0.9e-4, 0.2e-4, 0.1e-4], ()),
+        ([0.0, *(float(k % 2) * k for k in range(1, 12))], (20, 22, 24, 26)),
+    ],
+)
+def test_harmonics_that_stand_out_are_few(sizes: list[float], found: tuple[int, ...]) -> None:
+    """Maxima alone, not the fall with the order, nor what is too small, and the four largest."""
+    assert loudest(tuple(range(15, 15 + len(sizes))), np.array(sizes)) == found

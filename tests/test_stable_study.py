@@ -145,9 +145,9 @@ def test_a_peak_under_friction_is_stable_and_attained() -> None:
 def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     data = dataset(solved(undecided(monkeypatch)))
     peak = at_peak(data)
+    # the peak is integrated, and others; neighbours on the branch with the same transitions follow from them
+    assert set(data.stability_verdict.values.tolist()) <= {"stable", "undecided"}
     assert data.stability_verdict.values[peak] == "stable"
-    # only the peak is integrated; its neighbours on the branch with the same transitions are not doubted for it
-    assert set(np.delete(data.stability_verdict.values, peak)) <= {"undecided"}
     basis = data.motion_stability_basis.values
     assert np.any(basis == 2)
     assert set(data.motion_stability.values[basis == 2].tolist()) == {0}
@@ -156,10 +156,12 @@ def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(monkeyp
     # few harmonics: the multiplier and its error stay what they are
     size, error = (float(data[f"stability_multiplier{s}"][peak]) for s in ("", "_error"))
     assert size < 1.0 < size + error
-    assert data.verify_motion.values.tolist() == ["attained"]
+    integrated = data.verify_frequency_hz.values.tolist()
+    assert set(data.verify_motion.values.tolist()) == {"attained"}
     # followed for as long as a disturbance needs to decay a thousandfold
-    assert int(data.verify_periods[0]) >= shows_after(size)
-    assert data.verify_frequency_hz.values.tolist() == data.peak_frequency_hz.values.tolist()
+    assert int(data.verify_periods[integrated.index(float(data.peak_frequency_hz[0]))]) >= shows_after(size)
+    assert 1 < len(integrated) <= 1 + with_stability.MOST_DOUBTS
+    assert not np.any(data.motion_stability.values == 2)  # undecided
 
 
 def test_a_large_model_stays_undecided_and_names_the_check(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -212,3 +212,14 @@ def test_machines_are_the_same_whenever_they_are_drawn() -> None:
         assert np.linalg.eigvalsh(one.stiffness)[0] > 0
         families.add(one.family)
     assert families == {"chain", "stop", "pad", "cubic"}
+
+
+def test_a_harmonic_that_meets_a_mode_beyond_the_judged_ones_is_kept() -> None:
+    """Seed 118002, machine 15: five harmonics were kept, all up to the 15th judged, and the 16th takes 8.3 % off the first."""
+    machine = draw(118002, 15)
+    told = asked(machine)
+    at = int(np.argmin(np.abs(told.hz - 44.894)))
+    assert told.level[at] == 0  # trusted
+    found = Judge(machine, 2 * np.pi * told.hz[at]).orbit(told.motion[at])
+    assert found is not None
+    np.testing.assert_allclose(told.motion[at][1], found.motion[1], atol=0.01 * np.abs(found.motion[1]).max())

@@ -18,6 +18,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import Harmonics
 
 REACH = 3  # highest harmonic of a judging set over the highest that is kept or driven
+HIGHEST = 63  # harmonic, in multiples of the common divisor, beyond which nothing is looked for: there a motion in time costs less
 SAMPLES_A_HARMONIC = 8  # of the contact forces at least: with fewer, aliasing may hide what acts
 # error of a solution that is not known to be exact, and that a prediction leaves as it is: `exact` is 0, and nothing else is
 UNSEEN = float(np.finfo(float).tiny)

@@ -10,7 +10,8 @@ A branch is followed by arc length, or from one listed value of the parameter to
   goes on from there with more harmonics.
 - After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the wait for the next one.
 
-A branch that cannot be followed, or that gains no parameter for long, is taken up a little further on. Values that were not found are looked
+A branch that cannot be followed, or that gains no parameter for long, is taken up a little further on; so is one that runs back beside itself
+and tells nothing new, which is forgotten. Values that were not found are looked
 for once more, when their neighbours are known.
 """
 
@@ -31,6 +32,7 @@ from stickslip.response.continuation_steps import (
     onward,
     passed_maximum,
     retraced,
+    turned_for_nothing,
     without_more,
 )
 from stickslip.solve.fallbacks import steps_at_most
@@ -96,6 +98,7 @@ class _Walk:
     taken: int = 0
     tried: dict[tuple[float, int], float] = field(default_factory=dict)  # effort at a value, level
     spent: float = 0.0  # work, in the unit of `Curve.cost`
+    forgotten: int = 0  # points that told nothing new, whose work is in that
 
     def run(self) -> Iterator[Followed]:
         """Go from the first value to the last."""
@@ -167,7 +170,7 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        return levels_left(self.curve, self.route, len(self.branch) + 1, self.spent)
+        return levels_left(self.curve, self.route, len(self.branch) + self.forgotten + 1, self.spent)
 
     def _spent_up(self) -> bool:
         return self._levels() <= MIN_LEVELS < self.curve.levels
@@ -311,7 +314,14 @@ class _Walk:
         return reached or self.taken > MAX_BRANCH_LENGTH * self.route.points
 
     def _idle(self) -> bool:
-        return not self.route.listed and self.route.idle([s.point.p for s in self.branch])
+        """Whether the branch is left; what ran back beside it is forgotten."""
+        if self.route.listed or not self.route.leaves:
+            return False
+        begin = self._beginning(len(self.branch) - 1)
+        back = turned_for_nothing(self.curve, self.route, [s.point for s in self.branch[begin:]])
+        del self.branch[len(self.branch) - back :]
+        self.forgotten += back
+        return back > 0 or self.route.idle([s.point.p for s in self.branch])
 
     def _begun(self, p: float) -> Iterator[Followed]:
         """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""

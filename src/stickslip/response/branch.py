@@ -130,6 +130,10 @@ class Curve(Protocol):
         """Whether two levels tell the same motion."""
         return True
 
+    def alike(self, one: Followed, other: Followed) -> bool:
+        """Whether two motions at one value of the parameter differ by no more than the error that is allowed."""
+        return False
+
     def near(self, fewer: Followed, more: Followed) -> bool:
         """Whether they differ by so little that they cannot stand on different sheets."""
         return True

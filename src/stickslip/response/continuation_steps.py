@@ -17,6 +17,7 @@ from stickslip.solve.status import Status
 
 PATIENT = 16  # iterations from a solution with other harmonics
 RECENT = 12  # points behind the last one that a step may go back along
+RUN_BACK = 8  # points that a branch runs back beside itself before it is left
 BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
 
 # work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed;
@@ -131,6 +132,38 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
             share = (made.p - a.p) / (b.p - a.p)
             there = a.point.x + share * (b.point.x - a.point.x)
             if _length(weights, made.point.x - there) < BACK * step:
+                return True
+    return False
+
+
+def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -> int:
+    """Return how many points at the end of a branch run back beside it over the length of a step and tell nothing new: all since it turned, or none.
+
+    Contacts that lift off many times in a period may turn a branch that has the most harmonics of all; with still more there would be no fold.
+    """
+    count = 0
+    for before, after in pairwise(reversed(branch)):  # the last point first
+        if not route.before(before.p, after.p):
+            break
+        count += 1
+    turn = len(branch) - count
+    most = curve.levels - 1 > 0 and all(f.level == curve.levels - 1 for f in branch[turn:])
+    if count < RUN_BACK or not most or not all(f.converged for f in branch):
+        return 0
+    far = abs(branch[-1].p - branch[turn - 1].p) >= abs(route.gap)
+    return count if far and all(_beside(curve, branch[:turn], one) for one in branch[-RUN_BACK:]) else 0
+
+
+def _beside(curve: Curve, before: Sequence[Followed], one: Followed) -> bool:
+    """Whether a point tells what an earlier part of the branch tells at its value of the parameter."""
+    for a, b in pairwise(before):
+        if a.p != b.p and (one.p - a.p) * (one.p - b.p) <= 0.0:
+            level = max(a.level, b.level, one.level)
+            share = (one.p - a.p) / (b.p - a.p)
+            ends = [curve.lifted(f.point.x, f.level, level) for f in (a, b)]
+            x = ends[0] + share * (ends[1] - ends[0])
+            there = replace(one, level=level, point=replace(one.point, x=x))
+            if curve.alike(there, one):
                 return True
     return False
 

@@ -10,6 +10,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.judging import SAMPLES_A_HARMONIC, UNSEEN, covers, judging_balance, judging_set, judging_set_of
+from stickslip.harmonic.ringing import ringing
 from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
@@ -108,10 +109,11 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     if problem.system.interface.rigid:
         return float("nan")
     own = with_stiffness(problem.balance(point.support))
-    more = judging_balance(with_waves(problem, own, judging_set_of(own)[-1]))
+    x = own.unknowns(point.coefficients)
+    wide = with_waves(problem, own, judging_set_of(own)[-1])
+    more = judging_balance(wide, ringing(wide, x, point.omega))
     if more.harmonics == own.harmonics:
         return float("nan")  # the wheel has no more waves
-    x = own.unknowns(point.coefficients)
     found = _twice(problem, own, more, x, point.omega)
     known = covers(own, more) and point.by_dof is None
     return found.error if known else max(found.error, UNSEEN)

@@ -10,6 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set_of
+from stickslip.harmonic.ringing import ringing
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.operators import Jacobian
@@ -55,7 +56,7 @@ class ForcedCurve:
     forced: ForcedProblem
     supports: tuple[Harmonics, ...]
     raises: bool = True
-    references: dict[int, HarmonicBalance] = field(default_factory=dict, repr=False)  # made when first needed
+    references: dict[Harmonics, HarmonicBalance] = field(default_factory=dict, repr=False)  # made when first needed
 
     @property
     def levels(self) -> int:
@@ -111,18 +112,18 @@ class ForcedCurve:
         if self.raises and level + 1 == self.levels > 1:
             return self.at_the_cap(level, point)
         if self.raises and level > 0:
-            return self._predicted(level, step)
+            return self._predicted(level, step, point)
         if level + 1 < self.levels:
-            step = replace(step, reference=self._reference(level))
+            step = replace(step, reference=self._reference(level, point))
         verdict = judged(strategy, step)
         bound = (SAFETY[0] if self.raises else 1.0) * verdict.indicator
         if verdict.again is None:
             return Judged(bound)
         return Judged(bound, verdict.again, verdict.start)
 
-    def _predicted(self, level: int, step: Step) -> Judged:
+    def _predicted(self, level: int, step: Step, point: Point) -> Judged:
         """Predict the error by a Newton step with the harmonics of the next level, and doubt it by what the step after it would change."""
-        more, following = self._reference(level), self.supports[level + 1]
+        more, following = self._reference(level, point), self.supports[level + 1]
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
         kept: list[tuple[_Inverse | None, float]] = []
 
@@ -142,14 +143,16 @@ class ForcedCurve:
         start = more.coefficients(alert.start)[: following[-1] + 1] if far else None
         return Judged(bound, (), start)
 
-    def _reference(self, level: int) -> HarmonicBalance:
-        """Return the problem towards which solutions of a level are judged: with the harmonics of the next one, and with the judging set."""
-        if level not in self.references:
-            own = with_stiffness(self.problem(level))
-            wide = set(self.supports[level + 1]) >= set(judging_set_of(own))
-            more = with_stiffness(self.problem(level + 1)) if wide else judging_balance(own, self.supports[level + 1])
-            self.references[level] = more
-        return self.references[level]
+    def _reference(self, level: int, point: Point) -> HarmonicBalance:
+        """Return the problem towards which a solution of a level is judged: with the harmonics of the next one, the judging set, and those at which it rings."""
+        own, following = with_stiffness(self.problem(level)), self.supports[level + 1]
+        wanted = {*following, *judging_set_of(own), *ringing(own, point.x, point.p)}
+        if wanted <= set(following):
+            return with_stiffness(self.problem(level + 1))
+        harmonics = tuple(sorted(wanted))
+        if harmonics not in self.references:
+            self.references[harmonics] = judging_balance(own, harmonics)
+        return self.references[harmonics]
 
     def _doubt(
         self, step: Step, more: HarmonicBalance, x: FloatArray, inverse: _Inverse | None, residual: float
@@ -185,6 +188,10 @@ class ForcedCurve:
     def agree(self, fewer: Followed, more: Followed) -> bool:
         """Whether the motions differ by clearly less than the threshold."""
         return self.change(fewer, more) <= AGREE * self.forced.strategy.threshold
+
+    def alike(self, one: Followed, other: Followed) -> bool:
+        """Whether two motions differ by no more than the threshold."""
+        return self.change(one, other) <= self.forced.strategy.threshold
 
     def near(self, fewer: Followed, more: Followed) -> bool:
         """Whether the motions differ by so little that they cannot stand on different sheets."""

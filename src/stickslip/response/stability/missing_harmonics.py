@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
-from stickslip.harmonic.judging import judging_set_of
+from stickslip.harmonic.judging import HIGHEST, judging_set_of
 from stickslip.harmonic.selection.alert import silent
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.solve.newton_method import newton
@@ -17,9 +17,9 @@ HARMONICS_FACTOR, HARMONICS_MORE = 2, 3  # the step has FACTOR times the harmoni
 MAX_SOLVED_HARMONICS = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
 FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harmonics beyond it change as much again
 STEP_WORK = 1e6  # floating point operations of a Newton step for each of its unknowns
-MOST_HARMONICS = 63  # of a motion that is solved for its multipliers,
-MOST_ROWS = 4500  # and of its unknowns
+MOST_ROWS = 4500  # of a motion that is solved for its multipliers
 SOLUTIONS = 10  # of a point, at most
+FAILED = 3  # of them one after the other, after which the motion in time costs less
 MIN_HARMONICS = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
@@ -81,14 +81,19 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
 def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
     """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
     reached, order = point, max(HARMONICS_FACTOR * point.order + HARMONICS_MORE, MIN_HARMONICS)
+    failed = 0
     for _ in range(SOLUTIONS):
-        order = min(order, MOST_HARMONICS)
+        order = min(order, HIGHEST)
         if order <= reached.order or problem.system.retained.size * (2 * order + 1) > MOST_ROWS:
             return
         more = solved_with(problem, reached, order)
         if more is None:
+            failed += 1
+            if failed == FAILED:
+                return
             order = (reached.order + order) // 2
             continue
+        failed = 0
         if more.point.order <= reached.order:
             return  # a wheel has no more waves
         yield more

@@ -234,10 +234,10 @@ def _judge(question: Question, response: Response, examined: list[Examined], not
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
     checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
-    for one in told:
-        known = notes.get(f"{IN_TIME}.{one.omega!r}")
-        if known and one.motion:
-            checks.setdefault(one.omega, Check(**known))
+    for accepted in response.accepted:
+        known = notes.get(f"{IN_TIME}.{accepted.point.omega!r}")
+        if known:
+            checks.setdefault(accepted.point.omega, Check(**known))
     if checks:
         notes.put(IN_TIME, of_checks([checks[omega] for omega in sorted(checks)]))
     attained = [omega for omega, check in checks.items() if check.motion == "attained"]

@@ -344,8 +344,12 @@ class Curve:
     @cached_property
     def attained(self) -> BoolArray:
         """(n,) whether a time integration settled to the same amplitude, and to the same outputs within the error that is tolerated."""
-        near = [abs(off) <= ATTAINED for off in self.integrated]
+        near = [abs(off) <= self.allowed_in_time(i) for i, off in enumerate(self.integrated)]
         return np.array(near, dtype=bool) & ~(self.outputs_off > self.limit)
+
+    def allowed_in_time(self, point: int) -> float:
+        """Return the difference from a time integration up to which a point stands, percent: of the peak `ATTAINED`, of others the error that is tolerated."""
+        return ATTAINED if point == self.peak else 100 * self.limit
 
     @cached_property
     def left_out(self) -> tuple[int, float, float] | None:

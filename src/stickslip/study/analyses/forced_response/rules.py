@@ -194,8 +194,8 @@ def in_time(case: Curve) -> Iterator[Finding]:
             why = "a time integration did not settle to a periodic motion"
             remedy = "See the table of checks: it says what drifts or rings on."
             yield Finding("doubtful", why, remedy, (point,))
-        elif not abs(off) <= ATTAINED:
-            why = f"time integration and harmonic balance differ by {_difference_text(off)}, more than {ATTAINED:g} %"
+        elif not abs(off) <= (allowed := case.allowed_in_time(point)):
+            why = f"time integration and harmonic balance differ by {_difference_text(off)}, more than {allowed:g} %"
             remedy = f"{_more(case, point)}; the table of checks says which of the two is wrong."
             yield Finding("doubtful", why, remedy, (point,), abs(off))
         elif case.outputs_off[point] > case.limit:

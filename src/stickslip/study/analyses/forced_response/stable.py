@@ -233,14 +233,18 @@ def with_motion(examined: Examined, check: Check | None) -> Examined:
 
 
 def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
-    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done; not with structural damping."""
-    top = response.top
+    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done."""
     return (
-        top is not None
-        and question.model.system.structure.of_harmonic(1).loss is None
+        response.top is not None
         and any(e.position == response.peak and e.verdict == "undecided" and not e.motion for e in examined)
-        and seconds_in_time(question.model.system) < MOST_IN_TIME
+        and integrable(question)
     )
+
+
+def integrable(question: Question) -> bool:
+    """Whether motions are integrated in time without being asked to: where that is soon done, and nothing has structural damping."""
+    system = question.model.system
+    return system.structure.of_harmonic(1).loss is None and seconds_in_time(system) < MOST_IN_TIME
 
 
 def why_not(question: Question) -> str:

@@ -3,18 +3,22 @@
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, replace
 
+import numpy as np
+
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.forced_response.comparison import Check
-from stickslip.study.analyses.forced_response.examining import examined_points, with_stable_peak
-from stickslip.study.analyses.forced_response.in_time import check_in_time
+from stickslip.study.analyses.forced_response.examining import examined_points, neighbours_of, with_stable_peak
+from stickslip.study.analyses.forced_response.in_time import check_in_time, seconds_in_time
 from stickslip.study.analyses.forced_response.looked import Looked
 from stickslip.study.analyses.forced_response.points import Accepted, Response, collect
 from stickslip.study.analyses.forced_response.problem import IN_TIME, Question
-from stickslip.study.analyses.forced_response.stable import Examined, to_integrate, with_motion, with_raised
+from stickslip.study.analyses.forced_response.stable import Examined, integrable, to_integrate, with_motion, with_raised
 from stickslip.study.store.progress import LOG
 
 MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
+MOST_DOUBTS = 20  # other motions that are integrated in time,
+SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
 
 
 def with_stability(
@@ -52,7 +56,8 @@ def _with_peak(response: Response, examined: list[Examined], look: Looked) -> li
 def _examined(question: Question, response: Response, notes: Notes, look: Looked) -> list[Examined]:
     """Examine the stability; what an interrupted run has examined is not done again.
 
-    Where the peak stays undecided and is soon integrated in time, that decides, and another peak takes its place where the motion leaves it.
+    Where a motion stays undecided and is soon integrated in time, that decides: of the peak, whose place another takes where the motion leaves it, then
+    of others.
     """
     found = examined_points(question, response, look)
     look.tell()
@@ -62,7 +67,39 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
             break
         check = integrated(question, peak, peak.top, found, notes)
         found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
+    if question.examine == "peak" or not integrable(question):
+        return found
+    return _doubts_in_time(question, response, found, notes)
+
+
+def _doubts_in_time(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
+    """Integrate in time the points that multipliers or predictions leave open, the largest first, and carry what a motion attains to its neighbours."""
+    found, tried = examined, set[int]()
+    seconds = seconds_in_time(question.model.system)
+    for _ in range(min(MOST_DOUBTS, int(SECONDS_OF_DOUBTS / seconds))):
+        open_ = _open_places(question, response, found) - tried
+        if not open_:
+            break
+        place = max(open_, key=lambda i: response.amplitude(response.accepted[i]))
+        tried.add(place)
+        own = response.accepted[place]
+        check = integrated(question, response, own, found, notes)
+        found = [with_motion(e, check) if e.position == place else e for e in found]
+        found = neighbours_of(question, response, found, [own.point.omega] * (check.motion == "attained"))
     return found
+
+
+def _open_places(question: Question, response: Response, examined: Sequence[Examined]) -> set[int]:
+    """Return the positions of points whose stability is undecided, and of those whose harmonics a prediction alone doubts; not of unstable ones."""
+    undecided = {e.position for e in examined if e.verdict == "undecided" and not e.motion}
+    unstable = {e.position for e in examined if e.verdict == "unstable"}
+    threshold = question.problem.strategy.threshold
+    predicted = (
+        i
+        for i, a in enumerate(response.accepted)
+        if a.point.converged and np.isnan(a.audit_error) and a.own_error > threshold
+    )
+    return undecided | ({*predicted} - unstable)
 
 
 def integrated(

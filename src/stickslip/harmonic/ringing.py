@@ -1,0 +1,81 @@
+"""Harmonics beyond a judging set at which the structure rings: a mode there may make much of a small force of the contacts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.product import harmonic_means
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.factors import solved, with_contacts
+from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.harmonic.judging import HIGHEST, SAMPLES_A_HARMONIC, judging_set_of
+from stickslip.harmonic.matrix_products import products
+
+MOST_RINGING = 4  # harmonics, those with the largest gaps
+FAINTEST_GAP = 1e-4  # of the vibration of the gaps, below which nothing is made of it
+MOST_ROWS = 400  # of a structure, above which its matrices are not solved with for each harmonic
+
+
+def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
+    """Return the few harmonics beyond the judging set at which the contact forces of a solution meet a mode.
+
+    Each harmonic is solved alone, ``q_h = -(Z_h + Bᵀ K B)⁻¹ Bᵀ λ_h``, with the mean stiffness K of the contacts over the period. Where the gaps are
+    larger than at the harmonics before and after, a mode lies near.
+
+    Parameters
+    ----------
+    low
+        The problem of the solution.
+    x
+        Its scaled unknowns.
+    omega
+        Frequency, rad/s.
+
+    Returns
+    -------
+    tuple of int
+        Empty for a structure of over `MOST_ROWS` retained coordinates.
+    """
+    judged, most = judging_set_of(low), low.linear.most
+    step = judged[1] if len(judged) > 1 else 1
+    top = step * HIGHEST if most is None else min(step * HIGHEST, most)
+    if low.linear.n > MOST_ROWS or top <= judged[-1]:
+        return ()
+    beyond = tuple(range(judged[-1], top + 1, step))
+    enough = replace(low, samples=max(low.samples, SAMPLES_A_HARMONIC * top))
+    period = enough.contacts(x, omega)
+    gaps = np.abs(np.fft.rfft(period.gap, axis=2)[:, :, 1:]).max(initial=0.0)
+    forces = np.fft.rfft(period.force, axis=2)[:, :, list(beyond)]
+    if gaps == 0.0 or not np.any(forces):
+        return ()
+    sizes = _gaps_of_each(low, omega, beyond, harmonic_means(period.blocks)[0], forces)
+    return loudest(beyond, sizes / gaps)
+
+
+def loudest(harmonics: Harmonics, sizes: FloatArray) -> Harmonics:
+    """Return the harmonics at which `sizes` are larger than before and after, at most `MOST_RINGING` of them, growing."""
+    before, after = sizes[:-1], np.append(sizes[2:], 0.0)
+    tops = 1 + np.flatnonzero((sizes[1:] > before) & (sizes[1:] >= after) & (sizes[1:] > FAINTEST_GAP))
+    chosen = tops[np.argsort(-sizes[tops])][:MOST_RINGING]
+    return tuple(sorted(harmonics[i] for i in chosen))
+
+
+def _gaps_of_each(
+    low: HarmonicBalance, omega: float, harmonics: Harmonics, stiffness: ComplexArray, forces: ComplexArray
+) -> FloatArray:
+    """Return the largest gap (k,) of each harmonic, solved alone under contact forces (n_contacts, 3, k) with their mean stiffness (n_contacts, 3, 3)."""
+    side, rows = products(low.linear, (0, *harmonics), omega), low.rows
+    sizes = np.zeros(len(harmonics))
+    for place, h in enumerate(harmonics):
+        own = forces[:, :, place].reshape(-1)
+        pushed = np.zeros((2, low.linear.n))
+        rows.add_forces(np.stack([own.real, own.imag]), pushed)
+        matrix = with_contacts(side.block(h), stiffness, rows)
+        try:
+            moved = solved(matrix, pushed[0] + 1j * pushed[1])
+        except np.linalg.LinAlgError:
+            sizes[place] = np.inf  # a mode without damping
+            continue
+        sizes[place] = np.hypot(*rows.gaps(np.stack([moved.real, moved.imag]))).max(initial=0.0)
+    return sizes
