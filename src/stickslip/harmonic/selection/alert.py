@@ -98,7 +98,7 @@ def jacobian_alert(
     change = (solve or solve_array)(at.jac, right)
     if change is None:
         return Alert(np.inf, 0, 0, padded, seconds)
-    return _led_to(high, q, omega, padded + change, measure, seconds)
+    return led_to(high, q, omega, padded + change, measure, seconds)
 
 
 def asked_again(
@@ -132,13 +132,13 @@ def asked_again(
     change = (solve or solve_array)(at.jac, -at.residual)
     if change is None:
         return replace(first, error=np.inf, seconds_contact=seconds)
-    return _led_to(high, q, omega, first.start + change, measure, seconds)
+    return led_to(high, q, omega, first.start + change, measure, seconds)
 
 
-def _led_to(
+def led_to(
     high: HarmonicBalance, q: ComplexArray, omega: float, start: FloatArray, measure: ErrorMeasure, seconds: float
 ) -> Alert:
-    """Return what steps from the low-order coefficients to the scaled unknowns `start` say."""
+    """Return what the change from the low-order coefficients (H+1, n) to the scaled unknowns `start` says."""
     before = high.linear.recover(omega, q)
     rows = measure.rows(len(q), high.order + 1)
     change = high.coefficients(start - high.unknowns(q))[:rows]
