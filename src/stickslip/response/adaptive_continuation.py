@@ -43,6 +43,7 @@ LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
 LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
 MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
 LATER = 0.2  # share of the effort at a value for when its neighbours are known, and for its motion in time
+STRETCHES = 3.0  # times the work of one stretch of a branch, for all of them
 LONGEST_CALM = 48  # the same after trials that failed
 MAX_BRANCH_LENGTH = 40  # multiples of the smallest number of points at which any branch ends
 
@@ -99,6 +100,8 @@ class _Walk:
     tried: dict[tuple[float, int], float] = field(default_factory=dict)  # effort at a value, level
     spent: float = 0.0  # work, in the unit of `Curve.cost`
     forgotten: int = 0  # points that told nothing new, whose work is in that
+    before: int = 0  # points before the present stretch of the branch,
+    spent_before: float = 0.0  # and their work
 
     def run(self) -> Iterator[Followed]:
         """Go from the first value to the last."""
@@ -170,7 +173,10 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        return levels_left(self.curve, self.route, len(self.branch) + self.forgotten + 1, self.spent)
+        """Return how many levels may be used: a stretch has its own work, so that a hard one leaves enough for what comes after it, and all have `STRETCHES` times as much."""
+        points = len(self.branch) + self.forgotten + 1
+        own = levels_left(self.curve, self.route, max(points - self.before, 1), self.spent - self.spent_before)
+        return min(own, levels_left(self.curve, self.route, points, self.spent / STRETCHES))
 
     def _spent_up(self) -> bool:
         return self._levels() <= MIN_LEVELS < self.curve.levels
@@ -326,6 +332,7 @@ class _Walk:
     def _begun(self, p: float) -> Iterator[Followed]:
         """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
         index, near = len(self.branch), self._last()
+        self.before, self.spent_before = index + self.forgotten, self.spent
         here = near[0].level if near and not self._spent_up() else 0
         made: Followed | None = None
         for share in LEAPS if near and not self.route.listed else ():

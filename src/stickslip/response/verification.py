@@ -17,7 +17,8 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_s
 from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.newton_method import newton
 
-MAX_ITERATIONS = 15  # of Newton's method where two steps say different things
+MAX_ROWS = 2000  # of a system that is solved where two steps say different things,
+MAX_ITERATIONS = 15  # of Newton's method there
 SAME_RTOL = 0.02  # difference of what two steps say, with which they say the same
 
 
@@ -56,7 +57,7 @@ def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor:
     """Predict at every solved point what all harmonics up to a multiple of the reference order, and those of its judging set, would change.
 
     Two Newton steps a point: two contact evaluations and two linear solutions. The first keeps the contact states of the point; the second asks the
-    contacts where the first leads. Where it changes what is predicted by more than a fiftieth, the motion is solved with these harmonics; where that
+    contacts where the first leads. Where it changes what is predicted by more than a fiftieth, the motion is solved with these harmonics (up to `MAX_ROWS`); where that
     fails, the second step is a warning and no bound, as a rule too large. Harmonics that the reference leaves out, such as the even ones, are among those that it is held against.
 
     Parameters
@@ -128,7 +129,7 @@ def _led_on(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance,
     """Return what two Newton steps from a solution towards more harmonics say; where the second says another thing than the first, Newton's method goes on."""
     first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
     second = asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
-    if abs(second.error - first.error) <= SAME_RTOL * second.error:
+    if abs(second.error - first.error) <= SAME_RTOL * second.error or high.size > MAX_ROWS:
         return second
     q, few = low.coefficients(x), replace(problem.sweep.newton, max_iterations=MAX_ITERATIONS)
     found = newton(lambda v: high.linearise(v, omega), high.unknowns(q), few, NaturalLevel())

@@ -68,10 +68,11 @@ def settle(
     if not sweep.auto and of_peak and sweep.peak_points:
         done = yield from settling.settle_highest()
     audits = audits_by_frequency(solved)
-    for place, point in enumerate(accepted):
-        mine = point.converged and (point.stage == "peak") == of_peak and place not in done
-        if mine and _open(problem, point, audits.get(point.omega, [])):
-            yield from settling.settle(place)
+    places = [i for i, p in enumerate(accepted) if p.converged and (p.stage == "peak") == of_peak and i not in done]
+    open_ = (i for i in places if _open(problem, accepted[i], audits.get(accepted[i].omega, [])))
+    # where the work does not suffice for all, it goes to those that need little of it
+    for place in sorted(open_, key=lambda i: accepted[i].harmonics.size):
+        yield from settling.settle(place)
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:

@@ -243,6 +243,14 @@ class Curve:
         return np.flatnonzero(off)
 
     @cached_property
+    def sure(self) -> BoolArray:
+        """(n,) whether a point is known to be stable, and its harmonics to be enough: by an audit, else by prediction, or by a motion in time."""
+        error = np.where(np.isnan(self.audit), self.own_error, self.audit)
+        return np.asarray(
+            (self.floats("motion_stability") == MOTION["stable"]) & (self.attained | (error <= self.limit))
+        )
+
+    @cached_property
     def known(self) -> frozenset[int]:
         """Positions of points whose stability follows from others, whatever their own multipliers leave open."""
         carried = self.floats("motion_stability_basis") == CARRIED

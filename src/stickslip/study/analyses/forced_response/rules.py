@@ -137,20 +137,21 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
 
 
 def on_other_motions(case: Curve) -> Iterator[Finding]:
-    """Doubt neighbours of a branch that stand on different motions."""
+    """Tell of neighbours of a branch that stand on different motions; doubt them at the peak, and where either is not known to be one: stable, its harmonics enough."""
     at = case.branch[case.converged[case.branch]]
     if case.stepped or at.size < 2:  # between given frequencies any growth is possible
         return
     for jump in jumps(case.amplitude[at], case.dissipation[at], case.few[at], case.elastic):
         i, j = int(at[jump.step]), int(at[jump.step + 1])
         kept = case.kept[i], case.kept[j]
-        unlike = "" if kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
+        sure = case.peak not in (i, j) and case.sure[i] and case.sure[j]
+        unlike = "" if sure or kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
         why = (
             f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): more than one periodic motion "
             f"exists near there, and which one a machine takes depends on its history{unlike}"
         )
         remedy = f'Take {case.nearer} there, and sweep both ways (direction = "down").'
-        yield Finding("doubtful", why, remedy, (i, j), jump.size)
+        yield Finding("trusted" if sure else "doubtful", why, remedy, (i, j), jump.size)
 
 
 def folds(case: Curve) -> Iterator[Finding]:
