@@ -1,1 +1,1 @@
-"""What a Python user holds: models, studies and results."""
+"""The Python interface: models, studies and results."""

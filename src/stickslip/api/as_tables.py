@@ -1,4 +1,4 @@
-"""A model of Python as the tables that a study file would have of it, for the summary of inputs on the page."""
+"""A Python model as study tables, for the summary of inputs on the page."""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields

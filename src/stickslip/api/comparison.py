@@ -1,4 +1,4 @@
-"""Comparing designs: results and curves of a measurement side by side."""
+"""Comparison of designs: results and measured curves side by side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

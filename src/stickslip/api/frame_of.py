@@ -1,4 +1,4 @@
-"""A dataset as a table of pandas."""
+"""A dataset as a pandas DataFrame."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""What a notebook shows while something is computed: one output, a line a job, renewed in place."""
+"""Progress in a notebook: one output, one line for each job."""
 
 import logging
 import sys

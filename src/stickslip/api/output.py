@@ -1,4 +1,4 @@
-"""What a command says when its output, its memory or its disk fails it: one line, whatever happens."""
+"""Messages when output, memory or disk fail: one line."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""What commands print: lines and tables, on a terminal or a wide page."""
+"""Lines and tables on the terminal."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""A study file read step by step: what is wrong with it is told before the libraries that compute and draw are loaded."""
+"""Study files read step by step: errors are reported before heavy libraries are imported."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""What a Python user holds of a result: its data, its figures, its peaks, its page."""
+"""A result in Python: data, figures, peaks, page."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What a user sees while something is computed: a bar on a terminal, plain lines elsewhere."""
+"""Progress on the terminal: a bar, or plain lines where there is none."""
 
 import logging
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A study file as a Python user holds it."""
+"""A study file in Python."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor

@@ -1,4 +1,4 @@
-"""Parts, contacts and loads put together: a model, and what it is to a solver."""
+"""Parts, contacts and loads assembled into a model, and the model as solvers see it."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""The aerodynamic force on a model at a speed: patterns of force wave by wave, and what it leaves as it is."""
+"""Aerodynamic forces on a model at a speed, wave by wave."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Aerodynamic coefficients of a model and what they belong to: modes, or points."""
+"""Aerodynamic influence coefficients of a model, and the modes or points that they refer to."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Facets at the rim of a surface that have clamped nodes, which readers take out of its set."""
+"""Facets at the rim of a surface with clamped nodes, which readers remove from its node set."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Motion of contact points in the place of that of the nodes around them: fewer coordinates for contacts to touch."""
+"""Contact points as coordinates in place of the nodes around them: fewer coordinates in contact."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Coordinates of a joined model: which dof of which part each one is, and what follows what."""
+"""Coordinates of a joined model: the part and dof of each, and constraints."""
 
 from dataclasses import dataclass, replace
 

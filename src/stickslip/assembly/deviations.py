@@ -1,4 +1,4 @@
-"""What mistuning adds to the matrices of a wheel: rows by which it sees the sectors, and the change they make."""
+"""Mistuning as changes of the wheel's matrices, of low rank."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

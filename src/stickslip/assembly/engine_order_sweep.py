@@ -1,4 +1,4 @@
-"""A model over a range of speeds: reduced at a few of them, each with its own stiffness and preload, and polynomials between."""
+"""A model over a range of speeds: reduced at a few speeds, with polynomials between."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""How large and how stiff the bodies of a model are: what its motions are held against."""
+"""Size and stiffness of the bodies of a model, the scales of its motions."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Loads of a model as forces on the dofs of all parts, and where motion is reported."""
+"""Loads as forces on the dofs of all parts, and output locations."""
 
 import cmath
 import math

@@ -1,4 +1,4 @@
-"""The motion of every node from what a response solves for: the reductions made again with their way back."""
+"""Recovery of the motion of every node from the reduced coordinates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

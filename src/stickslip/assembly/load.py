@@ -1,4 +1,4 @@
-"""Loads on a model, and where its motion is reported."""
+"""Loads on a model, and its outputs."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What the names of a model mean: surfaces, node sets, nodes, single dofs, as places on the dofs of all parts."""
+"""Names of surfaces, node sets, nodes and dofs, resolved on the dofs of all parts."""
 
 import re
 from collections.abc import Iterable, Mapping

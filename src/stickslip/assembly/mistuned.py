@@ -1,4 +1,4 @@
-"""A mistuned wheel as solvers see it: all its sectors, what they differ by, and every blade's outputs."""
+"""A mistuned wheel as solvers see it: all sectors, their deviations, and the outputs of every blade."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""How the sectors of a wheel differ: frequencies of blades, contacts, and parts of their own."""
+"""Mistuning: frequencies of blades, contacts, and parts that differ from sector to sector."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

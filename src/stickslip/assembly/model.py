@@ -1,4 +1,4 @@
-"""Parts, contacts and loads: a model. It does not know who asks."""
+"""The model: parts, contacts and loads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace

@@ -1,4 +1,4 @@
-"""A model with half again as many modes in its reductions: what its answers are compared with."""
+"""A model with half again as many modes in its reductions, for comparison."""
 
 from dataclasses import replace
 from math import ceil

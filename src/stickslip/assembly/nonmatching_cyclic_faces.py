@@ -1,4 +1,4 @@
-"""Cyclic faces whose meshes do not match: the high face follows the low face of the next sector in the mean."""
+"""Cyclic faces with meshes that do not match: the high face follows the low face of the next sector by a mortar tie."""
 
 import numpy as np
 import scipy

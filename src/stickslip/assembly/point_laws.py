@@ -1,4 +1,4 @@
-"""What a point of a contact has of its law: the contact's preload and gap in it, and the point's share of the interface."""
+"""The law of a contact point: the contact's preload and gap, and the point's share of the area."""
 
 from dataclasses import fields, is_dataclass, replace
 from typing import Any

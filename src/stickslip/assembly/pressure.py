@@ -1,4 +1,4 @@
-"""Pressure fields of a flow solver, put on the facets of a structure's surface as forces of its nodes."""
+"""Pressure fields of a flow solver as nodal forces."""
 
 from dataclasses import dataclass, field
 from typing import Any

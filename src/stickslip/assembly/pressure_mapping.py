@@ -1,4 +1,4 @@
-"""Which facet of a surface each point of a pressure field belongs to: by distance, and by the side that its normal tells."""
+"""Mapping of pressure points to facets, by distance and by the direction of the normal."""
 
 from dataclasses import dataclass
 

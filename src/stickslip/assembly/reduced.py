@@ -1,4 +1,4 @@
-"""Parts reduced one by one, each once: copies share the reduction of what they copy, later models that of earlier ones."""
+"""Reduction of the parts, each once: copies and later models share it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a response is asked of a model: loads as forces, places that are reported, and what cannot be answered."""
+"""The request of a response to a model: forces, outputs, and refusals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Rigid contacts of a model: every gap of one has to be a coordinate, and nothing else may need the motion of its nodes."""
+"""Rigid contacts: their gaps become coordinates."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Displacements of steady rotation that joined parts share."""
+"""Displacements of steady rotation common to joined parts."""
 
 import numpy as np
 import scipy

@@ -1,4 +1,4 @@
-"""The skin of a model's meshes, and fields on it, for pictures."""
+"""The outer surface of a model and fields on it, for pictures."""
 
 from collections.abc import Mapping
 

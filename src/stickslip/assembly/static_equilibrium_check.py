@@ -1,4 +1,4 @@
-"""Whether static loads pull apart what contacts alone hold: then there is no equilibrium to look for."""
+"""Refusal of static loads that pull apart parts held by contacts alone."""
 
 from collections.abc import Mapping
 

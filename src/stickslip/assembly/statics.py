@@ -1,4 +1,4 @@
-"""What static loads do to the solids of a model."""
+"""Static displacements of the solids of a model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

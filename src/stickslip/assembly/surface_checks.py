@@ -1,4 +1,4 @@
-"""Whether the two surfaces of a contact can meet: normals against each other, no overlap, points that move."""
+"""Checks of the two surfaces of a contact: opposite normals, overlap, moving points."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations

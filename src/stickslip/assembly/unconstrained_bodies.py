@@ -1,4 +1,4 @@
-"""Which bodies of a model neither supports nor contacts nor joins hold, and how these can move."""
+"""Bodies without supports, contacts or joins, and their free motions."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Models that stay as the finite elements made them: when nothing is condensed, and which analyses take that."""
+"""Unreduced models: when nothing is condensed, and the analyses that accept it."""
 
 import numpy as np
 import scipy.sparse

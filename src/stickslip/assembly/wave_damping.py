@@ -1,4 +1,4 @@
-"""Damping of a wave by the modes of its parts, where each has its own."""
+"""Damping of a wave from the modal damping of its parts."""
 
 from dataclasses import dataclass, replace
 

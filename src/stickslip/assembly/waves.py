@@ -1,4 +1,4 @@
-"""The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
+"""A sector reduced wave by wave; known waves come from memory or the store."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What happens at a contact point: laws, their evaluation over a period, and where the points are."""
+"""Contact laws, their evaluation over a period, and the geometry of contact points."""
 
 import lazy_loader
 

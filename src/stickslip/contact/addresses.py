@@ -1,4 +1,4 @@
-"""Compiled functions that are called by address: what calls them is compiled without them, in a quarter of the time.
+"""Compile functions that are called by address: their callers compile without them, in a quarter of the time.
 
 Numba fetches the address of a function that is an argument by Python code at every call, a millisecond each, in which a signal's exception
 would be lost. Here it is fetched once and handed over as a number.

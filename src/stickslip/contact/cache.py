@@ -1,4 +1,4 @@
-"""numba as this package uses it: functions that are compiled with `njit` from here are kept with a checksum, and long compiling is said.
+"""numba with the package's own cache: compiled functions are stored with a checksum, and long compilations are announced.
 
 Nothing that is needed to judge a study file imports this module: numba takes a quarter of a second to load.
 """

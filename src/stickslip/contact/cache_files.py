@@ -1,4 +1,4 @@
-"""Where compiled functions are kept: numba's cache of one function, with a checksum of each file, and the age of all that it was made from.
+"""Files of the compilation cache: each has a checksum and the dates of all its sources.
 
 numba offers its caches as classes; the dispatcher of a function holds one as an attribute. Nothing of numba is replaced here, and
 functions of other programs keep numba's own cache.

@@ -1,4 +1,4 @@
-"""Contact laws as arrays: what the evaluators of a period take."""
+"""Contact laws as arrays, the input of the evaluators."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

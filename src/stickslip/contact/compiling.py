@@ -1,4 +1,4 @@
-"""What is said while functions are compiled: on a first run that lasts, and a silent program looks as if it hung."""
+"""Messages during compilation, so that a first run does not look as if it hung."""
 
 import logging
 from threading import Timer

@@ -1,4 +1,4 @@
-"""How contacts couple harmonics: which rows of their derivatives do, and what these rows add to a matrix of the coordinates they touch.
+"""Coupling of harmonics by contacts: the rows of the derivatives that couple, and what they add to the Jacobian.
 
 A contact that sticks or is open all period answers each harmonic of a gap by the same harmonic of a force, with a complex number. One that slips
 couples the harmonics of its tangential forces with those of all gaps; its normal force couples nothing as long as it stays closed.

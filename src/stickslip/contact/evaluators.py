@@ -1,4 +1,4 @@
-"""How contact forces are evaluated over a period, by name."""
+"""Names of the methods that evaluate contact forces over a period."""
 
 from typing import Literal, get_args
 

@@ -1,4 +1,4 @@
-"""Sliders that stay where a static state has left them."""
+"""Laws whose sliders stay where a static state has left them."""
 
 from dataclasses import replace
 

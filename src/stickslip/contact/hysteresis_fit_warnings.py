@@ -1,4 +1,4 @@
-"""What a hysteresis loop cannot tell of a friction contact, and what makes an estimate doubtful, in words."""
+"""Warnings about a fitted hysteresis loop: parameters that the loop does not determine, and doubtful estimates."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which contacts have springs whose start the equations leave open, and an interface on which each of them has a start of its own.
+"""Contacts whose initial slider position is free, and an interface that prescribes it.
 
 A spring with a slider that never moves keeps what it began with. The start is the place of the slider, ``slider`` of a law: the force
 depends on the gap less that place alone, so that shifted gaps give the forces of every start.

@@ -1,4 +1,4 @@
-"""Where contacts are: pairs of points, their laws, and the operator from displacements to gaps."""
+"""Contact points: pairs, their laws, and the operator from displacements to gaps."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise

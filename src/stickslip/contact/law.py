@@ -1,4 +1,4 @@
-"""The seam of contact laws: parameters in a frozen dataclass, behaviour in one compiled step.
+"""The protocol of contact laws: parameters in a frozen dataclass, behaviour in one compiled step.
 
 The step maps displacement, velocity and state at one sample of one contact to force and new state, with the derivatives of that map. It
 owns nothing, so that the same law serves harmonic balance and the static preload. All steps share one signature: the marcher is compiled once, against that

@@ -1,4 +1,4 @@
-"""A law of one's own against its differences, before a long computation relies on it."""
+"""Check of a user's contact law against finite differences."""
 
 import numpy as np
 

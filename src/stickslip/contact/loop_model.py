@@ -1,4 +1,4 @@
-"""What a measured hysteresis loop is compared with: a contact of elastic Coulomb friction under a constant normal load.
+"""Model of a measured hysteresis loop: elastic Coulomb friction under a constant normal load.
 
 A recording has unknowns of its own beside stiffness and limit: the force that the spring holds at the first sample, the offset of the
 force sensor, and its drift. The friction force is a piecewise linear function of all of them.

@@ -1,4 +1,4 @@
-"""Where a point falls on facets: the closest one, and the one in a given direction."""
+"""Projection of points on facets: the closest point, and the point along a direction."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The steady cycle of the slider that holds a tangential spring, between two walls that are trigonometric polynomials.
+"""The steady cycle of a Jenkins slider whose limits are trigonometric polynomials.
 
 In units of force the slider is at ``z = k x - T``, and friction keeps it between ``k x - μN`` and ``k x + μN``: it rests while the
 contact sticks, the lower wall pushes it while the contact slips forward, the upper one while it slips backward. Slip therefore ends at

@@ -1,4 +1,4 @@
-"""When the contacts of a period are shared among threads."""
+"""Number of threads for the contacts of a period."""
 
 import numba
 

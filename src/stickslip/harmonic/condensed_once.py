@@ -1,4 +1,4 @@
-"""A structure is condensed once for all the problems that are made of it: checks, static equilibrium, each load of a study."""
+"""Cache of condensed structures, shared by checks, the static equilibrium and all loads of a study."""
 
 from hashlib import blake2b
 from weakref import WeakKeyDictionary

@@ -1,4 +1,4 @@
-"""What the linear systems of a periodic problem cost as arrays and by products, from what can be counted.
+"""Estimated cost of the linear systems: with full matrices, and with products.
 
 The coefficients are seconds of one core, measured by the rows ``krylov/crossover`` of `evidence.benchmarks`. Where they are off by a common
 factor, as on a slower machine, nothing changes: they are compared with each other.

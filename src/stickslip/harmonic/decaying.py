@@ -1,4 +1,4 @@
-"""What vibrates, as a motion feels it that decays: ``D(s) = K + s C + s² M`` at ``s = hλ`` with ``λ = -β + iω``.
+"""Dynamic stiffness of a decaying motion: ``D(s) = K + s C + s² M`` at ``s = hλ`` with ``λ = -β + iω``.
 
 A motion ``Re sum_h X_h e^{hλt}`` is the power series of one that decays as ``e^{λt}`` (Laxalde & Thouverez, Journal of Sound and Vibration 322 (2009)
 1009-1025). Its condensation is that of a steady motion at the complex frequency ``ω + iβ``; the mean feels the static stiffness.

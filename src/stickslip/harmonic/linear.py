@@ -1,4 +1,4 @@
-"""What vibrates, and the same condensed, as the harmonic balance sees it."""
+"""Protocols of the linear structure: before and after condensation."""
 
 from collections.abc import Hashable
 from typing import Protocol, Self, runtime_checkable

@@ -1,4 +1,4 @@
-"""Matrices of a structure as arrays, after a look at what the condensation needs of them."""
+"""Matrices of a structure as arrays, checked for what the condensation needs."""
 
 import numpy as np
 import scipy.sparse

@@ -1,4 +1,4 @@
-"""Dynamic stiffness of a mistuned wheel by the waves of the tuned one: what a frequency costs is that of one sector times their number.
+"""Dynamic stiffness of a mistuned wheel by the waves of the tuned one: a frequency costs one sector times their number.
 
 The interior of the tuned wheel is solved wave by wave. Deviations act on few shares ``y = P u`` of the motion of each sector, with forces
 ``z = Δ y``; these are condensed to them by ``(1 + A Δ) y = y_0``, with A what a force on one share does to another one of the tuned wheel.

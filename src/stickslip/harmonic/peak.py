@@ -1,4 +1,4 @@
-"""The resonance peak as an equation: the periodic problem bordered by a condition that holds where an amplitude is largest.
+"""The resonance peak as an equation: the periodic problem with the condition that an amplitude is stationary.
 
 The unknowns are those of the balance and the frequency. With ``|a|`` the norm of one retained coordinate over the harmonics that the load
 drives, the condition is

@@ -1,4 +1,4 @@
-"""The penalty of the dynamic Lagrangian method: what the structure itself holds against a force along each gap."""
+"""Penalty stiffness of the dynamic Lagrangian method, from the structure's own stiffness along each gap."""
 
 from dataclasses import dataclass
 from functools import lru_cache

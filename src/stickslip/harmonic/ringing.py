@@ -1,4 +1,4 @@
-"""Harmonics beyond a judging set at which the structure rings: a mode there may make much of a small force of the contacts."""
+"""Harmonics beyond the judging set that meet a mode: a small contact force may cause a large motion there."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""How a torus of two phases is sampled: along the ways on which both phases grow with time, closed after whole turns of both.
+"""Sampling of a torus of two phases along paths on which both phases grow, closed after whole turns of both.
 
 A contact remembers along time, and time moves both phases at once: it goes around the torus on a characteristic,
 ``θ1 = ω1 t, θ2 = ω2 t + φ``. With a ratio of whole numbers q / p in place of ``ω2 / ω1`` a characteristic closes after p turns of the first phase

@@ -1,4 +1,4 @@
-"""What vibrates with two frequencies at once: a condensed dynamic stiffness and a load for each combined frequency."""
+"""Condensed dynamic stiffness and load for each combined frequency of a motion with two frequencies."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Structures: blades of finite elements, rigid dampers, lumped masses, damping and modes."""
+"""Structures: finite-element blades, rigid dampers, lumped masses, damping and modes."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""How many threads the OpenBLAS of NumPy and SciPy takes: one where matrices are small, all of them where a large one is factorised.
+"""Number of OpenBLAS threads: one for small matrices, all for a large factorisation.
 
 The matrices of a response have a few hundred rows. More threads wait for each other there: with two, a point of 9 ms of work
 takes 220 ms of the processor. Sums then have the order, and so the bits, of a run of the command.

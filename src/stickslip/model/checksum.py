@@ -1,4 +1,4 @@
-"""A checksum behind the content of a file or a record: one flipped bit is seen before anything of it is used."""
+"""Checksums behind the content of files and records."""
 
 from hashlib import file_digest, sha256
 from io import BytesIO

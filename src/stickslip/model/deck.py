@@ -1,4 +1,4 @@
-"""CalculiX decks of a mesh, so that anyone can check a model with a solver that shares no code with this package.
+"""CalculiX decks of a mesh, for checks with another solver.
 
 Format: CalculiX CrunchiX user's manual 2.20. A deck is in SI units (m, kg, s, N, Pa), as everything here.
 """

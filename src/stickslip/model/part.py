@@ -1,4 +1,4 @@
-"""What a model is put together from: a structure with named surfaces, its place, and, if it is a sector, of how many."""
+"""Parts: a structure with named surfaces, its position, and the number of sectors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

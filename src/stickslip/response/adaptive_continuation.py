@@ -1,4 +1,4 @@
-"""The one follower of branches of periodic motions: start, predict, correct, judge, adapt the harmonics, recover.
+"""Continuation of periodic motions with adaptive harmonics: start, predict, correct, judge, adapt, recover.
 
 A branch is followed by arc length, or from one listed value of the parameter to the next. What is solved at each point is one of a few
 *levels*, the same equation with more and more harmonics (one level alone: harmonics stay as they are). Harmonics change along the branch:

@@ -1,4 +1,4 @@
-"""What the follower is told and what it tells: the curve, its way, the points on it."""
+"""Input and output of the continuation: the curve, its range, and the points on it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The single solves of the follower: a step on, the same point with other harmonics, a point that no branch leads to."""
+"""Single solves of the continuation: a step, a point with other harmonics, a start without a branch."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What each harmonic that a solved point lacks would change in the outputs: the parts by which `GoalOriented` chooses."""
+"""Contribution of each missing harmonic to the outputs: the terms by which `GoalOriented` chooses."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Static equilibrium: where the centrifugal load puts the damper before anything vibrates."""
+"""Static equilibrium under the centrifugal load, before anything vibrates."""
 
 from dataclasses import dataclass, replace
 

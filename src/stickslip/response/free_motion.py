@@ -1,4 +1,4 @@
-"""A damper whose mean position nothing determines.
+"""Dampers whose mean position nothing determines.
 
 A contact that slips or opens in every cycle forgets its mean position. When all contacts do, the coordinates of a free damper that no
 normal spring holds may drift: the Jacobian is singular, and the static part of the solution along them means nothing.

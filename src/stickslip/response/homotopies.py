@@ -1,4 +1,4 @@
-"""The physics of what is tried where a frequency does not converge: the excitation grows, then the higher harmonics join."""
+"""Homotopies for frequencies that do not converge: the excitation grows, then higher harmonics join."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

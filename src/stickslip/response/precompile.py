@@ -1,4 +1,4 @@
-"""All compiled functions asked for once on a tiny problem, so that they are on disk before the first run that needs them."""
+"""Compilation of all kernels on a tiny problem, so that the first run does not wait."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed

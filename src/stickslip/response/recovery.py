@@ -1,4 +1,4 @@
-"""Everything that is reported at one point of a response, recovered from its retained coordinates."""
+"""Recovery of all reported quantities at a point from its retained coordinates."""
 
 from dataclasses import dataclass
 

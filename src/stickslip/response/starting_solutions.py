@@ -1,4 +1,4 @@
-"""How a periodic motion is found where no branch leads to it: one ladder, every rung counted and bounded in Newton steps."""
+"""Periodic solutions without a neighbour: a ladder of methods, each with a limit of Newton steps."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial

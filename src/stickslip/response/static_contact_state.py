@@ -1,4 +1,4 @@
-"""Contacts under static loads: their forces, and which of them stick in small vibrations."""
+"""Contacts under static loads: forces, and the state for small vibrations."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Whether harmonics were enough: the alert from a solved response to a judging set (Gastaldi & Berruti 2017, section 6)."""
+"""Check of the harmonics: prediction from a solution to a judging set (Gastaldi & Berruti 2017, section 6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

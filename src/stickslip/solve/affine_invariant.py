@@ -1,4 +1,4 @@
-"""Newton steps, shortened until the next correction would be smaller: a test that does not depend on the scales of the equations."""
+"""Newton's method with the natural monotonicity test: steps are shortened until the next correction is smaller, whatever the scales."""
 
 from functools import partial
 from time import perf_counter

@@ -1,4 +1,4 @@
-"""What a branch of ``F(x, p) = 0`` is made of: the equation, its points, their distances, and how it is to be followed."""
+"""Branches of ``F(x, p) = 0``: the equation, its points, distances between them, and options."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Folds and other marks of a branch: where a function of its points changes sign, located between two points."""
+"""Folds and other events of a branch, located between two points."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

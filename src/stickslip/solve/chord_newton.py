@@ -1,4 +1,4 @@
-"""Newton steps whose factors are kept while they serve: a residual costs a small part of a factorised Jacobian.
+"""Newton steps with old factors for as long as they converge.
 
 After a full Newton step the same factors give further corrections, with Broyden's updates of rank one (Kelley, Solving Nonlinear Equations with
 Newton's Method, SIAM 2003, chapter 4), as long as each is clearly smaller than the one before. Where contacts change their states they are not: then the

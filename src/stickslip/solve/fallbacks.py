@@ -1,4 +1,4 @@
-"""Solve at a fixed parameter by whatever it takes: other globalisations, then homotopies; what it took is counted."""
+"""Fallbacks at a fixed parameter: other globalisations, then homotopies, with a limit of Newton steps."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace

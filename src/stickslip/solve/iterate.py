@@ -1,4 +1,4 @@
-"""What the correctors share: an iterate, the work they do, and how a step is taken from one iterate to the next."""
+"""Iterates of the correctors: their work, and the step from one to the next."""
 
 import math
 from collections.abc import Callable

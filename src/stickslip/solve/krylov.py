@@ -1,4 +1,4 @@
-"""Linear systems whose matrix is known by its products: preconditioned Krylov methods, and the choice between these and LU.
+"""Linear systems given by products: preconditioned Krylov methods, and the choice between these and LU.
 
 A system ``J x = b`` is solved as ``(J P⁻¹) y = b, x = P⁻¹ y``: preconditioned from the right, so that the residual that is made small is the
 one that Newton sees.

@@ -1,4 +1,4 @@
-"""The factors of the last Newton step, which tell the tangent as well where the Jacobian of the solution is the same."""
+"""Factors of the last Newton step, used again for the tangent."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt: steps that are damped where the Jacobian knows little."""
+"""Levenberg-Marquardt method."""
 
 import numpy as np
 import scipy.linalg

@@ -1,4 +1,4 @@
-"""The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
+"""Protocol of the linear solvers, and the dense solver."""
 
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeGuard

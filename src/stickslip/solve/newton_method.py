@@ -1,4 +1,4 @@
-"""Newton's method for equations that are smooth between kinks, with a choice of what keeps it from going astray."""
+"""Newton's method for piecewise smooth equations, with a choice of globalisations."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence

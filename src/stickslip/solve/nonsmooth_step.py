@@ -1,4 +1,4 @@
-"""How to get past a kink at which every damped step fails."""
+"""Steps past a kink at which every damped step fails."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""LU of what is left of a Jacobian after the unknowns that are easily solved for, borders included."""
+"""Schur complement of a Jacobian, borders included."""
 
 from dataclasses import dataclass
 from functools import cached_property

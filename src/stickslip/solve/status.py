@@ -1,4 +1,4 @@
-"""Why a solver stopped, as a value with advice, and what it took."""
+"""Reasons why a solver stopped, with advice, and its work."""
 
 from enum import IntEnum
 

@@ -1,4 +1,4 @@
-"""Everything of a run but the computation: models, static state, natural frequencies, choices, cost. Nothing is written."""
+"""``stickslip check``: models, static state, natural frequencies, choices and cost, without a run. Nothing is written."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What ``stickslip fit`` says of measured hysteresis loops, as lines of text."""
+"""Output of ``stickslip fit``."""
 
 import math
 from pathlib import Path

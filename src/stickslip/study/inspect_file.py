@@ -1,4 +1,4 @@
-"""What ``stickslip inspect`` says of a model's file, as lines of text."""
+"""Output of ``stickslip inspect``."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Jobs, worked off: in this process, in processes that are watched, on other machines. A job that cannot be done stops no other."""
+"""Execution of jobs: in this process, in watched processes, on other machines. A failed job stops no other."""
 
 import logging
 import pickle

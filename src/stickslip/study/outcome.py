@@ -1,4 +1,4 @@
-"""What a run has found, put together: the only place that makes a result of what jobs have left."""
+"""The result of a run, assembled from its jobs."""
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""From a study to its results: every job of every analysis, each record safe on the disk. The only runner."""
+"""The runner: every job of every analysis, each record written to disk."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

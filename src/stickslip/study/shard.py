@@ -1,4 +1,4 @@
-"""A share of the jobs of a run, for plain job arrays on a folder that all see."""
+"""Shares of the jobs of a run, for job arrays on a shared folder."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The course of a planar contact from one time to another while it is closed: stick and slip in turn, with located ends.
+"""Motion of a planar contact while it is closed: stick and slip in turn, with located ends.
 
 The memory of the start travels along: the derivative of the slider's place z, or of the angle of slip, by the place at the start.
 """

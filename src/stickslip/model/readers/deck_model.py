@@ -1,4 +1,4 @@
-"""What a CalculiX or Abaqus deck says: cells, materials, boundary conditions, rotation, cyclic symmetry."""
+"""Content of a CalculiX or Abaqus deck: cells, materials, boundary conditions, rotation, cyclic symmetry."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace

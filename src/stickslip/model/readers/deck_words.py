@@ -1,4 +1,4 @@
-"""Words of CalculiX and Abaqus decks: which keywords and parameters are read, which say nothing of the structure, which are told.
+"""Keywords of CalculiX and Abaqus decks: read, ignored, or reported.
 
 Any other keyword or parameter is refused by line: it may change mass, stiffness, supports, damping or rotation.
 """

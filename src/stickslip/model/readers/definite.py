@@ -1,4 +1,4 @@
-"""Matrices that no passive structure has: what of them is refused, and what is told."""
+"""Matrices that no passive structure has: refusals and warnings."""
 
 import numpy as np
 import scipy

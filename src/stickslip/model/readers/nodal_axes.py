@@ -1,4 +1,4 @@
-"""Nodes with axes of their own: the rotation that brings a model's coordinates into the global axes."""
+"""Rotation of nodal coordinate systems into the global axes."""
 
 import numpy as np
 import scipy

@@ -1,4 +1,4 @@
-"""Nodes of a model: numbers, positions and sets; what a file of matrices does not know of its dofs."""
+"""Node numbers, positions and sets, which files of matrices lack."""
 
 import csv
 import io

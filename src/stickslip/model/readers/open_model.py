@@ -1,4 +1,4 @@
-"""Open a file of a model, whichever of the readers it takes; and say what is in it."""
+"""Open a model file with the right reader, and report its content."""
 
 import re
 from collections import Counter

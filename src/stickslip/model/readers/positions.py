@@ -1,4 +1,4 @@
-"""Where the nodes lie: positions and sets from whichever file or mesh the user has."""
+"""Positions and node sets from any file or mesh."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is in a model: counts, mass, size, first frequencies, and whether they make sense."""
+"""Summary of a model: counts, mass, size, first frequencies, plausibility."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

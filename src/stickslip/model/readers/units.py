@@ -1,4 +1,4 @@
-"""Unit systems of finite-element models, and their conversion to SI: the one place where it happens."""
+"""Unit systems of finite-element models, converted to SI here and nowhere else."""
 
 from dataclasses import dataclass, replace
 

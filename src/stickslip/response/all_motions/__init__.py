@@ -1,4 +1,4 @@
-"""All motions of a load: those that no sweep meets, searched for by deflation and from random states in time, and where starts end."""
+"""Search for all motions under a load by deflation and by random starts in time, with their basins of attraction."""
 
 import lazy_loader
 

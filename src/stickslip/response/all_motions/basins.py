@@ -1,4 +1,4 @@
-"""Where motions go in time from random states: shares of starts that end on each, with what a sample of them can tell."""
+"""Basins of attraction: shares of random starts that end on each motion, with confidence limits."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

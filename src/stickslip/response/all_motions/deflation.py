@@ -1,4 +1,4 @@
-"""Newton's method on a residual that known solutions are divided out of (Farrell, Birkisson & Funke 2015)."""
+"""Deflated Newton method: known solutions are divided out of the residual (Farrell, Birkisson & Funke 2015)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""About how long a search for all motions takes: one linearisation and a few periods are timed."""
+"""Estimated time of a search for all motions, from one timed linearisation and a few periods."""
 
 from dataclasses import replace
 from time import perf_counter

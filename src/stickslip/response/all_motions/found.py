@@ -1,4 +1,4 @@
-"""What a search for all motions finds: branches, the motions at each frequency that was searched, and their basins."""
+"""Results of a search for all motions: branches, motions at each searched frequency, and basins."""
 
 from dataclasses import dataclass, field
 from typing import Literal

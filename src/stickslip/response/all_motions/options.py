@@ -1,4 +1,4 @@
-"""How all motions are looked for, and the equations of the search."""
+"""Options of a search for all motions, and its equations."""
 
 from dataclasses import dataclass, field
 

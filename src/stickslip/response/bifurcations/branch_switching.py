@@ -1,4 +1,4 @@
-"""How a branch leaves another one: the directions that the equations leave open where it crosses, and its first point."""
+"""Branch switching: the directions of a crossing branch, and its first point."""
 
 import numpy as np
 import scipy.linalg

@@ -1,4 +1,4 @@
-"""What is found on a branch: its bifurcations, what finding them took, and where nobody looked."""
+"""Bifurcations found on a branch, their cost, and ranges that were not searched."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Where multipliers cross the unit circle along a branch: between points whose numbers of multipliers outside of it differ."""
+"""Location of bifurcations: between points with different numbers of multipliers outside the unit circle."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""The same forced response with more freedom: over several periods of its load, or with every sector of a wheel for itself."""
+"""The forced response with a longer period or less symmetry: several periods of the load, or every sector of a wheel for itself."""
 
 from dataclasses import dataclass, replace
 

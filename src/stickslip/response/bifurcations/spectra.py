@@ -1,4 +1,4 @@
-"""The multipliers of a motion in an order that is continuous along a branch: by their moduli, without those that are neutral for good."""
+"""Multipliers sorted so that they are continuous along a branch."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which of all the points that were solved make up the response."""
+"""Selection of the accepted points among all that were solved."""
 
 from collections.abc import Mapping, Sequence
 

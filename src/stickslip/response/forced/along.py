@@ -1,4 +1,4 @@
-"""The forced response as a branch whose harmonics change on the way: raised until the judgement is quiet, audited, lowered again."""
+"""The forced response along a branch with adaptive harmonics: raised until the error is small, audited, lowered again."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace

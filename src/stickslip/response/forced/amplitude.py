@@ -1,4 +1,4 @@
-"""What the amplitude of a response is, and what its error is taken of."""
+"""Definition of the amplitude of a response, and of its relative error."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Names and numbers that a forced response is asked for with."""
+"""Options of a forced response: names and limits."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Frequencies that the corrector did not find: from the motion in time, if that repeats itself; if it does not, with what shows so."""
+"""Frequencies without a solution, taken from time integration where that becomes periodic."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, replace

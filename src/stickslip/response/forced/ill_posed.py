@@ -1,4 +1,4 @@
-"""Systems of which there is no forced response to be had."""
+"""Refusal of systems that have no forced response."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Doubts that more work settles: points whose errors are predicted alone are solved with more harmonics and compared, until two levels agree.
+"""Doubtful points solved again with more harmonics until two levels agree.
 
 What a prediction says of a point, and not how many others were asked for, decides whether it is solved again, and each point has its own budget.
 """

@@ -1,4 +1,4 @@
-"""What a forced response is asked for."""
+"""Options of a sweep."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

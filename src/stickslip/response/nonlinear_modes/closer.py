@@ -1,4 +1,4 @@
-"""Points between those of a nonlinear mode, where these do not tell enough: at knees, at extremes, and where a harmonic passes the frequency of another mode.
+"""Refinement of a nonlinear mode: at knees, at extremes, and where a harmonic meets another mode.
 
 A branch that is followed by steps of the shape's change goes past what is narrower than a step. Three tests say where: a point that its neighbours
 do not foretell; the parabola through a largest or least value and its neighbours, whose top is off that value; and the number of negative eigenvalues

@@ -1,4 +1,4 @@
-"""What stands for the amplitude of a nonlinear mode: its kinetic energy over the frequency, which no resonance with another mode takes away."""
+"""Modal amplitude of a nonlinear mode, from its kinetic energy: unaffected by internal resonances."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""More points of a backbone where those between which it is interpolated do not tell enough: damping begins with a corner where slip does."""
+"""More points of a backbone where interpolation is poor: damping has a corner where slip begins."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Where along a synthesised response its mode answers alone, and not at the peak only.
+"""Range of a synthesised response in which one mode dominates.
 
 At a peak the mode is large and the other modes are small beside it; away from it they may be a fifth of it. As long as nothing slips they are
 added, and the sum is exact. Where contacts slip, they feel the other modes too, and a mode whose amplitude follows the load steeply, as on the flank

@@ -1,4 +1,4 @@
-"""Whether a mode may be taken as the only one that answers: what the other modes do, linearly, under the same force.
+"""Validity of the single-mode assumption: linear response of the other modes under the same force.
 
 All other modes are there as the linear ones that they are with the contacts stuck: what the whole linear structure answers, less the part of the
 linear mode. They answer to what the motion of the backbone leaves of the load. As long as nothing slips they are added, and the sum is the

@@ -1,1 +1,1 @@
-"""What a model can and cannot do, told without solving its response: damping, bounds by friction, bodies on contacts alone."""
+"""Physical limits of a model, found without its response: damping, the most that friction can do, parts held by contacts alone."""

@@ -1,4 +1,4 @@
-"""How a resonance peak depends on the stiffness of its contacts, by linear solutions with the Jacobian of the balance.
+"""Sensitivity of a resonance peak to the contact stiffness, by linear solutions with the Jacobian of the balance.
 
 A solution of ``R(x, ω, κ) = 0``, with κ the logarithm of a factor on all contact stiffnesses, moves by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
 forces depend on κ; their derivative is a difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak

@@ -1,4 +1,4 @@
-"""What friction can do to a mode, estimated by describing functions: the largest damping, and the frequency that the mode ends at.
+"""Largest damping by friction and the shifted frequency of a mode, by describing functions.
 
 Every contact that slips is a spring of the complex stiffness ``k η(x)``, with one slip ratio x of all contacts: the amplitude of their gaps over
 that at which they begin to slip. From stuck (x = 1) to sliding (x large) each mode is followed by its shape. It is an estimate, no bound: for

@@ -1,4 +1,4 @@
-"""The same contacts with half as many points: each stands for two neighbours, and sees the mean of their gaps."""
+"""The interface with half as many contact points: each stands for two neighbours and sees the mean of their gaps."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How much friction a contact has: the Coulomb limit that it dissipates by, whatever its law."""
+"""Coulomb limit of a contact, whatever its law."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Modes within a range of frequencies: their damping without friction, what friction does to them, and whose motion they are."""
+"""Modes in a frequency range: damping without friction, damping by friction, and the parts that move."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Motions with two frequencies, and what is not periodic at all."""
+"""Quasi-periodic motions with two frequencies, and motions without a period."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Finds a second tone beside a forced motion: near modes that grow, and at the angles of multipliers."""
+"""Search for a second frequency beside a forced motion: unstable modes, and angles of multipliers."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What is not periodic, in time: its envelope, its statistics and its spectrum, and whether these have settled.
+"""Motions without a period, in time: envelope, statistics, spectrum, and whether these have settled.
 
 A motion that repeats itself never has no amplitude, but windows of it are alike once it has settled: the largest amplitude in a window, its mean
 and root mean square. The march is as long as that needs, or as a budget of work allows; of what it was, the later half counts.

@@ -1,4 +1,4 @@
-"""A motion with two frequencies, and how its amplitude goes up and down."""
+"""A motion with two frequencies and its envelope."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Near which frequencies a second tone may begin: angles of multipliers that have left the unit circle, and modes that grow."""
+"""Starting frequencies of a second tone: angles of multipliers outside the unit circle, and unstable modes."""
 
 from collections.abc import Sequence
 

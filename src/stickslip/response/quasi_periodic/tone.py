@@ -1,4 +1,4 @@
-"""Motions whose second frequency nothing drives: a forced motion that has become unstable, or flutter beside it.
+"""Motions with a second frequency of their own: an unstable forced motion, or flutter beside it.
 
 Beyond a Neimark-Sacker point a second tone of an own frequency grows out of the forced motion. It has a phase that nothing fixes, since time may
 begin anywhere for it, and so its frequency is one more unknown. For a given amplitude ``a`` of the second tone, the damping that has to

@@ -1,4 +1,4 @@
-"""How far the answer depends on the tractions that contacts which never slip have kept from before."""
+"""Bounds of the response over residual tractions, the preloads left in contacts that never slip."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Motions of other branches: where laws can make several at a frequency, a sweep up and one down through a wider range look for them."""
+"""Motions of other branches: sweeps up and down a wider range, where laws allow several motions."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise

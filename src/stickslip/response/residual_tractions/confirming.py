@@ -1,4 +1,4 @@
-"""Whether a bound is a motion: solved again by other means, and followed in time with the tractions it stands for."""
+"""Confirmation of a bound: solved again by other means, and integrated in time."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Where the slider of a planar contact may rest: in the discs of all instants, whose common part is convex.
+"""Admissible slider positions of a planar contact: the intersection of the discs of all instants.
 
 In units of force the slider is at ``z = K s``, and rests while ``|K x(t) - z| <= μN(t)``.
 """

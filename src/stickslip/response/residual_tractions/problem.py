@@ -1,4 +1,4 @@
-"""The periodic motion as a function of where the sliders of its contacts start, and the gradient of an amplitude by them.
+"""The periodic motion as a function of the slider positions, and the gradient of an amplitude.
 
 The sliders s enter through the gaps alone, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact
 derivatives that belongs to the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs

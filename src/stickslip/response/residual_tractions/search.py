@@ -1,4 +1,4 @@
-"""The smallest and the largest amplitude over all starts: ascent along adjoint gradients from several starts.
+"""Smallest and largest amplitude over all slider positions, by adjoint gradients from several starts.
 
 Where a contact is pushed beyond the interval in which it may rest, the motion drags it back to the end. Every start is therefore
 admissible, and the ends of the intervals, at which extremes lie as a rule, are reached by going too far: a step goes to where the gradient

@@ -1,1 +1,1 @@
-"""Resonances: peaks as equations, followed over design parameters; those that the load does not drive; which of several is the highest."""
+"""Resonance peaks as equations: followed over design parameters, subharmonic ones among them, and the highest of several."""

@@ -1,4 +1,4 @@
-"""Where the peaks of a response are: one sweep, and the maxima that stand out of it."""
+"""First resonance peaks: one sweep, and its maxima."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What is told of a resonance peak."""
+"""A resonance peak."""
 
 from dataclasses import dataclass
 

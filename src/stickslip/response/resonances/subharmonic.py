@@ -1,4 +1,4 @@
-"""Where subharmonic resonances begin: motions of several periods of the load, to which nothing leads from the response of one period.
+"""Onset of subharmonic resonances, which no branch of the response leads to.
 
 The branch is isolated as a rule. It is looked for by Newton's method from the response of one period with the motion added that it resists least at the
 lower frequency, of many amplitudes and phases; and then followed through the frequencies, both ways.

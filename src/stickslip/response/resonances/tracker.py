@@ -1,4 +1,4 @@
-"""From peak to peak: each started from those before, with steps of the parameter between where one is too long."""
+"""Steps from peak to peak: each starts from the peaks before, with intermediate values of the parameter where a step is too long."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

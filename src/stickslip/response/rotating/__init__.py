@@ -1,1 +1,1 @@
-"""Frequencies over the speed: Campbell, nodal diameters, interference."""
+"""Frequencies over the rotor speed: Campbell diagrams, nodal diameters, interference."""

@@ -1,4 +1,4 @@
-"""Vibration that nothing drives: limit cycles of unstable waves that friction bounds, and what becomes of disturbances of them."""
+"""Self-excited vibration: limit cycles of unstable waves that friction bounds, and their stability."""
 
 import lazy_loader
 

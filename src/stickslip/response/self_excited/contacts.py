@@ -1,4 +1,4 @@
-"""What contacts do in a motion that nothing drives."""
+"""Contact forces and dissipation in a self-excited motion."""
 
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Damping over amplitude: what a mode needs to go on with each amplitude, from where nothing slips to where friction is small."""
+"""Damping over amplitude of a self-excited mode, from stick to large slip."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Limit cycles: where the damping over the amplitude is zero, each solved as the autonomous problem, with as many harmonics as it needs."""
+"""Limit cycles: zeros of the damping over the amplitude, each solved as an autonomous problem with as many harmonics as it needs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

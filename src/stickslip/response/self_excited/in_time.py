@@ -1,4 +1,4 @@
-"""Self-excited vibration in time: where a motion goes from near a limit cycle, and which wave of a whole wheel wins."""
+"""Self-excited vibration in time: the motion that starts near a limit cycle, and the wave of the whole wheel that wins."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Linear modes about the static state, contacts stuck: where every self-excited vibration begins."""
+"""Linear modes about the static state with stuck contacts, the start of every self-excited vibration."""
 
 from dataclasses import dataclass, replace
 

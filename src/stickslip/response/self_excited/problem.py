@@ -1,4 +1,4 @@
-"""Periodic motion that nothing drives, as an equation: its frequency is unknown, and so is what keeps it going.
+"""The autonomous periodic problem: its frequency is unknown, and so is the damping that keeps the motion going.
 
 The balance has a given amplitude ``a`` of one coordinate in its first harmonic, which is its scale, and the phase of that coordinate is
 zero, since time may begin anywhere. The unknowns beside the motion are ``ln ω`` and a *level*:

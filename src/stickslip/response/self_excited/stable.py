@@ -1,4 +1,4 @@
-"""Whether a limit cycle is stable: multipliers of all its disturbances but the one along itself; of a wheel against every wave."""
+"""Stability of a limit cycle by its multipliers; of a wheel against every wave."""
 
 from dataclasses import dataclass, replace
 

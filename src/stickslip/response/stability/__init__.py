@@ -1,4 +1,4 @@
-"""Whether an accepted periodic motion is stable: the multipliers of small disturbances of it."""
+"""Stability of periodic motions by Floquet multipliers."""
 
 import lazy_loader
 

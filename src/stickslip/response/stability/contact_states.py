@@ -1,4 +1,4 @@
-"""What piecewise-linear contacts are to a small disturbance between their located transitions, and what they keep at these.
+"""Piecewise-linear contacts in a disturbed motion: stiffness between transitions, and jumps at them.
 
 A tangential spring that sticks is a spring ``k`` from the structure to its slider, one that slips a force ``±μ`` times the pressure, an
 open one nothing. Forces are continuous at every transition, so that the motion of the structure has no jumps in its derivative; only

@@ -1,4 +1,4 @@
-"""What contacts answer to a small disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of their gaps, along a motion whose transitions are known.
+"""Contact forces under a disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of the gaps, along a motion with known transitions.
 
 The forces are ``e^{στ} Σ_h F_h e^{ihτ}``, and F follows from G by a matrix that depends on the exponent: a slider that takes hold at τ_0 keeps
 the place that the disturbance had then, while the disturbance itself goes on growing. With the tangent of the periodic motion alone,

@@ -1,4 +1,4 @@
-"""The points of a response in the order of the branch, and what tells at no cost, or little, where their stability may change."""
+"""Points in the order of the branch, with cheap indicators of a change of stability: folds, the sign of the determinant, the list of transitions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

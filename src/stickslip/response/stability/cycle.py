@@ -1,4 +1,4 @@
-"""The list of transitions in the cycle of a motion, by which motions are told apart between which multipliers may jump."""
+"""The list of contact transitions in a period: multipliers may jump where it changes."""
 
 import numpy as np
 

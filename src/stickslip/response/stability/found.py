@@ -1,4 +1,4 @@
-"""Growth or decay of small disturbances of a periodic motion: multipliers, how far each may be off, and the verdict on them."""
+"""Floquet multipliers of a motion, their errors, and the verdict."""
 
 from dataclasses import dataclass
 from typing import Literal

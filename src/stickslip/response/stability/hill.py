@@ -1,4 +1,4 @@
-"""Stability of a motion by Hill's method that is exact for friction: of a wheel against every wave, one sector at a time."""
+"""Hill's method, exact for friction: of a wheel against every wave, one sector at a time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What vibrates between contacts, for a disturbance with an exponent: the dynamic stiffness of each harmonic in modes of its own.
+"""Modes of the dynamic stiffness of each harmonic, for a disturbance with a complex exponent.
 
 The modes are those with springs in place of the contacts that stand for their mean. Damping may couple them, damping by loss factors and
 aerodynamic forces may add to them: all that a harmonic balance knows acts here as it does there.

@@ -1,4 +1,4 @@
-"""Hill's problem between two frequencies of the disturbance, as a small matrix of the modes that can ring there.
+"""Hill's problem in a frequency interval of the disturbance, as a small matrix of the modes that resonate there.
 
 A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h q_h`` and contact forces
 ``f = D(σ) g``. Modes whose frequency is far from that of a harmonic are eliminated with the contacts: what is left of the others is a matrix

@@ -1,4 +1,4 @@
-"""All Floquet exponents near the imaginary axis and right of it, by Hill's method that is exact for friction."""
+"""Floquet exponents near and right of the imaginary axis, by Hill's method."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

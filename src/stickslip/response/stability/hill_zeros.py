@@ -1,4 +1,4 @@
-"""Zeros of the determinant of a small analytic matrix, found by a contour integral, polished by Newton's method, and counted.
+"""Zeros of an analytic determinant: found by contour integrals, refined by Newton's method, and counted.
 
 W.-J. Beyn, "An integral method for solving nonlinear eigenvalue problems", Linear Algebra and its Applications 436 (2012) 3839-3863.
 """

@@ -1,4 +1,4 @@
-"""How disturbances go through the intervals of a period whose contact states differ in a few springs only.
+"""Disturbances over the intervals of a period whose contact states differ in a few springs.
 
 One state of the contacts, that in which each contact is longest, is decomposed into eigenvectors, with which its exponential is a product
 per eigenvalue. Another state is that one and a matrix of rank r, one for each spring row that differs, ``A = A₀ + U V``. What this adds to the

@@ -1,4 +1,4 @@
-"""What the harmonics that a motion lacks change in it: a Newton step with more of them, or as many as it takes."""
+"""Correction of a motion by its missing harmonics: one Newton step, or a solution."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Modal states of a structure, in which disturbances of its motion are described."""
+"""Modal coordinates for the disturbances of a motion."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How the modulus of a multiplier is written."""
+"""Format a multiplier for messages."""
 
 ROUNDS_TO_ONE = 5e-4  # off 1, below which four digits may say 1
 

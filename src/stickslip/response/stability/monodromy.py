@@ -1,4 +1,4 @@
-"""The derivative of the period map where all transitions are located: exponentials between these, projections at them."""
+"""Monodromy matrix with located transitions: matrix exponentials between them, projections at them."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Stability of a solved point: Floquet multipliers of the motion on all reduced states and the places of the sliders."""
+"""Floquet multipliers of a solved point, with all reduced states and slider positions."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""How far up in frequency contacts may make modes grow: so many harmonics a disturbance must have for its exponents to be counted.
+"""Bound of the frequencies at which contacts can make modes grow: the harmonics that a disturbance needs.
 
 A mode that rings above all harmonics that are solved acts on the others by its receptance alone. Contacts that change its stiffness while it
 rings may feed it, which no count of the others shows.

@@ -1,4 +1,4 @@
-"""How disturbances propagate while no contact changes its state: the exponential of a matrix, to rounding.
+"""Propagation of disturbances between transitions: the matrix exponential, to rounding.
 
 Reduced structures are stiff: their fastest modes turn a thousand times in a period. Short intervals take the Taylor series of the
 exponential on the disturbances themselves. Longer ones are halved until a rational function is exact to rounding, whose squares are the

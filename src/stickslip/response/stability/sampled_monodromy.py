@@ -1,4 +1,4 @@
-"""The derivative of the period map where the forces of some contacts are known by sampled tangents only.
+"""Monodromy matrix where the tangents of some contacts are known on samples only.
 
 These forces act as a kick at each sample, and between samples everything is propagated exactly (the splitting of Strang 1968): the error
 is of second order in the step. The means of the tangents over the period are springs, and part of what is propagated.

@@ -1,4 +1,4 @@
-"""Contact laws without located transitions: the tangents of their steps along a periodic motion, on samples.
+"""Tangents of contact laws without located transitions, on samples of a period.
 
 Hysteresis turns where a gap does. A step over such a time is taken in parts, the gap there being interpolated between both samples:
 a step that jumps over it would have the slope of one side for both. Friction that depends on the velocity is steep for a moment where

@@ -1,4 +1,4 @@
-"""The stability of a solved point, asked with more harmonics until it is known on which side of the unit circle its multipliers lie."""
+"""Stability of a solved point, computed with more harmonics until the verdict is clear."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""The laws of an interface as the compiled time step takes them."""
+"""Contact laws of an interface as input of the compiled time step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

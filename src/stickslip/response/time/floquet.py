@@ -1,4 +1,4 @@
-"""Floquet multipliers: what becomes of a small disturbance of a periodic motion from one period to the next."""
+"""Floquet multipliers: growth of small disturbances over a period."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A structure with its contacts, ready to be marched in time steps: matrices, laws, and the compiled run over both."""
+"""A structure with contacts, prepared for time stepping."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Whether a motion in time repeats itself, with what shows that it does not: how far it wanders, and that small differences grow.
+"""Whether a motion in time is periodic: its scatter from period to period, and the growth of small differences.
 
 It is marched from rest until the harmonics of all gaps repeat or the periods are spent. Of a motion that does not repeat, a copy that is kicked
 by a millionth is marched beside it: if the two part, it is no slow decay. If they do not, the changes must stay as large as they were, where a

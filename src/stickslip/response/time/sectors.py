@@ -1,4 +1,4 @@
-"""All sectors of a tuned wheel in time: harmonics have no waves there, the motion of every sector is marched.
+"""All sectors of a tuned wheel in time: each sector is integrated, as harmonics have no waves there.
 
 The coordinates of a tuned wheel mean the same in every wave, and so do its gaps. The motion of sector s is the sum of its waves,
 ``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are the transforms of those of the waves. An engine order

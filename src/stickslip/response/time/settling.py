@@ -1,4 +1,4 @@
-"""What a period of a marched motion tells: its harmonics, and whether it has become periodic."""
+"""Harmonics of a period in time, and whether the motion has become periodic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

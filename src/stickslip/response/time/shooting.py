@@ -1,4 +1,4 @@
-"""Shooting: the periodic motion that the time integration settles to, by Newton's method on the period map.
+"""Shooting: Newton's method on the period map.
 
 The map from a state to the state one period later is that of `integrate`, step for step; its derivative, the monodromy
 matrix, comes from tangents carried along the steps. The method finds unstable motions as well as stable ones, does not

@@ -1,4 +1,4 @@
-"""States at t = 0 that a motion begins with: displacements, velocities, and what the contact laws remember."""
+"""Initial states of a time integration: displacements, velocities, and states of the contact laws."""
 
 # mypy: disallow-untyped-decorators=False
 

@@ -1,4 +1,4 @@
-"""How much of a periodic motion is the step's own doing: corrections of it towards the motions with twice and four times as many steps."""
+"""Time-step error of a periodic motion: corrections towards twice and four times as many steps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

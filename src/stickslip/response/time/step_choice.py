@@ -1,4 +1,4 @@
-"""How many steps a period needs where contacts open and close: so many that an impact on the stiffest of them is followed.
+"""Number of time steps in a period, from the stiffest contact that opens and closes.
 
 A contact of stiffness k on the mass m that moves with it alone vibrates with √(k/m). An impact lasts half such a vibration. What the step makes
 of it depends on the angle ``√(k/m) h``. Masses on stops, held against an integrator with exact events (`tests/test_step_choice.py`), are off by

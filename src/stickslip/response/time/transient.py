@@ -1,4 +1,4 @@
-"""Direct time integration, which knows no harmonics: it shares with the balance the matrices and the step of each contact law.
+"""Direct time integration, without harmonics: it shares with the balance only the matrices and the contact laws.
 
 The linear part, with every contact stuck, is propagated exactly over a step by a matrix exponential, whatever the damping
 matrix and however stiff the modes; so are the periodic loads. What is left of the contact force, its departure from the

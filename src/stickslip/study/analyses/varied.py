@@ -1,4 +1,4 @@
-"""What a study varies, read from the dataset of an analysis."""
+"""The varied keys of a study, from the dataset of an analysis."""
 
 import numpy as np
 import xarray as xr

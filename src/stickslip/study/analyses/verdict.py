@@ -1,4 +1,4 @@
-"""Whether an answer is to be trusted: trusted, doubtful or wrong, why, and what to do."""
+"""Verdicts: trusted, doubtful or wrong, with reason and remedy."""
 
 import json
 import re

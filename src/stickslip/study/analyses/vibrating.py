@@ -1,4 +1,4 @@
-"""What analyses ask of a model in the same way: the waves that may vibrate by themselves, modes with stuck contacts, how motions are represented."""
+"""Requests that several analyses share: waves that may vibrate, modes with stuck contacts, representation of motions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Which motion of a result is written: a point of a forced response, of a nonlinear mode, or a limit cycle."""
+"""The motion to export: a point of a forced response, of a nonlinear mode, or a limit cycle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

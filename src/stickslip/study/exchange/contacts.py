@@ -1,4 +1,4 @@
-"""What contacts do over a period: gaps, forces, pressures, states and slip, as fields on the contact points."""
+"""Contacts over a period as fields: gaps, forces, pressures, states, slip."""
 
 from dataclasses import dataclass
 

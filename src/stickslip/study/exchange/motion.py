@@ -1,4 +1,4 @@
-"""The motion of every node: what a result holds, expanded by the model that it was computed of."""
+"""Motion of every node, recovered from a result."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

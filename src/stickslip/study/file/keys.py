@@ -1,4 +1,4 @@
-"""The keys of a table of the study file with their defaults and meanings, as text."""
+"""Keys of a study table with defaults and meanings, as text."""
 
 import json
 from collections.abc import Iterator, Mapping

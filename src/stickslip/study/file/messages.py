@@ -1,4 +1,4 @@
-"""From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
+"""Errors of pydantic as sentences with file, key, value and remedy."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

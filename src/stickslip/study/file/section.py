@@ -1,4 +1,4 @@
-"""What all tables of a study file have in common."""
+"""The base of all study tables."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite

@@ -1,4 +1,4 @@
-"""Units at the ends of keys, also those that no key has: what a value in one unit is in another."""
+"""Units at the ends of keys, and conversions between them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

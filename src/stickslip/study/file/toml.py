@@ -1,4 +1,4 @@
-"""TOML of a bounded size: what would take the parser minutes or gigabytes is refused before."""
+"""TOML of bounded size and depth."""
 
 import re
 import tomllib

@@ -1,1 +1,1 @@
-"""From the tables of a study to a model."""
+"""Study tables turned into models."""

@@ -1,4 +1,4 @@
-"""From the table [aero] and its file of coefficients to what a model holds."""
+"""The table [aero] and its file of coefficients as part of a model."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Contacts per area on rigid bodies: what has to be told of a side before its points have areas."""
+"""Contacts per area on rigid bodies: the data needed for the areas of their points."""
 
 from collections.abc import Iterator
 from typing import Any

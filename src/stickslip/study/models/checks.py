@@ -1,4 +1,4 @@
-"""What can be refused without a mesh: names that are not there, files that are not there, questions without what they need."""
+"""Refusals without a mesh: missing names, missing files, incomplete questions."""
 
 import re
 from collections.abc import Callable, Iterator

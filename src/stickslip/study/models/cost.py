@@ -1,4 +1,4 @@
-"""What a model costs by its size: told from the tables, before anything is meshed or read."""
+"""Estimated cost of a model, from its tables."""
 
 from math import prod
 from pathlib import Path

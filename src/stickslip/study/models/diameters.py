@@ -1,4 +1,4 @@
-"""What can be refused without a mesh of the nodal diameters that analyses by waves ask for."""
+"""Refusals without a mesh: nodal diameters of analyses by waves."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -1,4 +1,4 @@
-"""A part from the files of a finite-element program: one way from the reader to the part."""
+"""A part from the files of a finite-element program."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the fluid does to a model: refusals of its coefficients and pressures before any mesh is made."""
+"""Refusals without a mesh: aerodynamic coefficients and pressures."""
 
 from collections.abc import Iterator
 from pathlib import Path

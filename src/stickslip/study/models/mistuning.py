@@ -1,4 +1,4 @@
-"""From the tables [mistuning.NAME] to what a model holds of them."""
+"""The tables [mistuning.NAME] as part of a model."""
 
 from collections.abc import Mapping
 from pathlib import Path

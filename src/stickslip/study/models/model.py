@@ -1,4 +1,4 @@
-"""From the tables of a study to a model."""
+"""Study tables turned into a model."""
 
 import re
 from collections.abc import Mapping

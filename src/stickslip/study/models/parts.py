@@ -1,4 +1,4 @@
-"""From the tables [part.NAME] to parts; equal tables give the same part, so that nothing is meshed or reduced twice."""
+"""The tables [part.NAME] as parts; equal tables share one part."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""What can be refused of a run-up without a mesh: what does not go with the speed."""
+"""Refusals without a mesh: run-ups."""
 
 from collections.abc import Iterator
 from typing import Any

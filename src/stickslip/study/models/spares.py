@@ -1,4 +1,4 @@
-"""What is wrong with the tables [mistuning.NAME] before any mesh is made, and which parts stand in single sectors alone."""
+"""Refusals without a mesh: [mistuning.NAME]; and parts that stand in single sectors alone."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What can be refused without a mesh of wheels of different numbers of sectors that a join couples."""
+"""Refusals without a mesh: joined wheels of different numbers of sectors."""
 
 from collections.abc import Iterator
 

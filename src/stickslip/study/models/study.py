@@ -1,4 +1,4 @@
-"""A study: what is to be computed of which models."""
+"""A study: its analyses and the cases that [vary] spans."""
 
 import json
 from collections.abc import Mapping

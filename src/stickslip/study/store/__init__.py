@@ -1,1 +1,1 @@
-"""What a run keeps on the disk, whole whenever it is stopped."""
+"""Files of a run, whole whenever it is stopped."""

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and what is said when they cannot be."""
+"""Atomic writes, and messages where they fail."""
 
 import errno
 import os

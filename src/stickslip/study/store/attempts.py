@@ -1,4 +1,4 @@
-"""Files of jobs at work that several processes may write at once: each has its own, and goes on from the furthest of all.
+"""Journals that several processes may write at once: each has its own, and the furthest counts.
 
 No lock is needed, so this is good on shared folders whose locks are not to be relied on. What two processes find of the same job
 is the same to the last bit, so either may seal it.

@@ -1,4 +1,4 @@
-"""The results folder: made, tried out and locked before anything long begins."""
+"""The results folder: created, tested and locked before a run."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""The file of a job: everything it has finished, record by record.
+"""The journal of a job, record by record.
 
 One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
 leaves whole records only. Every record and note ends with its checksum, and a sealed file holds one of all of them. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of

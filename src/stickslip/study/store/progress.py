@@ -1,4 +1,4 @@
-"""What a run says, by the standard logging: lines, warnings, and how much of a job is done.
+"""Progress and messages of a run, by the standard logging.
 
 Records of progress carry ``fraction`` (0 to 1); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
 """

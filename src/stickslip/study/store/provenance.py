@@ -1,4 +1,4 @@
-"""Where a result comes from: attributes of the root of its tree."""
+"""Provenance of a result, as attributes of the tree's root."""
 
 import json
 import platform

@@ -1,4 +1,4 @@
-"""What is expensive of a model, kept for the next start: one file a content, whole or not at all."""
+"""Cache of expensive parts of a model on disk."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

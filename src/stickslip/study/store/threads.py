@@ -1,4 +1,4 @@
-"""How many threads BLAS takes, said before NumPy is loaded."""
+"""Number of BLAS threads, set before NumPy is imported."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""A job in a process of its own, that is watched: by the run, or by a worker on another machine, which loads no library for it."""
+"""Watched job processes, on this machine or another."""
 
 import logging
 import pickle

@@ -1,4 +1,4 @@
-"""A process for jobs, watched from outside: it may end at any time, and is ended where a job takes too long or too much memory."""
+"""A worker process, ended where a job takes too long or too much memory."""
 
 import logging
 import os

@@ -1,4 +1,4 @@
-"""Where jobs run: in this process, in worker processes of this machine, or on others; with the same numbers, to the last bit.
+"""Places for jobs: this process, worker processes, other machines; the same numbers to the last bit.
 
 Each executor is a function that gives `Hands`: what takes a job, and how many at a time.
 """

@@ -1,4 +1,4 @@
-"""What a job solves: the model at rest, its waves, and the modes that are followed."""
+"""The problem of a job: the model at rest, its waves, and the modes to follow."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

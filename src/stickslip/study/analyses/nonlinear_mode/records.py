@@ -1,4 +1,4 @@
-"""What is found on the way along nonlinear modes, as it is kept in the journal of a job, and the modes that it makes."""
+"""Journal records of nonlinear modes, and the modes made of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

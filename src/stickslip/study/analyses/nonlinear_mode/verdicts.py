@@ -1,4 +1,4 @@
-"""What is told of nonlinear modes: verdicts, and what the terminal prints."""
+"""Verdicts on nonlinear modes, and the terminal tables."""
 
 from collections.abc import Mapping, Sequence
 

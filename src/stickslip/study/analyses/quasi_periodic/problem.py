@@ -1,4 +1,4 @@
-"""What a job solves: the model, its loads sorted by frequency, and near which frequencies a second tone may be."""
+"""The problem of a job: the model, its loads sorted by frequency, and where a second tone may begin."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What is found at one first frequency, as it is kept in the journal of a job."""
+"""Journal records at one first frequency."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""What is told of motions with two frequencies: verdicts, and what the terminal prints."""
+"""Verdicts on motions with two frequencies, and the terminal tables."""
 
 from collections.abc import Iterator, Mapping
 

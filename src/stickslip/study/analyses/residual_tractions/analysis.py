@@ -1,4 +1,4 @@
-"""How far the response depends on residual tractions: bounds over a range of frequencies and of the resonance."""
+"""Bounds of the response over residual tractions, over frequencies and at the resonance."""
 
 from collections.abc import Iterator, Sequence
 

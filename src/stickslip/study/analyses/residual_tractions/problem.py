@@ -1,4 +1,4 @@
-"""The table [residual_tractions] of a study file, and what a job solves."""
+"""The problem of a job: the model and its bounds over residual tractions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

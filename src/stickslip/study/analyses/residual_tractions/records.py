@@ -1,4 +1,4 @@
-"""Bounds at a frequency as they are kept in the journal of a job."""
+"""Journal records of bounds at a frequency."""
 
 import json
 from dataclasses import dataclass, field

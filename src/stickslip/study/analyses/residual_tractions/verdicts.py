@@ -1,4 +1,4 @@
-"""What is told of bounds over residual tractions: verdicts, and what the terminal prints."""
+"""Verdicts on bounds over residual tractions, and the terminal tables."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Which of several peaks is the highest, where another one overtakes it, and where the highest is lowest."""
+"""The highest of several peaks over the parameter: crossings, and where the highest is lowest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

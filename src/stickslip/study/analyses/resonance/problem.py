@@ -1,4 +1,4 @@
-"""What a job of the resonances is given, picklable, and what it is solved with."""
+"""The problem of a job of the resonances, picklable."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

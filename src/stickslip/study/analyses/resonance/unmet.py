@@ -1,4 +1,4 @@
-"""Which peaks that were followed back from the last value a sweep at their own value does not meet."""
+"""Peaks followed backwards that a sweep at their own value does not meet."""
 
 from collections.abc import Sequence
 

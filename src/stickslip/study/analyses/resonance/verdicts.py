@@ -1,4 +1,4 @@
-"""What is told of resonances: verdicts, and what the terminal prints."""
+"""Verdicts on resonances, and the terminal tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Fast run-ups of a job: sweeps along the engine orders at given rates, and what they say beside the steady peaks."""
+"""Fast run-ups along the engine orders, beside the steady peaks."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a job of the run-up is given, picklable, and what it is solved with."""
+"""The problem of a job of the run-up, picklable."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

@@ -1,4 +1,4 @@
-"""The numbers of a finished run-up, and the dataset of all cases."""
+"""Variables of a run-up, and the dataset of all cases."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is said of a finished run-up: verdicts, and the tables of the terminal."""
+"""Verdicts on a run-up, and the terminal tables."""
 
 from collections.abc import Iterator
 

@@ -1,1 +1,1 @@
-"""What modes, Campbell and SAFE diagrams share: travelling waves of a wheel, or a structure as a whole."""
+"""Modes, Campbell and SAFE diagrams: travelling waves of a wheel, or a structure as a whole."""

@@ -1,4 +1,4 @@
-"""What results say of the model beside its frequencies: mass, size, axis, what rotation does, the skin for pictures."""
+"""The model in the results: mass, size, axis, effects of rotation, skin for pictures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

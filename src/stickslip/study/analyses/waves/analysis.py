@@ -1,4 +1,4 @@
-"""What the analyses by waves share: all but which waves they ask for, and what they make of them."""
+"""The common part of the analyses by waves."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence

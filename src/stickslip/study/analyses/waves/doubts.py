@@ -1,4 +1,4 @@
-"""What the user of a bladed disk's results should know: engine orders that were not judged, large displacements, poor bases."""
+"""Doubts about the results of a bladed disk: engine orders not judged, large displacements, poor bases."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A wave of a model in the flow: what [flutter] tells of it, and [modes] beside natural frequencies."""
+"""Flutter of a wave: for [flutter], and for [modes] beside natural frequencies."""
 
 from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.model import ContactsAs, Model

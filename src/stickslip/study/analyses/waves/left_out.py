@@ -1,4 +1,4 @@
-"""What of a model the frequencies of a diagram leave out; the user is told."""
+"""Effects that a frequency diagram neglects."""
 
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.verdict import Verdict

@@ -1,4 +1,4 @@
-"""Which travelling waves an analysis looks at, and how they are called."""
+"""Wave numbers of an analysis, and their names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What is computed for one travelling wave: its modes at a speed, or its branches over a range of speeds."""
+"""The solution for one travelling wave: its modes at a speed, or its branches over speeds."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What the terminal prints of the analyses by waves: tables of text, made of their datasets."""
+"""Terminal tables of the analyses by waves."""
 
 from collections.abc import Callable, Sequence
 
