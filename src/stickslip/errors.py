@@ -1,4 +1,4 @@
-"""The error types, and the shape of their messages: place, what is wrong, value got, remedy."""
+"""Error types, and the form of their messages: place, error, value, remedy."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping

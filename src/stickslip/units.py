@@ -1,4 +1,4 @@
-"""Units of engineers and the SI units of the library; what a dataclass's field may be, in Python and in a study file."""
+"""Engineering units, the SI units of the library, and allowed values of dataclass fields."""
 
 import math
 from dataclasses import MISSING, Field, dataclass, field, fields

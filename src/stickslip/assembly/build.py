@@ -1,4 +1,4 @@
-"""From a model to what solvers see: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
+"""Assembly of a model: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

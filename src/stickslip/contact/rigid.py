@@ -1,4 +1,4 @@
-"""Rigid contacts over one period: what is predicted is corrected to what the laws allow.
+"""Rigid contacts over one period: predicted forces projected on the contact laws.
 
 The prediction ``p`` is the force that would keep the contact as it is: the force that equilibrium asks for, plus a penalty times what
 the laws forbid, sliding along the tangents and penetration along the normal. Coulomb's and Signorini's laws are then projections,

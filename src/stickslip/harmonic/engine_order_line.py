@@ -1,4 +1,4 @@
-"""Dynamic stiffness along an engine-order line: at each frequency that of the speed that belongs to it."""
+"""Dynamic stiffness along an engine-order line, where the speed follows the frequency."""
 
 from dataclasses import dataclass, field, replace
 

@@ -1,4 +1,4 @@
-"""The periodic problem as a function of any parameter: a level of the load, a field of the contact laws, or what a user's function changes.
+"""The periodic problem as a function of any parameter: a load level, a field of the contact laws, or a user's function.
 
 A family gives the harmonic balance for each value of the parameter. All its members have the scales of the first one, so that an unknown
 means the same displacement for every value. Residual and Jacobian are those of the member; the derivative of the residual by the

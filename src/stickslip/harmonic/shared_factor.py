@@ -1,4 +1,4 @@
-"""One real factor that all harmonics and frequencies share, and what it lacks in the low modes.
+"""One real factor for all harmonics and frequencies, corrected in the low modes.
 
 With ``A = Z_0 + Bᵀ k B``, k the mean over the harmonics of what each keeps of the contacts, ``D_h = A + ihω C - (hω)² M + ...`` differs from
 A by inertia and damping. In modes far above the harmonics that is little; in the low ones, V, it is all:

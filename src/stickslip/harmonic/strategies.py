@@ -1,4 +1,4 @@
-"""Strategies by name, and what a study file is judged by before any of them is loaded; `stickslip.harmonic.selection` has them."""
+"""Names of the strategies, and their traits for study files; `stickslip.harmonic.selection` holds the strategies."""
 
 # name → file and class
 STRATEGIES = {

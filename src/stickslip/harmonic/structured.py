@@ -1,4 +1,4 @@
-"""The Jacobian of the harmonic balance as what it is made of, and the preconditioner that this suggests.
+"""The Jacobian of the harmonic balance by its parts, and its preconditioner.
 
 ``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``D_h = Z_h + K̂ʰʰ``, one
 complex matrix a harmonic or one real one for all of them (`harmonic.shared_factor`), therefore precondition the whole. From the lowest harmonic to the highest, each is solved with what those below

@@ -1,4 +1,4 @@
-"""Reduced structures kept on disk under the hash of what they were made from."""
+"""Reduced structures on disk, under the hash of their inputs."""
 
 import dataclasses
 import hashlib

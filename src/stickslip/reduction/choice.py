@@ -1,4 +1,4 @@
-"""How a part is reduced: the method, and how many modes it keeps."""
+"""The reduction of a part: method and number of modes."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol, get_args

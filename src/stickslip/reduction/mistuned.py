@@ -1,4 +1,4 @@
-"""A wheel whose sectors differ: the waves of the tuned wheel, and what single sectors add by few shares of their motion."""
+"""A mistuned wheel: waves of the tuned wheel, and low-rank deviations of single sectors."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Coordinates of a travelling wave in which contacts between sectors act on displacements: own ones, and those of the neighbours.
+"""Coordinates of a travelling wave in which contacts between sectors act on displacements of their own sector and its neighbours.
 
 Sector n + s does what sector n does, times ``exp(i s θ)``. A dof of a neighbour that a contact touches is therefore the own dof in
 another phase: where contacts know it in that phase alone, it is taken as the coordinate, a unitary change. A dof that contacts know in

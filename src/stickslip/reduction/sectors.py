@@ -1,4 +1,4 @@
-"""All sectors of a wheel at once, each on its own coordinates in its own axes: what waves make them, and what single sectors add.
+"""All sectors of a wheel, each on its own coordinates in its own axes, from the waves.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, appendix 1.

@@ -1,4 +1,4 @@
-"""What vibrates along an engine-order line: its matrices and static load are those of the speed that belongs to each frequency.
+"""A structure along an engine-order line: matrices and static load follow the speed.
 
 Matrices of a few speeds on the same coordinates, and polynomials in the square of the speed through them, times the speed for Coriolis
 forces. Those of solids are such polynomials themselves, of second degree, their load of third; what modes of a reduction add converges

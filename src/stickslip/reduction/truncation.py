@@ -1,4 +1,4 @@
-"""How many modes a reduction keeps: up to a frequency, or until the estimated error of its frequencies is small."""
+"""Number of modes of a reduction: up to a frequency, or up to an estimated error of the frequencies."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The waves of one sector: what they share is factorised once for all of them.
+"""All waves of one sector, with one factorisation of their common part.
 
 ``A_k = A_0 + e^{iθ} A_1 + e^{-iθ} A_1ᵀ`` with real matrices for each wave number of a real sector, θ its phase angle; A_1 couples few dofs of
 a sector with the neighbour's: the columns of its low face, and of contacts with the neighbour. With these and copies of them for the

@@ -1,4 +1,4 @@
-"""What compared designs tell beside forced responses: nonlinear modes, flutter margins, limit cycles."""
+"""Compared designs beside forced responses: nonlinear modes, flutter margins, limit cycles."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar

@@ -1,4 +1,4 @@
-"""What a page is made of besides figures: tables, words, and buttons that choose a case. Plain text, which the templates escape."""
+"""Content of a page beside figures: tables, texts, and buttons for the cases. Plain text, which the templates escape."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

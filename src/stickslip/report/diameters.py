@@ -1,4 +1,4 @@
-"""Frequencies over nodal diameters: what the nodal-diameter map and the SAFE diagram share."""
+"""Frequencies over nodal diameters, for the nodal-diameter map and the SAFE diagram."""
 
 import numpy as np
 import plotly.graph_objects as go

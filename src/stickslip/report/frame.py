@@ -1,4 +1,4 @@
-"""How a page is put together: its contents in the templates of `assets`, which escape all that is no markup of ours."""
+"""The page: contents in the templates of `assets`, which escape all foreign markup."""
 
 import re
 from base64 import b64decode, b64encode

@@ -1,4 +1,4 @@
-"""What went in, as the head of the page tells it: loads, contacts with the values of their laws, damping, cases, names."""
+"""Inputs at the head of the page: loads, contacts with the values of their laws, damping, cases, names."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The page of a fit to hysteresis loops: what was measured, what the law makes of it, and what is left."""
+"""The page of a fit to hysteresis loops: measurement, fitted law, and residual."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a section of the page holds, and the look all figures share."""
+"""Figures of a section, and their common style."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""A result as the report sees it: the dataset of a run, its analyses, and what it says of itself."""
+"""A result as the report sees it: dataset, analyses, and provenance."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What an analysis adds to the page: blocks of figures, tables and words, each a function of its dataset."""
+"""The section of an analysis on the page: figures, tables and texts, each a function of its dataset."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

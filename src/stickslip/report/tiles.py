@@ -1,4 +1,4 @@
-"""Patches of contact surfaces: what of a surface lies nearest to each of its points, no larger than the area of the point says."""
+"""Patches of contact surfaces: the part of a surface nearest to each contact point."""
 
 from collections.abc import Iterable, Sequence
 

@@ -1,4 +1,4 @@
-"""Periodic motion as any parameter varies: solution branches at one frequency, and what analyses along a parameter share."""
+"""Periodic motion over any parameter: solution branches at one frequency, and the common part of such analyses."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

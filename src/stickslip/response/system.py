@@ -1,4 +1,4 @@
-"""A structure with its contacts: what every analysis needs."""
+"""A structure with its contacts, the input of every analysis."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Fields that several laws have: what a study file says of them."""
+"""Fields that several laws share, with their study keys."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""When a sticking contact reaches its limit: the first zero of ``F = |X - z|² - L²``, bracketed so that none is missed.
+"""End of stick of a planar contact: the first zero of ``F = |X - z|² - L²``, bracketed so that none is missed.
 
 Value, slope and second derivative at a time and a bound M on the third derivative tell how far F stays below zero, or rises without
 turning. Steps of that length go from the beginning of stick to the first zero, which the last one brackets. Slip ends at a double zero

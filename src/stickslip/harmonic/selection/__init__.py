@@ -1,4 +1,4 @@
-"""Which harmonics a frequency needs: strategies, one a file; their names are in `stickslip.harmonic.strategies`."""
+"""Strategies of harmonic selection, one a file; their names are in `stickslip.harmonic.strategies`."""
 
 from functools import cache
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What each missing harmonic does to the outputs: residuals weighted by the adjoints of the outputs.
+"""Effect of each missing harmonic on the outputs: residuals weighted by the adjoints of the outputs.
 
 R. Becker and R. Rannacher, "An optimal control approach to a posteriori error estimation in finite element methods", Acta Numerica 10
 (2001) 1-102, sections 2 and 6, applied to harmonics in place of elements. The padded solution q of few harmonics leaves a residual r̃ in

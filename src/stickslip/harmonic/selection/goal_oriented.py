@@ -1,4 +1,4 @@
-"""Harmonics chosen one by one by what each does to the outputs: a goal-oriented estimate of the error (see `adjoint`)."""
+"""Harmonics chosen one by one by their effect on the outputs: a goal-oriented error estimate (see `adjoint`)."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, get_args

@@ -1,4 +1,4 @@
-"""How alike two Jacobians are, and how strongly harmonics are coupled (Gastaldi & Berruti 2017, sections 4.1 and 6.2)."""
+"""Similarity of two Jacobians, and strength of the coupling of harmonics (Gastaldi & Berruti 2017, sections 4.1 and 6.2)."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What strategies that look at spectra have in common: shares of energy, and supports made of them."""
+"""Shares of energy in a spectrum, and supports made of them."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""The seam of harmonic selection: what a strategy sees of a solved frequency, and what it says.
+"""The protocol of harmonic selection: its input at a solved frequency, and its verdict.
 
 A strategy is a frozen dataclass of its parameters with one method, `judge`. It is called once for every converged solution. What it
 answers serves both ways of going through the frequencies (Gastaldi & Berruti 2017, section 4.4): the *double passage*, in which a

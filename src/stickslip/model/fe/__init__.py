@@ -1,1 +1,1 @@
-"""Finite elements: solids, beams, prestress, rotation, and what solves with their matrices."""
+"""Finite elements: solids, beams, prestress, rotation, and solvers for their matrices."""

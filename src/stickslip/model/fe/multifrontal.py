@@ -1,4 +1,4 @@
-"""Cholesky factors of large sparse matrices, by dense algebra front by front, and what is left when some rows stay.
+"""Multifrontal Cholesky factors of large sparse matrices, and Schur complements.
 
 J. W. H. Liu, "The multifrontal method for sparse matrix solution: theory and practice", SIAM Review 34 (1992) 82-109.
 """

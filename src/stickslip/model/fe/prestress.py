@@ -1,4 +1,4 @@
-"""Strain energy of a loaded elastic solid to second order: what a static displacement adds to the stiffness.
+"""Stress stiffening: strain energy of a loaded elastic solid to second order.
 
 St. Venant-Kirchhoff's law, total Lagrangian: Green strain, second Piola-Kirchhoff stress ``λ tr(E) I + 2 G E``.
 """

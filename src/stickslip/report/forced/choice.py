@@ -1,4 +1,4 @@
-"""Where more harmonics were needed and why, in plain words."""
+"""Frequencies that needed more harmonics, and the reasons."""
 
 from collections import Counter
 

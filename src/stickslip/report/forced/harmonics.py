@@ -1,4 +1,4 @@
-"""Which harmonics were kept at which frequency, one row of panels a case."""
+"""Harmonics kept over frequency, one row of panels a case."""
 
 import numpy as np
 import plotly.graph_objects as go

@@ -1,4 +1,4 @@
-"""The head of the page: what came out of a forced response in four numbers, and what is doubtful."""
+"""The head of the page: four numbers of the forced response, and the doubts."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Motions in time where no balance stands for them: how their amplitude goes up and down, and what they are made of."""
+"""Motions without a period: envelope and spectrum in time."""
 
 import numpy as np
 import plotly.graph_objects as go

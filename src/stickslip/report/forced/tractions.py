@@ -1,4 +1,4 @@
-"""What residual tractions leave open, as a band on the figures of the forced response."""
+"""Bounds over residual tractions as a band on the figures of the forced response."""
 
 import numpy as np
 import plotly.graph_objects as go

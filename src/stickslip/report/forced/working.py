@@ -1,4 +1,4 @@
-"""Where friction works, on the page: the ends of the optimisation curves in words, and a band behind them."""
+"""Working range of the friction: the ends of the optimisation curves in words, and a band behind them."""
 
 import numpy as np
 import plotly.graph_objects as go

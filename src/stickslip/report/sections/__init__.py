@@ -1,1 +1,1 @@
-"""What each analysis adds to the page, one file an analysis; `stickslip.report.page` lists them."""
+"""Sections of the analyses, one a file; `stickslip.report.page` lists them."""

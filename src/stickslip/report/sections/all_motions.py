@@ -1,4 +1,4 @@
-"""All motions: every branch that was found in one figure, and where starts in time end."""
+"""All motions: every branch in one figure, and the basins of attraction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Limit cycles: damping and frequency over the amplitude, what is stable, and which wave wins in time."""
+"""Limit cycles: damping and frequency over the amplitude, stability, and the wave that wins in time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Synthesised responses over the backbone, peaks over the level, passages, and what is to be thought of them."""
+"""Synthesised responses over the backbone, peaks over the level, passages, and verdicts."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How what the jobs of an analysis found becomes its node: records as rows of arrays, cases side by side, the verdicts of all."""
+"""Records of the jobs of an analysis put together: arrays, cases side by side, verdicts."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any

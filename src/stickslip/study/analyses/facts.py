@@ -1,4 +1,4 @@
-"""What every analysis says of its model: mass, size, counts, axis, and what rotation does."""
+"""Facts of a model in every analysis: mass, size, counts, axis, effects of rotation."""
 
 from typing import Any
 

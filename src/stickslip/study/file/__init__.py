@@ -1,1 +1,1 @@
-"""The study file: its tables, and what is wrong with one."""
+"""The study file: its tables, and the errors in it."""

@@ -1,4 +1,4 @@
-"""The table [aero]: aerodynamic influence coefficients of a wheel, and what they belong to."""
+"""The table [aero]: aerodynamic influence coefficients of a wheel."""
 
 from typing import Annotated, Any, Literal, Self
 

@@ -1,4 +1,4 @@
-"""The tables [contact.NAME] and [join.NAME]; keys of laws are those of the laws' own dataclasses."""
+"""The tables [contact.NAME] and [join.NAME]; the keys of a law are the fields of its dataclass."""
 
 from functools import cache
 from typing import Annotated, Any, Literal, Self

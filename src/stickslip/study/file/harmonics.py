@@ -1,4 +1,4 @@
-"""The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
+"""The table [harmonics]: harmonics that are kept, and their selection."""
 
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, Self

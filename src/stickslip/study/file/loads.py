@@ -1,4 +1,4 @@
-"""The tables [load.NAME], [rotation] and [output]: what drives the model, and where its motion is reported."""
+"""The tables [load.NAME], [rotation] and [output]."""
 
 from os.path import realpath
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Everything a study file may hold: one section for each table, those of the analyses among them."""
+"""All tables of a study file, those of the analyses among them."""
 
 import json
 from functools import cache

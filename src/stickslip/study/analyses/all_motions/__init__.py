@@ -1,1 +1,1 @@
-"""All motions of a load: the table, what is searched, what is told of it."""
+"""All motions of a load: table, problem, records, verdicts."""

@@ -1,4 +1,4 @@
-"""What a search for all motions is given, picklable, and what it is solved with."""
+"""The problem of a search for all motions, picklable."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

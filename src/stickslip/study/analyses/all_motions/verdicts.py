@@ -1,4 +1,4 @@
-"""What is told of all motions: verdicts, and what the terminal prints."""
+"""Verdicts on all motions, and the terminal tables."""
 
 from collections.abc import Mapping
 

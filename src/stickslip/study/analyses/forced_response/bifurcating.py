@@ -1,4 +1,4 @@
-"""The bifurcations of a response, and the branches that leave there: what a job puts down of them."""
+"""Bifurcations of a response and the branches that leave there, as notes of a job."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a mistuned wheel's response is beside that of the tuned one: amplification, the largest blade, waves, localisation."""
+"""A mistuned response beside the tuned one: amplification, largest blade, waves, localisation."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What amplification and localisation of a mistuned wheel are measured by."""
+"""Reference amplitudes for amplification and localisation of a mistuned wheel."""
 
 import numpy as np
 

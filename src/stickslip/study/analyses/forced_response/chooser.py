@@ -1,4 +1,4 @@
-"""What chose the harmonics of a response, in words and as attributes of its dataset."""
+"""The harmonic selection of a response, in words and as attributes of its dataset."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a comparison of the balance with an integration in time has found, and what is said of it."""
+"""Comparison of the balance with a time integration: numbers and sentence."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""One case of a finished dataset, as the rules of its verdicts see it; what the dataset does not hold is NaN, empty or absent."""
+"""One case of a finished dataset, for the rules of its verdicts; missing variables are NaN, empty or absent."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

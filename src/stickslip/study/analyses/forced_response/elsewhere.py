@@ -1,4 +1,4 @@
-"""Other motions beside that of the response: looked for at the peak and beside it, told where they are stable or not known to be unstable."""
+"""Other motions at the peak and beside it, told where they are stable or not known to be unstable."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the response of a case will cost, told before anything long is computed."""
+"""Estimated cost of a case."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""What an examination of the stability costs, and whether it is begun: all sectors of a wheel count, each of which may do something else."""
+"""Estimated cost of a stability examination, and whether it is begun; all sectors of a wheel count."""
 
 from stickslip.assembly.unreduced import KEPT
 from stickslip.reduction.tuned import TunedWheel

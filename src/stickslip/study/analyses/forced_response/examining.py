@@ -1,4 +1,4 @@
-"""Of which points of a response the stability is examined: by case, first where it can change, as far as the work goes; and what follows for the others."""
+"""Choice of the points whose stability is examined, and the verdicts that follow for the others."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What a rule finds of a forced response, and how it names a check and a place."""
+"""A finding of a rule, and the names of checks and places in it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

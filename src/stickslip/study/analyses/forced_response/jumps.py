@@ -1,4 +1,4 @@
-"""Where a response jumps: neighbours of a branch that stand on different motions."""
+"""Jumps of a response: neighbours of a branch on different motions."""
 
 from dataclasses import dataclass
 from itertools import pairwise

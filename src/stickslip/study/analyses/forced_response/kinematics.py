@@ -1,4 +1,4 @@
-"""Whether the motion at a peak is small enough for linear kinematics: rotations, strain, slip over facets."""
+"""Limits of linear kinematics at the peak: rotations, strain, slip over facets."""
 
 import numpy as np
 

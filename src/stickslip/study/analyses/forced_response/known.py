@@ -1,4 +1,4 @@
-"""What only the model knows of a response, put down by its job: verdicts, and what ``stickslip check`` says beforehand."""
+"""Verdicts that need the model, put down by the job, and the warnings of ``stickslip check``."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Examinations of a job that may be stopped: what it has examined, and pieces of what it was at, are taken over by the next run."""
+"""Stability examinations of a job, resumed after an interruption."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How far a peak depends on the reduction, on the points of its contacts, and on their stiffness: the first two refined or made coarser, the peak found again."""
+"""Sensitivity of a peak to the reduction, the contact points and the contact stiffness: each is changed, and the peak solved again."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Whether the harmonics of a study are enough at all: each accepted solution towards the judging set of the most that the study keeps (``--verify-harmonics``)."""
+"""``--verify-harmonics``: each accepted solution towards the judging set of the most harmonics that the study keeps."""
 
 from dataclasses import dataclass, replace
 

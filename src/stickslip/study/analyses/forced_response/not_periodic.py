@@ -1,4 +1,4 @@
-"""Where a response has no periodic motion, or none that a machine stays at: what the motion in time is like."""
+"""Motions in time where no periodic motion was found, or none is stable."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What the physics of a case says before its numbers are praised: modes that nothing damps, bodies on contacts alone, what friction can do."""
+"""Physical limits of a case: undamped modes, parts held by contacts alone, the most that friction can do."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What makes a forced response doubtful though its equations are solved: physics that cannot be, the model itself, and other motions."""
+"""Rules on physics and model: impossible physics, sensitivity to the model, other motions."""
 
 from collections.abc import Iterator
 

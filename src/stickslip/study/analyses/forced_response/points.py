@@ -1,4 +1,4 @@
-"""The points of one case, put in order: what was accepted, its fields, its peak, its counts."""
+"""The points of a case in order: accepted solutions, their fields, the peak, counts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

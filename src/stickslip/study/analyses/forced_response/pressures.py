@@ -1,4 +1,4 @@
-"""What is told of pressure fields: force and moment before and after they are put on nodes, and modal forces."""
+"""Pressure fields in words: force and moment before and after the mapping, and modal forces."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What a job of the forced response is given, picklable, and what it is solved with."""
+"""The problem of a job of the forced response, picklable."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""How much the retention stiffness moves a peak."""
+"""Sensitivity of a peak to the retention stiffness."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What makes a forced response doubtful or wrong: one function a rule, each made from the variables of the finished dataset."""
+"""Rules of the verdicts on a forced response, each a function of the finished dataset."""
 
 from collections.abc import Iterator
 from itertools import pairwise

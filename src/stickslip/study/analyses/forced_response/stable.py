@@ -1,4 +1,4 @@
-"""Whether a motion of a response is stable: what its multipliers say, and what a motion in time adds."""
+"""Stability of a motion of a response: by multipliers, and by time integration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace

@@ -1,4 +1,4 @@
-"""The rules of stability: what is doubtful or wrong for it, and what unstable stretches and bifurcations are told."""
+"""Rules of stability: doubts, unstable stretches, bifurcations."""
 
 from collections.abc import Iterator
 

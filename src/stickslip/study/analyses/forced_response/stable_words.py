@@ -1,4 +1,4 @@
-"""What is told of the stability of a response: point by point where few were examined, else in runs along the branch."""
+"""The stability of a response in words: point by point where few were examined, else in runs along the branch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

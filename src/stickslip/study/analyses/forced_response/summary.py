@@ -1,4 +1,4 @@
-"""What the terminal says of a forced response: a row a case, where more harmonics were asked for, what was checked."""
+"""Terminal tables of a forced response: cases, frequencies that needed more harmonics, checks."""
 
 import numpy as np
 import xarray as xr

@@ -1,4 +1,4 @@
-"""The values of a case's variables, without the dimension ``case``: what a job puts down for the dataset."""
+"""Variables of one case, as a job puts them down for the dataset."""
 
 import json
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""The verdicts of a forced response: what the rules find, point by point and case by case."""
+"""Verdicts on a forced response, point by point and case by case."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The response of a case with what is known of its stability: each point examined once, an undecided peak integrated in time, points told by motions whose stability is known."""
+"""The response of a case with the stability of its points: examined once, undecided ones integrated in time, motions raised to more harmonics."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, replace

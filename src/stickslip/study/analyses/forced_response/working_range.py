@@ -1,4 +1,4 @@
-"""Where friction works: the ends of an optimisation curve, from its peaks and from what the contacts do there.
+"""The working range of the friction: the ends of an optimisation curve, from its peaks and the contacts.
 
 Along the curve, from the end where all contacts stick to the other, a damper first only stiffens, then takes the peak down, and at
 last lets go: its force no longer grows with the motion, and the peak over the force rises again.

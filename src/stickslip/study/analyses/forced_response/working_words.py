@@ -1,4 +1,4 @@
-"""What is said of the ends of an optimisation curve, on the page and on the terminal."""
+"""The working range in words, for the page and the terminal."""
 
 from collections.abc import Sequence
 

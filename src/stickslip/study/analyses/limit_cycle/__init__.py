@@ -1,1 +1,1 @@
-"""Limit cycles of a model: its table, what is solved, what is told of it."""
+"""Limit cycles: table, problem, records, verdicts."""

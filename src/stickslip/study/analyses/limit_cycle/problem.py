@@ -1,4 +1,4 @@
-"""What a job solves: the model, the waves and modes that are asked for, and those that grow by themselves."""
+"""The problem of a job: the model, the waves and modes asked for, and the unstable ones."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What is found of one mode of one wave, as it is kept in the journal of a job."""
+"""Journal records of one mode of one wave."""
 
 from dataclasses import dataclass
 

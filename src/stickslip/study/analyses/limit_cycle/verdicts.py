@@ -1,4 +1,4 @@
-"""What is told of limit cycles: verdicts, and what the terminal prints."""
+"""Verdicts on limit cycles, and the terminal tables."""
 
 from collections.abc import Mapping
 

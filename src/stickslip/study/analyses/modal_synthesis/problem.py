@@ -1,4 +1,4 @@
-"""What a job solves: the model with its loads, and the mode that answers."""
+"""The problem of a job: the model with its loads, and the mode."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

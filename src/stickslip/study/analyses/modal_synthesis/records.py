@@ -1,4 +1,4 @@
-"""What is found at one level of the loads, as it is kept in the journal of a job."""
+"""Journal records at one level of the loads."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What is told of synthesised responses: verdicts, and what the terminal prints."""
+"""Verdicts on synthesised responses, and the terminal tables."""
 
 from collections.abc import Mapping
 

@@ -1,1 +1,1 @@
-"""Nonlinear modes of a model: their table, what is solved, what is told of them."""
+"""Nonlinear modes: table, problem, records, verdicts."""

@@ -1,1 +1,1 @@
-"""Motions with two frequencies of a model: the table, what is solved, what is told of it."""
+"""Motions with two frequencies: table, problem, records, verdicts."""

@@ -1,1 +1,1 @@
-"""Resonance peaks over a design parameter: the table, what is solved, what is told of it."""
+"""Resonance peaks over a design parameter: table, problem, verdicts."""

@@ -1,1 +1,1 @@
-"""The run-up: its table, what a job is given, its numbers and its words."""
+"""The run-up: table, problem, values, verdicts."""

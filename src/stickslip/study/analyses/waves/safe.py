@@ -1,4 +1,4 @@
-"""Which modes engine orders can excite at one speed: the SAFE or interference diagram."""
+"""The SAFE or interference diagram: modes that engine orders can excite at one speed."""
 
 from collections.abc import Sequence
 
