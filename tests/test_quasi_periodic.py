@@ -13,11 +13,10 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.two_frequency_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic import in_time
-from stickslip.response.quasi_periodic.find import swept
+from stickslip.response.quasi_periodic.find import distinct, swept, tones_of_multipliers
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, off_by, two_tones, with_enough
-from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone, solve_free
 from stickslip.response.stability import stability
 from stickslip.response.time.marcher import step_work

@@ -23,13 +23,13 @@ from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
-from stickslip.report.forced.stability import stability
 from stickslip.report.forced.tables import peaks
 from stickslip.report.inputs import Varied, as_run, told
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.response import NEEDED, Response
+from stickslip.report.sections.forced_response import stability
 from stickslip.report.skin import edges, skin_picture
 from stickslip.report.tiles import patches, triangulated
 from stickslip.study.analyses.verdict import Verdict, to_json

@@ -24,7 +24,7 @@ from stickslip.response.stability.settled import Settled
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
-from stickslip.study.analyses.forced_response import examination, looked, stable, with_stability
+from stickslip.study.analyses.forced_response import examination, stable, with_stability
 from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.study.analyses.forced_response.comparison import Check
 from stickslip.study.analyses.forced_response.examining import (
@@ -180,7 +180,7 @@ def test_nothing_is_examined_or_integrated_twice(monkeypatch: pytest.MonkeyPatch
     whole = solved(asked)
     first = dataset(whole)
     times: list[str] = []
-    monkeypatch.setattr(looked, "examine", lambda *_: times.append("examined"))
+    monkeypatch.setattr(with_stability, "examine", lambda *_: times.append("examined"))
     monkeypatch.setattr(with_stability, "check_in_time", lambda *_: times.append("integrated"))
 
     class Kept:

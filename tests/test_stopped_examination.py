@@ -13,10 +13,10 @@ from test_flutter_wheel import forced
 from stickslip.response.stability import hill_stability
 from stickslip.response.stability.hill_segment import NODES, Segment
 from stickslip.study.analyses import analysis
-from stickslip.study.analyses.forced_response import looked
+from stickslip.study.analyses.forced_response import with_stability
 from stickslip.study.analyses.forced_response.bifurcating import Remembered
-from stickslip.study.analyses.forced_response.looked import Looked
 from stickslip.study.analyses.forced_response.stable import Examined, as_note
+from stickslip.study.analyses.forced_response.with_stability import Looked
 from stickslip.study.store.archive import decode, encode
 from stickslip.units import HZ
 
@@ -76,7 +76,7 @@ def test_points_and_pieces_are_taken_over_and_told(
         found = hill_stability(problem, accepted.point, keep).stability
         return Examined(accepted.point.omega, found.verdict, found.multiplier, found.multiplier_error, "")
 
-    monkeypatch.setattr(looked, "examine", examine)
+    monkeypatch.setattr(with_stability, "examine", examine)
     accepted: Any = SimpleNamespace(point=point)
     question: Any = SimpleNamespace(said=lambda text: text)
     straight = Looked(question, Journal())

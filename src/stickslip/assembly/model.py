@@ -1,6 +1,6 @@
 """The model: parts, contacts and loads."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -13,9 +13,8 @@ from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
-from stickslip.assembly.free_bodies import without_bodies
 from stickslip.assembly.load import Load, Output
-from stickslip.assembly.locations import Places
+from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.reduced import Spin, Steady, at_speed, damped, steady_of
@@ -34,10 +33,35 @@ from stickslip.model.facts import Facts, facts_of_parts, other_speeds, unlike_un
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.basis import in_coordinates, surviving_sets
 from stickslip.reduction.coupled_stages import Multistage
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
 from stickslip.response.forced.choices import AmplitudeOf
+
+
+def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
+    """Return a structure without the coordinates of some parts; `basis` leads back to all of them.
+
+    Raises
+    ------
+    InputError
+        If nothing is left.
+    """
+    if not names:
+        return structure
+    table = structure.dofs
+    stays = np.array([part not in names for part in table.part])
+    index = np.flatnonzero(stays)
+    if not index.size:
+        raise input_error(
+            "part", "nothing is left without free rigid bodies", "Let contacts stick, or give a part that is held."
+        )
+    into = picked(np.where(stays, np.cumsum(stays) - 1, -1), index.size)
+    if structure.basis is None:
+        structure = replace(structure, basis=picked(np.arange(structure.n), structure.n))
+    return in_coordinates(structure, into, table.take(index), surviving_sets(structure, index))
+
 
 ContactsAs = Literal["static", "stuck", "open"]
 

@@ -7,7 +7,7 @@ one that Newton sees.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, Protocol, TypeGuard
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,10 +15,57 @@ import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
-from stickslip.operators import Bordered, Corner, Jacobian, array_of, times
+from stickslip.operators import Bordered, Corner, Jacobian, JacobianOperator, array_of, times
 from stickslip.solve.gmres import gmres
-from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Dense, LinearSolver
-from stickslip.solve.preconditioned import Preconditioned, is_either, is_graded, is_preconditioned
+from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Assembling, Dense, LinearSolver, is_assembling
+
+Solve = Callable[[FloatArray], FloatArray]
+Product = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+class Preconditioned(JacobianOperator, Protocol):
+    """A Jacobian known by its products that can make a preconditioner."""
+
+    @property
+    def problem(self) -> object:
+        """What it is the Jacobian of; what is kept from one of its Jacobians serves the others."""
+        ...
+
+    def preconditioner(self) -> object | None:
+        """Return what of a new preconditioner is costly, such as factors; None if there is none."""
+        ...
+
+    def preconditioned_by(self, kept: object) -> tuple[Solve, Product]:
+        """Return how to solve ``P x = y``, with P from what was kept and from this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        ...
+
+
+class Graded(Preconditioned, Protocol):
+    """One that has a better preconditioner where its own does not do."""
+
+    def better_preconditioner(self, kept: object) -> object | None:
+        """Return what of a better preconditioner than `kept` is costly; None if there is none."""
+        ...
+
+
+class Either(Preconditioned, Assembling, Protocol):
+    """A Jacobian for which there is a choice."""
+
+
+def is_preconditioned(jac: Jacobian) -> TypeGuard[Preconditioned]:
+    """Whether a Jacobian makes a preconditioner."""
+    return hasattr(type(jac), "preconditioned_by")
+
+
+def is_either(jac: Jacobian) -> TypeGuard[Either]:
+    """Whether there is a choice."""
+    return is_preconditioned(jac) and is_assembling(jac)
+
+
+def is_graded(jac: Preconditioned) -> TypeGuard[Graded]:
+    """Whether a Jacobian has a better preconditioner, too."""
+    return hasattr(type(jac), "better_preconditioner")
+
 
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
 YOUNG = 12  # ... though not below that many iterations, which cost less than new factors

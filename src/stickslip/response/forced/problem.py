@@ -19,7 +19,6 @@ from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Str
 from stickslip.response.branch import Judged, following_vibration
 from stickslip.response.forced.amplitude import amplitudes, error_measure
 from stickslip.response.forced.choices import Stage
-from stickslip.response.forced.ill_posed import refuse_ill_posed
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import STEPS_BETWEEN, Following, Point, start_point, step_to
@@ -389,3 +388,22 @@ def forced_point(
     if not isinstance(balance, LocalBalance):
         return point
     return replace(point, kept=kept_by_dof(balance.by_dof, balance.harmonics).astype(np.int64))
+
+
+def refuse_ill_posed(system: System) -> None:
+    """Refuse a system without unknowns, and masses that are negative."""
+    if not system.retained.size:
+        raise input_error(
+            "System.interface",
+            "touches no dof that can move: nothing is left to solve for",
+            "Let a contact touch a free dof; without contacts the response is linear.",
+        )
+    structure = system.structure.of_harmonic(0)
+    mass = structure.mass.diagonal().real
+    if np.any(mass < 0):
+        dof = int(np.argmin(mass))
+        raise input_error(
+            "System.structure",
+            f"has the mass {mass[dof]:.6g} at {structure.dofs.labels[dof]}",
+            "A mass matrix is positive definite: check its source.",
+        )

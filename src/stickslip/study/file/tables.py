@@ -15,10 +15,24 @@ from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
 from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
-from stickslip.study.file.measured import Measured
 from stickslip.study.file.mistuning import MistuningTable
 from stickslip.study.file.parts import AnyPart, Copy
-from stickslip.study.file.section import Name, Section
+from stickslip.study.file.section import FilePath, Name, Section
+
+
+class Measured(Section):
+    """Measured peaks, drawn over the optimisation curves with their error bars."""
+
+    file: FilePath = Field(
+        description="CSV file of the measured peaks: a column named like the varied key, and columns such as peak_amplitude_um, "
+        "peak_amplitude_std_um, peak_frequency_hz"
+    )
+    source: str = Field(
+        "",
+        max_length=200,
+        description="where the points come from, such as a rig, a date or a report: shown on the page and kept in the result",
+    )
+
 
 VERSION = 2
 OF_THE_MODEL = frozenset(

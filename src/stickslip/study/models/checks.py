@@ -5,24 +5,29 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from stickslip.assembly.contact import GROUND, NEXT
+from stickslip.assembly.contact import ALONE, GROUND, NEXT, SPATIAL
 from stickslip.assembly.forces import engine_order
+from stickslip.contact.laws import ALL_LAWS
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
 from stickslip.model.dofs import is_numbered
+from stickslip.study.analyses import ANALYSES
 from stickslip.study.file.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
 from stickslip.study.file.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.section import Section
 from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables, original
-from stickslip.study.models.aero import knows_speeds
-from stickslip.study.models.areas import without_areas
+from stickslip.study.models.aero import aero_refusals, knows_speeds
 from stickslip.study.models.cost import too_large
-from stickslip.study.models.diameters import diameter_refusals
 from stickslip.study.models.files import MESHES
-from stickslip.study.models.fluid import fluid_refusals
-from stickslip.study.models.running import run_up_refusals
+from stickslip.study.models.pressure import pressure_refusals
 from stickslip.study.models.spares import mistuning_refusals
-from stickslip.study.models.stages import stage_refusals, staged
+
+_FLAT_CURVED = {
+    "flat": ("length_m", "flat_between_m"),
+    "curved": ("length_m", "curved_width_m"),
+}  # a wedge tells its areas itself
+
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
@@ -364,3 +369,123 @@ def _turns(table: Any) -> bool:
     if isinstance(table, FileModel):
         return table.file.lower().endswith(MESHES)
     return isinstance(table, PrismBlades | Sector)
+
+
+def without_areas(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaint about each key that a contact per area needs and its body does not have."""
+    contacts: dict[str, Any] = tables.contact
+    for name, contact in contacts.items():
+        head, _, side = contact.between[0].partition(".")
+        if contact.per != "area" or head not in tables.part:
+            continue
+        table: Any = tables.part[head]
+        while isinstance(table, Copy) and table.of in tables.part:
+            head, table = table.of, tables.part[table.of]
+        for key, value in _told(table, side).items():
+            if value is None:
+                yield input_error(
+                    f"part.{head}.{key}",
+                    f'is missing, and contact.{name} has per = "area": the points of {contact.between[0]!r} have no area',
+                    'Add it, or give the contact per = "interface" and the stiffness of the whole side.',
+                )
+
+
+def _told(table: Any, side: str) -> dict[str, Any]:
+    """Return what tells the areas of a side's points, by key; None where it is left out."""
+    if isinstance(table, FlatCurved):
+        return {key: getattr(table, key) for key in _FLAT_CURVED.get(side, ())}
+    if isinstance(table, Cylinder):
+        return {"contact_width_m": table.contact_width_m}  # type: ignore[attr-defined]
+    if isinstance(table, RigidBodyTable):
+        surface = table.surfaces.get(side)  # type: ignore[attr-defined]
+        return {} if surface is None else {f"surfaces.{side}.areas_m2": surface.areas_m2}
+    return {}
+
+
+def diameter_refusals(tables: Tables, sectors: int | None) -> Iterator[InputError]:
+    """Yield the complaints about nodal diameters that a wheel of so many sectors has not; None where only a file knows."""
+    for name in ("modes", "campbell"):
+        yield from _diameters(name, getattr(tables, name, None), sectors)
+
+
+def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputError]:
+    given = getattr(table, "nodal_diameters", None)
+    if sectors is None or not given:
+        return
+    if sectors == 1 and max(given) > 0:
+        yield input_error(
+            f"{name}.nodal_diameters",
+            "are of a wheel, and no part is a sector of one",
+            "Leave them out, or give the part its number of sectors.",
+        )
+        return
+    if max(given) > sectors // 2:
+        yield input_error(
+            f"{name}.nodal_diameters",
+            f"{max(given)} is above half of {sectors} sectors",
+            f"The nodal diameters go from 0 to {sectors // 2}.",
+        )
+        return
+    for order in getattr(table, "engine_orders", ()):
+        excited = min(order % sectors, -order % sectors)
+        if excited not in given:
+            yield input_error(
+                f"{name}.engine_orders",
+                f"{order} excites the nodal diameter {excited}, which is not computed",
+                "Add it to nodal_diameters, or leave those out: then all that are excited are computed.",
+            )
+
+
+def fluid_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
+    """Yield what is wrong with [aero] and with pressures of loads."""
+    yield from aero_refusals(tables, home, sectors)
+    yield from pressure_refusals(tables, home)
+
+
+def run_up_refusals(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about aerodynamic forces, mistuning and rigid contacts beside [run_up]."""
+    asked: Any = getattr(tables, "run_up", None)
+    contacts: dict[str, Any] = tables.contact
+    if asked is None:
+        return
+    if tables.aero is not None:
+        yield input_error(
+            "run_up",
+            "does not follow the aerodynamic forces of [aero] over speed",
+            "Leave [aero] out, or compute forced responses at single speeds.",
+        )
+    for name in tables.mistuning:
+        yield input_error(
+            "run_up",
+            f"is of tuned wheels, and [mistuning.{name}] makes sectors differ",
+            "Leave it out, or compute forced responses at single speeds.",
+        )
+    for name, table in contacts.items():
+        if asked.rate_rpm_per_s and ALL_LAWS[table.law] is RigidCoulomb:
+            yield input_error(
+                "run_up.rate_rpm_per_s",
+                f"needs contact forces that follow from gaps, and contact.{name}.law is {table.law}",
+                "Give the contact a stiffness, or leave the rates out.",
+            )
+
+
+def staged(tables: Tables) -> bool:
+    """Whether a join couples stages."""
+    return any(table.pairing == SPATIAL for table in tables.join.values())
+
+
+def stage_refusals(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about what nobody knows of coupled stages."""
+    if not staged(tables):
+        return
+    for name in ANALYSES:
+        if name != "modes" and getattr(tables, name, None) is not None:
+            why = f"is no question for stages, which a join by {SPATIAL} couples"
+            yield input_error(name, why, ALONE)
+    for name, table in tables.join.items():
+        if table.pairing != SPATIAL:
+            yield input_error(f"join.{name}.pairing", f"is {table.pairing} beside joins by {SPATIAL}", ALONE)
+    for name in tables.contact:
+        yield input_error(f"contact.{name}", "touches stages, which a join couples", ALONE)
+    if tables.rotation.speed_rpm > 0:
+        yield input_error("rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE)

@@ -1,20 +1,72 @@
 """The response of a case with the stability of its points: examined once, undecided ones integrated in time, motions raised to more harmonics."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from stickslip.response.forced.problem import ForcedPoint
-from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.analysis import Notes, Pieces
 from stickslip.study.analyses.forced_response.comparison import Check
 from stickslip.study.analyses.forced_response.examining import examined_points, neighbours_of, with_stable_peak
 from stickslip.study.analyses.forced_response.in_time import check_in_time, seconds_in_time
-from stickslip.study.analyses.forced_response.looked import Looked
 from stickslip.study.analyses.forced_response.points import Accepted, Response, collect
-from stickslip.study.analyses.forced_response.problem import IN_TIME, Question
-from stickslip.study.analyses.forced_response.stable import Examined, integrable, to_integrate, with_motion, with_raised
+from stickslip.study.analyses.forced_response.problem import IN_TIME, STABLE, Question
+from stickslip.study.analyses.forced_response.stable import (
+    Examined,
+    as_note,
+    examine,
+    from_note,
+    integrable,
+    to_integrate,
+    with_motion,
+    with_raised,
+)
 from stickslip.study.store.progress import LOG
+from stickslip.units import HZ
+
+
+@dataclass(eq=False)
+class Looked:
+    """Examines points in the order in which they are asked for.
+
+    Parameters
+    ----------
+    question
+        Of the case.
+    notes
+        Of the job.
+    count
+        Points that were asked for.
+    taken
+        Those of them that a stopped run had examined.
+    """
+
+    question: Question
+    notes: Notes
+    count: int = 0
+    taken: int = 0
+
+    def __call__(self, accepted: Accepted) -> Examined:
+        """Return what is found of the stability of a point."""
+        name, self.count = f"{STABLE}.{self.count}", self.count + 1
+        known, pieces = self.notes.get(name), Pieces(self.notes, name)
+        one = from_note(known, accepted.point) if known else examine(self.question, accepted, pieces.keep)
+        self.taken += bool(known)
+        self.notes.put(name, as_note(one))
+        pieces.give_up()
+        if pieces.taken:
+            self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")
+        return one
+
+    def tell(self) -> None:
+        """Say how many points were known."""
+        if self.taken:
+            self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")
+
+    def _say(self, text: str) -> None:
+        LOG.info(f"stability: {self.question.said(text)}")
+
 
 MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
 MOST_DOUBTS = 20  # other motions that are integrated in time,

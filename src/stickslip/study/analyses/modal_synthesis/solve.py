@@ -1,6 +1,6 @@
 """Synthesises the response at each level, judges whether the mode is alone, and solves directly where that is asked for."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from time import process_time
 from typing import Any
@@ -14,7 +14,9 @@ from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
+from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, nonlinear_mode
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
+from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.single_mode_flanks import along
@@ -26,13 +28,18 @@ from stickslip.response.nonlinear_modes.single_mode_validity import (
     peak_with_others,
 )
 from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, free_motions, resonances, synthesise
+from stickslip.response.self_excited.modes import StuckMode
+from stickslip.solve.status import Status
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.modal_synthesis.backbone_note import backbone_of
 from stickslip.study.analyses.modal_synthesis.percents import percent
 from stickslip.study.analyses.modal_synthesis.problem import Question
 from stickslip.study.analyses.modal_synthesis.records import SynthesisLevel
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres
+
+NOTE = "backbone"
+NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")
+
 
 TRUSTED, DOUBTFUL = 0.02, 0.05  # relative error that other modes may make of the peak
 COARSE = 0.08  # change of the peak by every second point of the backbone: four times what all points leave
@@ -279,3 +286,38 @@ def _design(own: ModalOscillator, question: Question) -> dict[str, Any]:
         "cycles": np.abs(own.displacement(free_motions(own), np.array([question.dof]))[:, 1, 0]),
         "homogeneous": int(is_homogeneous(own, question.discretisation)),
     }
+
+
+def backbone_of(question: Question, mode: StuckMode, notes: Notes) -> Backbone:
+    """Return the nonlinear mode of a job, from its notes where it is among them."""
+    known = notes.get(NOTE)
+    if known is not None:
+        return _read(question, mode, known)
+    system, rest, how = question.model.system, question.rest, question.discretisation
+    found = nonlinear_mode(system, rest, mode, question.dof, how, question.sweep)
+    whole = refined(found, question.model.load, how)
+    notes.put(NOTE, _written(whole))
+    return whole
+
+
+def _written(backbone: Backbone) -> dict[str, Any]:
+    points = backbone.solutions
+    most = max((p.order for p in points), default=0)
+    motion = np.zeros((len(points), most + 1, backbone.system.structure.n, 2))
+    for own, point in zip(motion, points, strict=True):
+        own[: point.order + 1, :, 0] = point.coefficients.real
+        own[: point.order + 1, :, 1] = point.coefficients.imag
+    numbers = {name: np.array([getattr(p, name) for p in points], dtype=float) for name in NUMBERS}
+    order = np.array([p.order for p in points], dtype=np.int64)
+    return {**numbers, "order": order, "motion": motion, "end": backbone.end}
+
+
+def _read(question: Question, mode: StuckMode, known: Mapping[str, Any]) -> Backbone:
+    points = []
+    for i, order in enumerate(known["order"]):
+        own = known["motion"][i, : int(order) + 1]
+        numbers = {name: float(known[name][i]) for name in NUMBERS}
+        points.append(
+            ModePoint(coefficients=own[..., 0] + 1j * own[..., 1], order=int(order), status=Status.CONVERGED, **numbers)
+        )
+    return Backbone(question.model.system, question.rest, mode, question.dof, tuple(points), str(known["end"]))

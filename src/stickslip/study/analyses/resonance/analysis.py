@@ -5,9 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.response.resonances.curve import peak_curve
+from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracker import represented_as
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
@@ -16,12 +18,52 @@ from stickslip.study.analyses.resonance.dataset import dataset
 from stickslip.study.analyses.resonance.envelope import heights, valley
 from stickslip.study.analyses.resonance.problem import Question, more_than, question_of
 from stickslip.study.analyses.resonance.table import ResonanceTable
-from stickslip.study.analyses.resonance.unmet import unmet_peaks
 from stickslip.study.analyses.resonance.verdicts import tables
 from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
 from stickslip.study.analyses.vibrating import represented
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres
+
+SWEEPS = 8  # at most, at values spread over those that are in question
+
+
+def unmet_peaks(
+    search: PeakSearch, points: Sequence[PeakPoint], values: Sequence[float], later: int
+) -> dict[str, FloatArray]:
+    """Return number and value of the peaks that no sweep was seen to reach.
+
+    Parameters
+    ----------
+    search
+        Of what.
+    points
+        All that was found.
+    values
+        In the order in which they were visited; the peaks of the last one were found by a sweep.
+    later
+        Number of the first peak that was followed back.
+    """
+    back = [p for p in points if p.peak >= later and p.converged and p.is_maximum]
+    places = [i for i, v in enumerate(values[:-1]) if any(p.value == v for p in back)]
+    share = np.linspace(0, len(places) - 1, min(SWEEPS, len(places)))
+    swept = sorted({places[int(i)] for i in share})
+    met: dict[tuple[int, int], bool] = {}
+    for i in swept:
+        here = [p for p in back if p.value == values[i]]
+        met |= {(p.peak, i): own for p, own in zip(here, met_by_a_sweep(search, here), strict=True)}
+
+    def reached(peak: int, i: int) -> bool:
+        # what sweeps meet on both sides of a value, one would meet there
+        before = max((j for j in swept if j <= i), default=-1)
+        after = min((j for j in swept if j >= i), default=len(values) - 1)
+        return met.get((peak, before), False) and met.get((peak, after), False)
+
+    unmet = [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]
+    return {
+        "peak": np.array([peak for peak, _ in unmet], dtype=float),
+        "value": np.array([v for _, v in unmet], dtype=float),
+    }
+
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
 UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
