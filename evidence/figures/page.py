@@ -10,7 +10,9 @@ from evidence.figures.timing import LEAST
 
 HEAD = """# The figures of Gastaldi and Berruti
 
-This page is for readers of the paper: does what it says hold for an open case? Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make pages NAME=figures` draws the counterparts of their figures for this
+Do the statements of Gastaldi and Berruti about their figures hold for an open case? **{tally}, of {count} statements.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
+
+Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make pages NAME=figures` draws the counterparts of their figures for this
 package's own two blades. It judges every statement of the paper about its figures on the case that tests it, and writes numbers, verdicts and reasons.
 
 - **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz): {first}.
@@ -26,8 +28,6 @@ whole command), medians of {repeats} interleaved repeats with their quartiles, a
 
 Numbers for two blades at the same ratio differ from page to page. Here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost`
 and {{doc}}`strategies` give theirs.
-
-**{tally}, of {count} statements.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
 """
 
 CAPTIONS = (
