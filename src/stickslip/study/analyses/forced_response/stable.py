@@ -242,9 +242,10 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
 
 
 def integrable(question: Question) -> bool:
-    """Whether motions are integrated in time without being asked to: where that is soon done, and nothing has structural damping."""
+    """Whether motions are integrated in time without being asked to: where their stability can be examined and that is soon done; not with structural damping."""
     system = question.model.system
-    return system.structure.of_harmonic(1).loss is None and seconds_in_time(system) < MOST_IN_TIME
+    can = not why_not(question) and system.structure.of_harmonic(1).loss is None
+    return can and seconds_in_time(system) < MOST_IN_TIME
 
 
 def why_not(question: Question) -> str:
