@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from stickslip.cli import app
 from stickslip.contact.interface import Interface
+from stickslip.errors import input_error
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
@@ -507,3 +508,17 @@ def test_the_wave_that_grows_is_named(
     monkeypatch.setattr(stable, "growing_wave", growing)
     accepted: Any = SimpleNamespace(point="point")
     assert stable._of_wave(asked, accepted, found) == said
+
+
+def test_a_model_that_has_no_form_in_time_keeps_its_doubts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An integration that nobody asked for ends no case."""
+
+    def refused(*_: object) -> Check:
+        raise input_error("time integration", "has no form for this", "None.")
+
+    asked = undecided(monkeypatch)
+    response = response_of(asked)
+    found = list(looked_at(asked, response).values())
+    assert any(e.verdict == "undecided" for e in found)
+    monkeypatch.setattr(with_stability, "integrated", refused)
+    assert with_stability._doubts_in_time(asked, response, found, SimpleNamespace()) == found  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.study.analyses.analysis import Notes, Pieces
 from stickslip.study.analyses.forced_response.comparison import Check
@@ -135,7 +136,10 @@ def _doubts_in_time(question: Question, response: Response, examined: list[Exami
         place = max(open_, key=lambda i: response.amplitude(response.accepted[i]))
         tried.add(place)
         own = response.accepted[place]
-        check = integrated(question, response, own, found, notes)
+        try:
+            check = integrated(question, response, own, found, notes)
+        except InputError:
+            break  # a model that has no form in time keeps its doubts
         found = [with_motion(e, check) if e.position == place else e for e in found]
         found = neighbours_of(question, response, found, [own.point.omega] * (check.motion == "attained"))
     return found
