@@ -39,6 +39,8 @@ from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
 from stickslip.response.forced.choices import AmplitudeOf
 
+ContactsAs = Literal["static", "stuck", "open"]
+
 
 def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
     """Return a structure without the coordinates of some parts; `basis` leads back to all of them.
@@ -61,9 +63,6 @@ def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
     if structure.basis is None:
         structure = replace(structure, basis=picked(np.arange(structure.n), structure.n))
     return in_coordinates(structure, into, table.take(index), surviving_sets(structure, index))
-
-
-ContactsAs = Literal["static", "stuck", "open"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -29,6 +29,7 @@ from stickslip.harmonic.rigid_jacobian import GapLaws, RigidJacobian, RigidLinea
 
 LOSS = 1e-13  # of the largest stiffness, as good as none
 LEAST = 5  # harmonics over which the mean is taken: with one alone a resonance would rule it
+SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +68,6 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     slope = -np.sum((inverse @ part.derivative[h]) * inverse.swapaxes(1, 2), axis=2)
     value = (highest + 1) / np.e * np.exp(-np.mean(np.log(h[:, None] ** 2 * np.abs(compliance)), axis=0))
     return Penalty(value, -value * np.mean((slope / compliance).real, axis=0))
-
-
-SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,8 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath, half_plane, torus_basis, torus_rates
 from stickslip.harmonic.two_frequency_side import TorusSide
 
+MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
+
 
 @dataclass(frozen=True, eq=False)
 class CombinedProducts:
@@ -62,9 +64,6 @@ class CombinedProducts:
     def block(self, harmonic: int) -> ComplexArray:
         """Return the matrix at a place, (n, n) in Fortran order, to be changed at will."""
         return np.array(self.stiffness[harmonic], order="F")
-
-
-MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
 
 
 @dataclass(frozen=True, eq=False)

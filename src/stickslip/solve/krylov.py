@@ -21,6 +21,14 @@ from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Assembling, De
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
+WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
+YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
+GAIN = 0.1  # share of the residual of a bordered system above which another correction does not help
+CREDIT = 4.0  # arrays that systems which were cheap by products pay for
+PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first time, and at most
+LEAST = 8  # products that are tried
+COARSE = 1e-4  # tolerance above which rounding is no part of what is left
+ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
 
 
 class Preconditioned(JacobianOperator, Protocol):
@@ -65,16 +73,6 @@ def is_either(jac: Jacobian) -> TypeGuard[Either]:
 def is_graded(jac: Preconditioned) -> TypeGuard[Graded]:
     """Whether a Jacobian has a better preconditioner, too."""
     return hasattr(type(jac), "better_preconditioner")
-
-
-WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
-YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
-GAIN = 0.1  # share of the residual of a bordered system above which another correction does not help
-CREDIT = 4.0  # arrays that systems which were cheap by products pay for
-PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first time, and at most
-LEAST = 8  # products that are tried
-COARSE = 1e-4  # tolerance above which rounding is no part of what is left
-ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
 
 
 @dataclass(eq=False)

@@ -27,6 +27,7 @@ from stickslip.study.analyses.forced_response.stable_words import FEW, all_lines
 from stickslip.study.analyses.forced_response.summary import orders_sentence, several_orders
 
 BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def stability(response: Response) -> list[Table | Words]:
@@ -68,9 +69,6 @@ def _error(error: float) -> str:
     if not np.isfinite(error):
         return "not known"
     return number(error, 2) if error > 0.0 else "none"
-
-
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def of_each_order(response: Response) -> Plot | None:

@@ -21,6 +21,13 @@ from stickslip.response.stability.hill_modes import HillModes, HillSide
 
 TOGETHER = 2.0  # times what changes of stiffness do to a mode alone: for what modes do together
 LET_GO = 0.1  # of its mean: a mode whose stiffness falls below is carried away by what is left, however it is damped
+NODES = 8  # of the polynomial through a segment of half a frequency
+AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring; or so many times as far:
+FARTHER = (1.0, 2.0, 4.0, 8.0)
+SMOOTH = 1e-4  # of its largest term: the last one of a polynomial that is near the matrix
+MOST_RINGING = 400  # modes of all harmonics together
+HALF = 0.5  # frequency of the motion: length of a segment
+Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
 
 def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
@@ -32,7 +39,7 @@ def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
 
 
 def _top(modes: HillModes, tangents: Sequence[ContactTangent]) -> float:
-    """Return that of the modes of one wave.
+    """Return the highest frequency, over that of the motion, of a mode of one wave that contacts may make grow; 0 where there is none.
 
     The amplitude of a fast mode grows at a sudden change of its stiffness by at most the root of the ratio of its frequencies before and
     after, at the phase that is worst, and decays by its damping. A mode for which the sum over the period is negative cannot grow.
@@ -62,14 +69,7 @@ def _relative(modes: HillModes, tangents: Sequence[ContactTangent]) -> FloatArra
     return np.asarray(total / modes.stiffness)
 
 
-NODES = 8  # of the polynomial through a segment of half a frequency
-AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring; or so many times as far:
-FARTHER = (1.0, 2.0, 4.0, 8.0)
-SMOOTH = 1e-4  # of its largest term: the last one of a polynomial that is near the matrix
-MOST_RINGING = 400  # modes of all harmonics together
 TAIL, MOST_TAIL = (3, 60)  # times the harmonics that are solved: up to which those beyond act, and so many at most
-HALF = 0.5  # frequency of the motion: length of a segment
-Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
 
 def not_kept(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:

@@ -292,4 +292,5 @@ def cost_line(question: Question) -> str:
         if seconds < MOST_IN_TIME
         else f"it stays undecided without --verify (about {seconds:.0f} s)"
     )
-    return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where the peak is undecided, {motion}"
+    which = "the peak" if question.examine == "peak" else "one"
+    return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where {which} is undecided, {motion}"

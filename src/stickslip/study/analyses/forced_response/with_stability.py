@@ -26,6 +26,10 @@ from stickslip.study.analyses.forced_response.stable import (
 from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
 
+MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
+MOST_DOUBTS = 20  # other motions that are integrated in time,
+SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
+
 
 @dataclass(eq=False)
 class Looked:
@@ -67,11 +71,6 @@ class Looked:
 
     def _say(self, text: str) -> None:
         LOG.info(f"stability: {self.question.said(text)}")
-
-
-MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
-MOST_DOUBTS = 20  # other motions that are integrated in time,
-SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
 
 
 def with_stability(
@@ -120,7 +119,7 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
             break
         check = integrated(question, peak, peak.top, found, notes)
         found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
-    if question.examine == "peak" or not integrable(question):
+    if question.examine in ("peak", "off") or not integrable(question):
         return found
     return _doubts_in_time(question, response, found, notes)
 

@@ -25,6 +25,8 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres
 
 SWEEPS = 8  # at most, at values spread over those that are in question
+UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
+HARMONICS = "harmonics"  # note: the highest peak with more of them
 
 
 def unmet_peaks(
@@ -66,8 +68,6 @@ def unmet_peaks(
 
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
-UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
-HARMONICS = "harmonics"  # note: the highest peak with more of them
 
 
 class ResonanceAnalysis:
