@@ -139,6 +139,36 @@ def test_deaths_are_counted_over_workers_that_are_lost(tmp_path: Path) -> None:
     assert "twice at the same place" in notes["set aside"]["text"]
 
 
+@pytest.mark.parametrize("ends", [True, False])
+def test_an_attempt_whose_job_another_process_has_sealed_ends_in_peace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, ends: bool
+) -> None:
+    made = order(tmp_path)
+    seal, others = JobJournal.seal, []
+
+    def overtaken(journal: JobJournal) -> None:
+        if not others:  # the other process is faster, and removes what is left of the job
+            others.append("at work")
+            watched(made.packed("other"), Dying(5, 0) if ends else Dying(3, 0), never, print)
+        seal(journal)
+
+    monkeypatch.setattr(JobJournal, "seal", overtaken)
+    if ends:
+        jobs.solve(made, made.file)
+    else:
+        watched(made.packed(), Dying(3, 0), never, print)
+    records, notes = read_sealed(made.sealed, made.analysis.record)
+    assert others
+    assert len(records) == 5
+    assert "twice at the same place" in notes["set aside"]["text"]
+    assert [p.name for p in made.sealed.parent.iterdir()] == [made.sealed.name]
+    # what is wrong with the file of a job that nobody has sealed is said
+    made.sealed.unlink()
+    monkeypatch.setattr(JobJournal, "seal", lambda journal: (made.file.unlink(), seal(journal)))
+    with pytest.raises(InputError, match="cannot be written"):
+        jobs.solve(made, made.file)
+
+
 def test_job_that_takes_too_long_is_set_aside_at_once(tmp_path: Path) -> None:
     made = order(tmp_path)
     watched(made.packed(), Dying(OutOfTime("it took more than 5 s")), never, print)

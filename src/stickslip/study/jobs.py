@@ -16,7 +16,15 @@ import numpy as np
 from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analyses.analysis import Analysis, Job
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
-from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind, new_owner, reached
+from stickslip.study.store.attempts import (
+    begin,
+    clear,
+    file_at_work,
+    left_behind,
+    new_owner,
+    reached,
+    until_sealed_elsewhere,
+)
 from stickslip.study.store.folder import token_file
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.progress import LOG, at_work
@@ -204,7 +212,7 @@ def _watched_here(order: Order, hands: Hands) -> None:
 def solve(order: Order, file: Path) -> None:
     """Solve a job, going on from what its file holds, and seal the file; runs in any process."""
     begin(order.sealed, file, order.analysis.record)
-    with JobJournal(file, order.analysis.record) as journal:
+    with until_sealed_elsewhere(order.sealed, file), JobJournal(file, order.analysis.record) as journal:
         journal.forget(ASIDE)
         solve_job(order.analysis, order.job, journal, order.checks)
         journal.seal()

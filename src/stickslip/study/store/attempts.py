@@ -5,7 +5,8 @@ is the same to the last bit, so either may seal it.
 """
 
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
@@ -42,6 +43,18 @@ def begin(sealed: Path, own: Path, record: type) -> None:
             return
         if _copied(path, own, record):
             return
+
+
+@contextmanager
+def until_sealed_elsewhere(sealed: Path, own: Path) -> Iterator[None]:
+    """End an attempt without an error where another process has sealed the job, and so removed this attempt's file."""
+    try:
+        yield
+    except InputError:
+        if own.exists() or not sealed.exists():
+            raise
+        LOG.info(f"{sealed.stem[:12]}: another process has finished this job")
+        clear(sealed)
 
 
 def clear(sealed: Path) -> None:

@@ -11,7 +11,7 @@ from time import monotonic
 from typing import Any
 
 from stickslip.errors import StickslipError
-from stickslip.study.store.attempts import clear, file_at_work, new_owner
+from stickslip.study.store.attempts import clear, file_at_work, new_owner, until_sealed_elsewhere
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.progress import LOG, OF_RECORDS
 from stickslip.study.store.provenance import library_versions
@@ -69,22 +69,23 @@ def watched(
     parcel: Parcel, cell: Cell, stopped: Callable[[], bool], hear: Callable[[logging.LogRecord], object]
 ) -> None:
     """Solve a job in a process of its own; set it aside where that takes too long, or ends twice at the same place."""
-    while True:
-        try:
-            cell.answer(unpacked, parcel, parcel.limits, stopped, hear)
-        except Stopped:
-            raise
-        except OutOfTime as ended:
-            return set_aside(parcel, str(ended))
-        except Ended as ended:
-            # kept in its file: the worker may be lost before it ends again
-            with JobJournal(parcel.file) as journal:
-                deaths = journal.died()
-            if deaths >= TWICE:
-                return set_aside(parcel, f"its process {ended}, twice at the same place")
-            hear(_line(f"{parcel.label}: its process {ended}; it is started again"))
-        else:
-            return None
+    with until_sealed_elsewhere(parcel.sealed, parcel.file):
+        while True:
+            try:
+                cell.answer(unpacked, parcel, parcel.limits, stopped, hear)
+            except Stopped:
+                raise
+            except OutOfTime as ended:
+                return set_aside(parcel, str(ended))
+            except Ended as ended:
+                # kept in its file: the worker may be lost before it ends again
+                with JobJournal(parcel.file) as journal:
+                    deaths = journal.died()
+                if deaths >= TWICE:
+                    return set_aside(parcel, f"its process {ended}, twice at the same place")
+                hear(_line(f"{parcel.label}: its process {ended}; it is started again"))
+            else:
+                return None
 
 
 def unpacked(parcel: Parcel) -> None:
@@ -106,7 +107,7 @@ def unknown(label: str, error: Exception) -> StickslipError:
 
 def set_aside(parcel: Parcel, why: str) -> None:
     """Seal a job as it is, with the reason; the next run goes on with it."""
-    with JobJournal(parcel.file) as journal:
+    with until_sealed_elsewhere(parcel.sealed, parcel.file), JobJournal(parcel.file) as journal:
         journal.put(ASIDE, {"text": f"the {parcel.question} job was set aside: {why}"})
         journal.seal()
     clear(parcel.sealed)
