@@ -32,7 +32,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.stability import motion_stability, stability
+from stickslip.response.stability import motion_stability, sampled_monodromy, stability
 from stickslip.response.stability.missing_harmonics import FARTHER, MIN_HARMONICS, corrected, solved_with
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
@@ -392,6 +392,30 @@ def test_sampled_and_located_contacts_go_together():
     assert located.resting == 2
     assert (sampled.transitions, sampled.resting) == (located.transitions, 0)
     assert matched(sampled.floquet.multipliers, located.floquet.multipliers) < 1e-9
+
+
+@pytest.mark.parametrize("n_modes", [2, 9])  # blocks of one sample, and of several
+def test_a_block_of_samples_is_one_sample_after_the_other(n_modes, monkeypatch):
+    rng = np.random.default_rng(n_modes)
+    structure, gaps = random_structure(rng, n_modes), random_gaps(rng, 3, 5)
+    laws = (
+        LAWS["lift-off"](),
+        CoupledCoulomb(k_t=0.9, k_n=0.7, mu=0.4, preload=0.6),
+        CubicSpring(k_t=0.9, k_w=0.5, k_n=0.4),
+    )
+    interface = Interface(("a", "b", "c"), laws, rng.standard_normal((9, n_modes)), np.array([0.7, 1.3, 0.4]))
+    of_blocks = motion_stability(structure, interface, gaps, 0.8)
+
+    def each_alone(kicks, first, shares, step, states):
+        for i, share in enumerate(shares, first):
+            kicks.kick(i, share, states)
+            states = step @ states
+        return states
+
+    monkeypatch.setattr(sampled_monodromy._Kicks, "advance", each_alone)
+    one_by_one = motion_stability(structure, interface, gaps, 0.8)
+    assert of_blocks.transitions == one_by_one.transitions > 0
+    assert matched(of_blocks.floquet.multipliers, one_by_one.floquet.multipliers) < 1e-9
 
 
 @pytest.mark.parametrize("law", ["variable normal force", "lift-off", "lift-off into stick"])

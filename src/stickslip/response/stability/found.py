@@ -162,11 +162,14 @@ class Stability:
 
 def partners(coarse: ComplexArray, fine: ComplexArray) -> ComplexArray:
     """Return the coarse multipliers in the order of the fine ones."""
-    left, out = coarse.copy(), np.empty_like(fine)
-    for i, value in enumerate(fine):
-        nearest = int(np.nanargmin(np.abs(left - value))) if np.any(~np.isnan(left)) else 0
-        out[i] = left[nearest]
-        left[nearest] = np.nan
+    apart = np.abs(fine[:, None] - coarse[None, :])
+    apart[np.isnan(apart)] = np.inf
+    out = np.full_like(fine, np.nan)
+    for i, row in enumerate(apart):
+        nearest = int(np.argmin(row))
+        if row[nearest] < np.inf:
+            out[i] = coarse[nearest]
+            apart[:, nearest] = np.inf
     return out
 
 

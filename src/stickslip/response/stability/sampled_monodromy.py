@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.response.stability.contact_states import ContactStates
+from stickslip.response.stability.kick_blocks import blocks, run
 from stickslip.response.stability.modal_states import ModalStates
 from stickslip.response.stability.monodromy import Disturbance, Sliders, identity
 from stickslip.response.stability.propagation import transition
@@ -40,8 +41,9 @@ class _Kicks:
     def __init__(self, modes: ModalStates, tangents: SampledTangents, weights: FloatArray, size: int) -> None:
         n, most = tangents.kept.shape
         self.modes, self.jac = modes, tangents.jac
-        self.by_rate = np.any(tangents.jac[:, :, :, 3:6] != 0.0, axis=(1, 2, 3))
-        self.alone = np.delete(tangents.jac, [3, 4, 5], axis=3)  # where no rate acts
+        self.by_rate = bool(np.any(tangents.jac[:, :, :, 3:6] != 0.0))
+        self.alone = np.ascontiguousarray(np.delete(tangents.jac, [3, 4, 5], axis=3))  # where no rate acts
+        self.factors = weights
         index = 3 * tangents.contacts[:, None] + np.arange(3)
         self.gaps = modes.gaps[index.reshape(-1)]  # (3 n, n_modes)
         self.rates = self.gaps * (modes.omega * modes.speed)
@@ -56,18 +58,32 @@ class _Kicks:
         self.states[self.real, size - 3 * n - own : size - 3 * n] = np.eye(own)
         self.before[:, :, size - 3 * n :] = np.eye(3 * n).reshape(n, 3, 3 * n)
 
+    def advance(self, first: int, shares: FloatArray, step: FloatArray, states: FloatArray) -> FloatArray:
+        """Return the states after the kicks at samples from `first` on, each with its share of the period, and a step after each."""
+        if self.by_rate:
+            for i, share in enumerate(shares, first):
+                self.kick(i, share, states)
+                states = step @ states
+            return states
+        half, (rows, columns) = self.modes.n, (len(self.gaps), states.shape[1])
+        gaps, push = np.zeros((rows, len(step))), np.zeros((len(step), rows))
+        gaps[:, :half], push[half : 2 * half] = self.gaps, self.pull
+        known, springs = np.zeros((self.alone.shape[3], columns)), self.springs.ravel()
+        for block in blocks(step, gaps, push, len(shares)):
+            samples = len(block.gaps)
+            now, forces = block.gaps @ states, np.zeros((samples, rows, columns))
+            contacts = self.alone[first : first + samples], self.factors, springs
+            run()(contacts, shares[:samples], block.answers, now, self.states, self.before, known, forces)
+            states = block.step @ states + block.pushed @ forces.reshape(-1, columns)
+            first, shares = first + samples, shares[samples:]
+        return states
+
     def kick(self, sample: int, share: float, motion: FloatArray) -> None:
         """Change velocities and states at a sample; velocities decay as the kick goes on."""
         n, half = len(self.states), self.modes.n
         gap = self.gaps @ motion[:half]
         now = gap.reshape(n, 3, -1)
-        if not self.by_rate[sample]:
-            after = self.alone[sample] @ np.concatenate([now, self.states, self.before], axis=1)
-            force = self.weights * after[:, :3].reshape(3 * n, -1) - self.springs * gap
-            motion[half:] -= share * (self.pull @ force)
-            self.states, self.before = after[:, 3:], now
-            return
-        jac, rate = self.jac[sample], self.rates @ motion[half:]
+        jac, rate = self.jac[sample], self.rates @ motion[half : 2 * half]
         known = np.concatenate([now, np.zeros_like(now), self.states, self.before], axis=1)
         force = self.weights * (jac[:, :3] @ known).reshape(3 * n, -1) - self.springs * gap
         damping = np.zeros((n, 3, n, 3))
@@ -77,7 +93,7 @@ class _Kicks:
         force = decayed(damping @ mobility) @ (force + damping @ rate)
         rate = rate - 0.5 * mobility @ force
         known[:, 3:6] = rate.reshape(n, 3, -1)
-        motion[half:] -= share * (self.pull @ force)
+        motion[half : 2 * half] -= share * (self.pull @ force)
         self.states, self.before = jac[:, 3:] @ known, now
 
     @property
@@ -133,10 +149,9 @@ def sampled_monodromy(
         stuck = contacts.sticks[here]
         matrix = modes.matrix(contacts.stiffness[here] + springs)
         exponential, driven = transition(matrix, pull[:, stuck], lengths[here])
-        force = driven @ now.sliders[stuck]
-        for _ in times[here]:
-            kicks.kick(sample, shares[sample], now.motion)
-            now.motion = exponential @ now.motion + force
-            sample += 1
+        step = np.block([[exponential, driven], [np.zeros(driven.T.shape), np.eye(driven.shape[1])]])
+        following = sample + times[here].size
+        moved = kicks.advance(sample, shares[sample:following], step, np.vstack([now.motion, now.sliders[stuck]]))
+        now.motion, sample = moved[: 2 * modes.n], following
         places.take_hold((here + 1) % count, now)
     return np.vstack([now.motion, now.sliders[held], kicks.rows])
