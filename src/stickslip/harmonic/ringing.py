@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.product import harmonic_means
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.factors import solved, with_contacts
@@ -65,17 +66,36 @@ def _gaps_of_each(
     low: HarmonicBalance, omega: float, harmonics: Harmonics, stiffness: ComplexArray, forces: ComplexArray
 ) -> FloatArray:
     """Return the largest gap (k,) of each harmonic, solved alone under contact forces (n_contacts, 3, k) with their mean stiffness (n_contacts, 3, 3)."""
-    side, rows = products(low.linear, (0, *harmonics), omega), low.rows
-    sizes = np.zeros(len(harmonics))
-    for place, h in enumerate(harmonics):
-        own = forces[:, :, place].reshape(-1)
-        pushed = np.zeros((2, low.linear.n))
-        rows.add_forces(np.stack([own.real, own.imag]), pushed)
-        matrix = with_contacts(side.block(h), stiffness, rows)
-        try:
-            moved = solved(matrix, pushed[0] + 1j * pushed[1])
-        except np.linalg.LinAlgError:
-            sizes[place] = np.inf  # a mode without damping
-            continue
-        sizes[place] = np.hypot(*rows.gaps(np.stack([moved.real, moved.imag]))).max(initial=0.0)
-    return sizes
+    side, rows, count = products(low.linear, (0, *harmonics), omega), low.rows, len(harmonics)
+    own = forces.reshape(-1, count).T
+    parts = np.zeros((2 * count, low.linear.n))
+    rows.add_forces(np.concatenate([own.real, own.imag]), parts)
+    pushed = parts[:count] + 1j * parts[count:]
+    matrices = [side.block(h) for h in harmonics]
+    if not any(map(scipy.sparse.issparse, matrices)):
+        shared = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
+        together = _solved_together(np.array(matrices) + shared, pushed)
+    else:
+        together = np.array(
+            [_solved(with_contacts(m, stiffness, rows), f) for m, f in zip(matrices, pushed, strict=True)]
+        )
+    gaps = rows.gaps(np.concatenate([together.real, together.imag]))
+    sizes = np.hypot(gaps[:count], gaps[count:]).max(axis=1, initial=0.0)
+    sizes[np.any(np.isinf(together), axis=1)] = np.inf
+    return np.asarray(sizes)
+
+
+def _solved_together(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Return the solutions (k, n) of systems (k, n, n); infinite where one is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.array([_solved(m, f) for m, f in zip(matrices, right, strict=True)])
+
+
+def _solved(matrix: Matrix, right: ComplexArray) -> ComplexArray:
+    """Return the solution (n,) of a system; infinite where it is singular: a mode without damping."""
+    try:
+        return np.asarray(solved(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.full_like(right, np.inf)
