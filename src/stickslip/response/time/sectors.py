@@ -8,6 +8,7 @@ forces are those of their frozen form, whose matrices are real for the wheel as 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import gcd
 
 import numpy as np
@@ -147,6 +148,7 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     return SectorsInTime(structure, contacts, HarmonicLoad(static, loads), motion, wheel)
 
 
+@lru_cache(maxsize=1)  # each point that is examined asks for it
 def whole_wheel(system: System) -> SectorsInTime:
     """Return all sectors of a system with a tuned wheel that has every wave, each of which may do something else; nothing drives them."""
     still = HarmonicLoad(np.zeros(system.structure.n))
