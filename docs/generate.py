@@ -88,7 +88,7 @@ def kept() -> dict[str, str]:
 
 def keys() -> dict[str, str]:
     """Return one table of keys for each table of the study file, by the pages that hold them."""
-    from stickslip.study.file.parts import PartTable
+    from stickslip.study.file.model.parts import PartTable
     from stickslip.study.file.tables import json_schema
 
     schema = json.loads(json_schema())
@@ -228,7 +228,7 @@ def laws() -> str:
 
 def variables_of_response() -> str:
     """Return the variables of a forced response, as the code that writes them lists them."""
-    from stickslip.study.analyses.forced_response.quantities import QUANTITIES
+    from stickslip.study.analyses.forced_response.records.quantities import QUANTITIES
 
     rows = [
         f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |" for name, q in QUANTITIES.items()
@@ -260,7 +260,7 @@ def variables_of_tractions() -> str:
 
 def variables_of_models() -> str:
     """Return what the linear analyses say of the model."""
-    from stickslip.study.analyses.waves.about import NUMBERS
+    from stickslip.study.analyses.waves.records.about import NUMBERS
 
     rows = [
         f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"

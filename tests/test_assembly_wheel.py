@@ -13,8 +13,8 @@ from stickslip.assembly.build import holding_points, linear_side
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.reduced import in_memory
-from stickslip.assembly.waves import _one_of
+from stickslip.assembly.parts.reduced import in_memory
+from stickslip.assembly.sides.waves import _one_of
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.pairing import node_to_segment

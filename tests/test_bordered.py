@@ -20,10 +20,10 @@ from stickslip.harmonic.parameters import law_field, load_level
 from stickslip.harmonic.peak import Driven, HorizontalTangent, PhaseQuadrature
 from stickslip.model.matrices import lumped
 from stickslip.operators import Bordered, array_of
-from stickslip.response.branch import following_vibration, steps_through
+from stickslip.response.continuation.branch import following_vibration, steps_through
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
-from stickslip.response.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.continuation import FOLD, start_point, trace
 from stickslip.solve.krylov import Krylov

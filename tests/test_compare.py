@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 import stickslip as ss
 from stickslip.api.comparison import Comparison
 from stickslip.cli import app
+from stickslip.report.compared.side_by_side import cards
 from stickslip.report.quantities import column
-from stickslip.report.side_by_side import cards
 
 STUDY = 'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'
 

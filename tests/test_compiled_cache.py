@@ -157,7 +157,7 @@ def attributes():
     return found
 
 before = attributes()
-import stickslip, stickslip.contact.march, stickslip.contact.events, stickslip.response.time.time_step
+import stickslip, stickslip.contact.march, stickslip.contact.events, stickslip.response.time.stepping.time_step
 after = attributes()
 print(*(key for key in before if before[key] != after.get(key)))
 
@@ -224,7 +224,8 @@ import numba
 from stickslip.contact import event_integrals, events, interface, intervals, march, prescribed_gap, product
 from stickslip.contact.planar import period, sensitivities, trajectory
 from stickslip.response import precompile
-from stickslip.response.time import start, time_step
+from stickslip.response.time.stepping import time_step
+from stickslip.response.time import start
 
 for task in precompile.TASKS.values():
     task()

@@ -21,8 +21,8 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.physics.contact_stiffness import stiffer, stiffness_slope
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
-from stickslip.study.analyses.forced_response.curve import Curve
-from stickslip.study.analyses.forced_response.physics_rules import contact_stiffness, told_of_model
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve
+from stickslip.study.analyses.forced_response.verdicts.physics_rules import contact_stiffness, told_of_model
 from tests.newton_bounds import FINE, unknowns_bound
 
 STEP = 1e-3

@@ -18,7 +18,7 @@ import stickslip as ss
 from stickslip.api.model import Model
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.full_field import nodes_of
-from stickslip.assembly.mistuning import BladeMistuning, Mistuning
+from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
 from stickslip.cli import app
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError

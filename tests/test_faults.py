@@ -174,7 +174,7 @@ def test_a_result_goes_to_a_file_with_an_ending_or_into_a_folder(tmp_path: Path)
 
 
 def test_without_a_place_for_compiled_functions_the_package_loads_and_says_so_once() -> None:
-    program = "import stickslip.contact.slider, stickslip.response.time.time_step"
+    program = "import stickslip.contact.slider, stickslip.response.time.stepping.time_step"
     nowhere = {"NUMBA_CACHE_DIR": "/dev/null/none", "NUMBA_CACHE_LOCATOR_CLASSES": "_UserProvidedCacheLocator"}
     ended = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, env={**os.environ, **nowhere}

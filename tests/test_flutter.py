@@ -13,11 +13,11 @@ import scipy.linalg
 from test_assembly_wheel import SECTORS, sector_model, shrouded_sector
 
 import stickslip as ss
-from stickslip.assembly.aero_forces import largest_displacements, phases
-from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import flow_around
-from stickslip.assembly.mistuning import BladeMistuning, Mistuning
+from stickslip.assembly.fluid.aero_forces import largest_displacements, phases
+from stickslip.assembly.fluid.aerodynamics import Aerodynamics
+from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
 from stickslip.model.structure_file import save_structure

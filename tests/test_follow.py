@@ -13,8 +13,8 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.adaptive_continuation import AUDITED, follow
-from stickslip.response.branch import OneLevel, Route, branch_of, steps_through
+from stickslip.response.continuation.adaptive_continuation import AUDITED, follow
+from stickslip.response.continuation.branch import OneLevel, Route, branch_of, steps_through
 from stickslip.response.forced.along import ForcedCurve
 from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.system import System

@@ -10,8 +10,8 @@ from models import lifting
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response import starting_solutions
-from stickslip.response.branch import BACKWARD
+from stickslip.response.continuation import starting_solutions
+from stickslip.response.continuation.branch import BACKWARD
 from stickslip.response.forced import from_time
 from stickslip.response.forced.response import Sweep, accepted_pairs, accepted_points, forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton

@@ -37,13 +37,18 @@ from stickslip.solve.status import Status
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced_response import analysis as analysis_module
 from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.curve import Curve
 from stickslip.study.analyses.forced_response.estimate import estimate, retained_of
-from stickslip.study.analyses.forced_response.known import mixed_places, no_resonance, nothing_pressed, off_engine_order
+from stickslip.study.analyses.forced_response.physics.known import (
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+    off_engine_order,
+)
 from stickslip.study.analyses.forced_response.problem import Question, question_of
-from stickslip.study.analyses.forced_response.rules import twice_the_harmonics
 from stickslip.study.analyses.forced_response.section import ForcedResponse
 from stickslip.study.analyses.forced_response.sweeps import sweep_of
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve
+from stickslip.study.analyses.forced_response.verdicts.rules import twice_the_harmonics
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import case_variables
@@ -318,7 +323,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert 0 < np.count_nonzero(own > 0.01) < own.size
     doubted = ["are predicted to change it by" in text for text in data.verdict_reason.values.tolist()]
     np.testing.assert_array_equal(doubted, own > 0.01)
-    monkeypatch.setattr("stickslip.study.analyses.forced_response.points.own_error", lambda *_: float("nan"))
+    monkeypatch.setattr("stickslip.study.analyses.forced_response.records.points.own_error", lambda *_: float("nan"))
     data = dataset(solved(asked))
     assert np.all(data.verdict.values >= 1)
     assert data.verdict_reason[0].item().startswith("its harmonics were not examined")

@@ -11,10 +11,10 @@ from test_cli import done, refused
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.forces import force_of
+from stickslip.assembly.joints.static_equilibrium_check import refuse_pulled
+from stickslip.assembly.joints.unconstrained_bodies import refuse_unheld, unheld
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
-from stickslip.assembly.static_equilibrium_check import refuse_pulled
-from stickslip.assembly.unconstrained_bodies import refuse_unheld, unheld
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

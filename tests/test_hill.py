@@ -18,9 +18,9 @@ from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.stability import hill_exponents, hill_stability, motion_stability, stability, wave_disturbances
-from stickslip.response.stability.contact_states import located_states
-from stickslip.response.stability.contact_tangent import contact_tangents
-from stickslip.response.stability.hill_segment import Segment
+from stickslip.response.stability.flow_map.contact_states import located_states
+from stickslip.response.stability.hill_method.contact_tangent import contact_tangents
+from stickslip.response.stability.hill_method.hill_segment import Segment
 from stickslip.response.system import System
 from stickslip.solve.status import Status
 from stickslip.study.store.archive import decode, encode

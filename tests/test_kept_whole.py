@@ -53,7 +53,7 @@ OTHERS = {
 
 @pytest.fixture(autouse=True)
 def _few(monkeypatch):
-    monkeypatch.setattr("stickslip.assembly.unreduced.LARGEST_INTERIOR", 20)
+    monkeypatch.setattr("stickslip.assembly.sides.unreduced.LARGEST_INTERIOR", 20)
 
 
 def study(folder, more, whole='[reduction]\nmethod = "none"\n'):
@@ -78,7 +78,7 @@ def test_the_response_of_parts_kept_whole_from_the_command_line(tmp_path, monkey
     code, told = said("export", path.parent / "results", "--steps", "2")
     assert code == 0, told
     assert list((path.parent / "results").rglob("*.vtu"))
-    monkeypatch.setattr("stickslip.assembly.unreduced.LARGEST_INTERIOR", 5000)
+    monkeypatch.setattr("stickslip.assembly.sides.unreduced.LARGEST_INTERIOR", 5000)
     other = study(tmp_path / "condensed", FORCED)
     code, told = said("run", other, "--no-report")
     assert code == 0, told

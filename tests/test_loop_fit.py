@@ -13,7 +13,7 @@ import stickslip as ss
 from stickslip.cli import app
 from stickslip.contact.prescribed_gap import forces_along
 from stickslip.errors import InputError
-from stickslip.study.file.contacts import ContactTable
+from stickslip.study.file.model.contacts import ContactTable
 
 K, LIMIT = 2e7, 50.0
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from stickslip.response.stability import low_rank_flow
-from stickslip.response.stability.contact_states import ContactStates
-from stickslip.response.stability.low_rank_flow import HYPERBOLA, NODES, REACH, FullFlow, LowRankFlow, flow_of
-from stickslip.response.stability.modal_states import ModalStates
-from stickslip.response.stability.propagation import transition
+from stickslip.response.stability.flow_map import low_rank_flow
+from stickslip.response.stability.flow_map.contact_states import ContactStates
+from stickslip.response.stability.flow_map.low_rank_flow import HYPERBOLA, NODES, REACH, FullFlow, LowRankFlow, flow_of
+from stickslip.response.stability.flow_map.modal_states import ModalStates
+from stickslip.response.stability.flow_map.propagation import transition
 
 N = 52  # coordinates
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from evidence.models.many_contacts import two_plates
-from stickslip.response.time.marcher import Marcher, prepared
+from stickslip.response.time.stepping.marcher import Marcher, prepared
 
 OMEGA = 2.0 * np.pi * 1067.0
 PERIODS, STEPS = 2, 256

@@ -27,10 +27,10 @@ import stickslip as ss
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.deviations import Blade, blade_alone, blade_alone_hz
-from stickslip.assembly.mistuned import changed
-from stickslip.assembly.point_laws import at_rest
-from stickslip.assembly.wheel_modes import wheel_modes
+from stickslip.assembly.joints.point_laws import at_rest
+from stickslip.assembly.sides.deviations import Blade, blade_alone, blade_alone_hz
+from stickslip.assembly.sides.mistuned import changed
+from stickslip.assembly.sides.wheel_modes import wheel_modes
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
 from stickslip.harmonic.dynamic_stiffness import condense

@@ -14,7 +14,7 @@ from stickslip.errors import InputError
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.mistuned import mistuned_wheel
-from stickslip.study.analyses.forced_response.bounds import localisation, whitehead
+from stickslip.study.analyses.forced_response.records.bounds import localisation, whitehead
 
 ROOT = Path(__file__).parents[1]
 TURN = 2 * np.pi

@@ -19,7 +19,7 @@ from stickslip.reduction.coupled_stages import Flange, constraints, multistage, 
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
-from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.records.results import WaveModes
 from stickslip.study.analyses.waves.stages import flange_doubts, unreached
 from stickslip.study.store.netcdf import one_case
 

@@ -7,7 +7,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.assembly.assembling import assemble
-from stickslip.assembly.more_modes import with_more_modes
+from stickslip.assembly.parts.more_modes import with_more_modes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -24,7 +24,7 @@ from stickslip.response.forced.response import accepted_points, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.physics.fewer_points import halved
 from stickslip.response.system import System
-from stickslip.response.time.marcher import step_work
+from stickslip.response.time.stepping.marcher import step_work
 from tests.solid_models import box
 
 LENGTH, THICKNESS = 0.1, 0.004

@@ -11,12 +11,12 @@ from test_assembly_wheel import LAW, SECTORS, SPEED, STEEL, answered, shrouded_s
 from test_cli import done, refused
 
 from stickslip.api.result import Result
-from stickslip.assembly import wheel
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
-from stickslip.assembly.part_copies import place_of, placed_body
+from stickslip.assembly.parts.part_copies import place_of, placed_body
+from stickslip.assembly.sides import wheel
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis

@@ -19,8 +19,8 @@ from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, off_by, two_tones, with_enough
 from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone, solve_free
 from stickslip.response.stability import stability
-from stickslip.response.time.marcher import step_work
 from stickslip.response.time.start import rest, start_from_harmonics
+from stickslip.response.time.stepping.marcher import step_work
 from stickslip.solve.krylov import Krylov
 
 MASS = np.eye(2)

@@ -40,9 +40,9 @@ from stickslip.study.analyses.run_up import values
 from stickslip.study.analyses.run_up.fast import name_of
 from stickslip.study.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
 from stickslip.study.analyses.run_up.values import dataset as of_run_up
-from stickslip.study.analyses.waves.about import STATIC, skin_note, told
-from stickslip.study.analyses.waves.about import _static as static_numbers
 from stickslip.study.analyses.waves.of_wheel import variables as of_wheel
+from stickslip.study.analyses.waves.records.about import STATIC, skin_note, told
+from stickslip.study.analyses.waves.records.about import _static as static_numbers
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
 from stickslip.units import DEG, HZ, RPM

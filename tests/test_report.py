@@ -17,8 +17,8 @@ from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, w
 from stickslip.api.model import Model
 from stickslip.errors import InputError
 from stickslip.report.content import Table
-from stickslip.report.forced.bodies import body_motion, rigid_bodies
 from stickslip.report.forced.choice import choice, flagged_ranges
+from stickslip.report.forced.contacts.bodies import body_motion, rigid_bodies
 from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.harmonics import kept_harmonics
@@ -26,12 +26,12 @@ from stickslip.report.forced.head import cards
 from stickslip.report.forced.tables import peaks
 from stickslip.report.inputs import Varied, as_run, told
 from stickslip.report.page import plots, report_file, report_html
+from stickslip.report.pictures.skin import edges, skin_picture
+from stickslip.report.pictures.tiles import patches, triangulated
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.sections.forced_response import stability
-from stickslip.report.skin import edges, skin_picture
-from stickslip.report.tiles import patches, triangulated
 from stickslip.study.analyses.verdict import Verdict, to_json
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: the page is not opened")

@@ -9,7 +9,7 @@ from synthetic_result import KEY, synthetic_result, tree_of
 
 import stickslip as ss
 from stickslip.study.analyses.analysis import named
-from stickslip.study.analyses.forced_response.quantities import flags
+from stickslip.study.analyses.forced_response.records.quantities import flags
 
 
 def test_a_response_is_a_row_a_point_and_output() -> None:

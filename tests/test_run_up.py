@@ -11,7 +11,7 @@ from test_assembly_wheel import H, sector_model, shrouded_sector
 
 import stickslip as ss
 from stickslip.assembly.assembling import assemble
-from stickslip.assembly.engine_order_sweep import over_speed, with_engine_order
+from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import InputError
 from stickslip.reduction.choice import Reduction
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response

@@ -16,7 +16,7 @@ from stickslip.response.time.sectors import SectorsInTime, all_sectors
 from stickslip.response.time.shooting import ShootingResult, shoot
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping
-from stickslip.study.analyses.forced_response.in_time import integrated
+from stickslip.study.analyses.forced_response.stability.in_time import integrated
 
 
 def ring(order: int) -> tuple[ss.System, ss.HarmonicLoad]:

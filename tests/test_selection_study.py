@@ -23,7 +23,7 @@ from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.response import Response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.study.analyses.forced_response import analysis
-from stickslip.study.analyses.forced_response.retention import NO_SHIFT
+from stickslip.study.analyses.forced_response.physics.retention import NO_SHIFT
 from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study

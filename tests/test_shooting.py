@@ -14,10 +14,10 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.time.floquet import Floquet, floquet
-from stickslip.response.time.marcher import prepared
 from stickslip.response.time.period_map import PeriodMap, period_map
 from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, rest
+from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, integrate
 
 GRIFFIN_GAP = np.array([[1.0], [0.0], [0.0]])

@@ -248,7 +248,7 @@ def test_parts_kept_whole_are_not_condensed_where_they_are_too_large(tmp_path, m
     (tmp_path / "study.toml").write_text(text)
     model = read_study(tmp_path / "study.toml").model()
     condensed = assemble(model, 1)
-    monkeypatch.setattr("stickslip.assembly.unreduced.LARGEST_INTERIOR", 100)
+    monkeypatch.setattr("stickslip.assembly.sides.unreduced.LARGEST_INTERIOR", 100)
     whole = assemble(model, 1)
     assert not isinstance(condensed.system.structure, Unreduced)
     assert isinstance(whole.system.structure, Unreduced)

@@ -32,7 +32,8 @@ from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.stability import motion_stability, sampled_monodromy, stability
+from stickslip.response.stability import motion_stability, stability
+from stickslip.response.stability.flow_map import sampled_monodromy
 from stickslip.response.stability.missing_harmonics import FARTHER, MIN_HARMONICS, corrected, solved_with
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton

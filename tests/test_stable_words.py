@@ -10,7 +10,7 @@ from stickslip.response.bifurcations.found import Bifurcations
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.time.floquet import Floquet
-from stickslip.study.analyses.forced_response.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
+from stickslip.study.analyses.forced_response.stability.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
 
 
 def points(words: str) -> list[Point]:

@@ -11,12 +11,12 @@ import pytest
 from test_flutter_wheel import forced
 
 from stickslip.response.stability import hill_stability
-from stickslip.response.stability.hill_segment import NODES, Segment
+from stickslip.response.stability.hill_method.hill_segment import NODES, Segment
 from stickslip.study.analyses import analysis
-from stickslip.study.analyses.forced_response import with_stability
-from stickslip.study.analyses.forced_response.bifurcating import Remembered
-from stickslip.study.analyses.forced_response.stable import Examined, as_note
-from stickslip.study.analyses.forced_response.with_stability import Looked
+from stickslip.study.analyses.forced_response.stability import with_stability
+from stickslip.study.analyses.forced_response.stability.bifurcating import Remembered
+from stickslip.study.analyses.forced_response.stability.stable import Examined, as_note
+from stickslip.study.analyses.forced_response.stability.with_stability import Looked
 from stickslip.study.store.archive import decode, encode
 from stickslip.units import HZ
 

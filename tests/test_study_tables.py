@@ -23,9 +23,9 @@ from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import named
-from stickslip.study.file.contacts import ContactTable, keys_of
 from stickslip.study.file.example import Kind, example_text
 from stickslip.study.file.harmonics import Harmonics
+from stickslip.study.file.model.contacts import ContactTable, keys_of
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
 from stickslip.study.file.tables import json_schema, study_tables

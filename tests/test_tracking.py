@@ -19,10 +19,10 @@ from stickslip.harmonic.parameters import AtFrequency, law_field, load_level
 from stickslip.harmonic.peak import Driven, PeakProblem
 from stickslip.model.matrices import lumped
 from stickslip.operators import array_of
-from stickslip.response.branch import following_vibration, steps_through
+from stickslip.response.continuation.branch import following_vibration, steps_through
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.parameter import Discretisation, branch_in_parameter, parameter_family
 from stickslip.response.resonances.tracking import smallest_peak, track_peak
-from stickslip.response.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.continuation import start_point, trace
 from stickslip.solve.krylov import Krylov

@@ -11,9 +11,9 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
-from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import LONGEST_MEMORY, remaining_change
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
+from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 

@@ -10,7 +10,7 @@ from verdict_rows import INF, NAN, above, case_of, check
 
 from stickslip.response.nonlinear_modes.single_mode_validity import Isolation
 from stickslip.study.analyses.all_motions import verdicts as motions
-from stickslip.study.analyses.forced_response.jumps import jumps
+from stickslip.study.analyses.forced_response.verdicts.jumps import jumps
 from stickslip.study.analyses.limit_cycle import verdicts as cycles
 from stickslip.study.analyses.modal_synthesis import verdicts as synthesis
 from stickslip.study.analyses.modal_synthesis.percents import percent

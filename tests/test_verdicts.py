@@ -14,8 +14,8 @@ from test_cli import done
 
 import stickslip as ss
 from stickslip.report.frame import concluded
-from stickslip.study.analyses.forced_response.curve import Curve, branch_length
-from stickslip.study.analyses.forced_response.verdicts import said_once, verdicts, with_levels
+from stickslip.study.analyses.forced_response.verdicts.cases import said_once, verdicts, with_levels
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve, branch_length
 from stickslip.study.analyses.verdict import (
     LEVELS,
     POINT_LEVELS,

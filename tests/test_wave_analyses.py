@@ -26,7 +26,7 @@ from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.study.analyses.analysis import named
 from stickslip.study.analyses.verdict import stored
-from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.records.numbers import Wheel
 from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome

@@ -11,9 +11,9 @@ import stickslip as ss
 from stickslip.report.forced.curves import optimisation
 from stickslip.report.forced.working import where_friction_works
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.curve import Curve
-from stickslip.study.analyses.forced_response.rules import not_periodic
-from stickslip.study.analyses.forced_response.working_range import (
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve
+from stickslip.study.analyses.forced_response.verdicts.rules import not_periodic
+from stickslip.study.analyses.forced_response.verdicts.working_range import (
     REGIMES,
     ContactsAtPeak,
     CurvePeak,
@@ -24,7 +24,7 @@ from stickslip.study.analyses.forced_response.working_range import (
     working_range,
     working_ranges,
 )
-from stickslip.study.analyses.forced_response.working_words import range_lines, range_sentences
+from stickslip.study.analyses.forced_response.verdicts.working_words import range_lines, range_sentences
 
 MASS, SPRING, DASHPOT, STIFFNESS, LIMIT = 1.0, 4e4, 4.0, 2e4, 2.0  # kg, N/m, N s/m, N/m, N
 KEY = "load.shaker.force_n"

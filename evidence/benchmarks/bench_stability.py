@@ -27,7 +27,7 @@ from stickslip.harmonic.fourier import to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import accepted_points
 from stickslip.response.stability import hill_exponents, motion_stability, stability
-from stickslip.response.stability.contact_states import located_states
+from stickslip.response.stability.flow_map.contact_states import located_states
 from stickslip.solve.newton_method import newton
 
 HERTZ = (165.0, 184.0)

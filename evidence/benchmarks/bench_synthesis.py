@@ -12,6 +12,7 @@ import numpy as np
 
 from evidence.models.two_blades import two_blades
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
@@ -24,7 +25,6 @@ from stickslip.response.nonlinear_modes.single_mode_validity import (
 from stickslip.response.nonlinear_modes.synthesis import synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
-from stickslip.response.starting_solutions import plain_sweep
 from stickslip.study.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 
 COARSER = 2.0

@@ -35,11 +35,11 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.response.time.marcher import prepared
 from stickslip.response.time.period_map import period_map
 from stickslip.response.time.settling import period_harmonics
 from stickslip.response.time.shooting import ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, start_from_harmonics
+from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 HERTZ = (165.0, 184.0)
@@ -294,7 +294,7 @@ def compilation() -> dict[str, Any]:
     """Compile what `shoot` needs beside the laws in a process with an empty cache."""
     program = (
         "from time import process_time\nimport stickslip.response.time.shooting\n"
-        "from stickslip.response.time.time_step import run_steps\n"
+        "from stickslip.response.time.stepping.time_step import run_steps\n"
         "clock = process_time(); run_steps(); print(process_time() - clock)"
     )
     with TemporaryDirectory() as folder:

@@ -23,7 +23,7 @@ from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
-from stickslip.study.analyses.forced_response.points import Accepted, collect
+from stickslip.study.analyses.forced_response.records.points import Accepted, collect
 
 TRUTHS = (63, 31)  # harmonics
 SAMPLES = 8  # a harmonic, at least

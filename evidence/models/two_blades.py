@@ -15,8 +15,8 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.study.analyses.analysis import Case, Job, Solved
 from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.points import Response, collect
 from stickslip.study.analyses.forced_response.problem import Question, question_of
+from stickslip.study.analyses.forced_response.records.points import Response, collect
 from stickslip.study.analyses.verdict import LEVELS, Level
 from stickslip.study.jobs import solve_job
 from stickslip.study.models.study import read_study

@@ -13,7 +13,7 @@ from evidence.validation.compare import Record, bound, left_out, record
 from evidence.validation.reference_data import chain_mode, has_complete
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.branch import Followed, Judged
+from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, mode_point, nonlinear_mode
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.nonlinear_modes.modal_amplitude import by_energy

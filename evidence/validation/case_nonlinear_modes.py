@@ -23,7 +23,7 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.response.branch import Followed, Judged
+from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import ModePoint, mode_point
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.nonlinear_modes.modal_amplitude import Phase, by_energy

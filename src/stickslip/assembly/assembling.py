@@ -3,9 +3,9 @@
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble_tuned
 from stickslip.assembly.load import refuse_second
-from stickslip.assembly.mistuned import assemble_mistuned
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import Store, in_memory
+from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.sides.mistuned import assemble_mistuned
 
 
 def assemble(

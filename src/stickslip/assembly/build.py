@@ -9,22 +9,22 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
-from stickslip.assembly.contact_point_coordinates import in_points
 from stickslip.assembly.coordinates import coordinates
+from stickslip.assembly.fluid.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
-from stickslip.assembly.interface_modes import KEY, on_shapes
+from stickslip.assembly.joints.contact_point_coordinates import in_points
+from stickslip.assembly.joints.interface_modes import KEY, on_shapes
+from stickslip.assembly.joints.pairs import Pairs
+from stickslip.assembly.joints.rigid import held_gaps, in_gaps, refuse_mixed_gaps
+from stickslip.assembly.joints.static_equilibrium_check import refuse_pulled
+from stickslip.assembly.joints.unconstrained_bodies import held_warnings
 from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.pairs import Pairs
-from stickslip.assembly.reduced import Store, in_memory, reduced_parts
+from stickslip.assembly.parts.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.response_request import Asked, asked, centrifugal_of_bodies, excitation, static_forces
-from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps
-from stickslip.assembly.static_equilibrium_check import refuse_pulled
-from stickslip.assembly.unconstrained_bodies import held_warnings
-from stickslip.assembly.unreduced import as_it_is, refuse_rigid
-from stickslip.assembly.waves import reduced_sector
+from stickslip.assembly.sides.unreduced import as_it_is, refuse_rigid
+from stickslip.assembly.sides.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
 from stickslip.errors import input_error

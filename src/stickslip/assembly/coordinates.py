@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.assembly.ties import Ties
+from stickslip.assembly.joints.ties import Ties
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure

@@ -8,10 +8,10 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import linear_side, system_of
 from stickslip.assembly.locations import AXES
-from stickslip.assembly.mistuned import of_all, system_of_all
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import with_ways_back
+from stickslip.assembly.parts.reduced import with_ways_back
 from stickslip.assembly.response_request import asked
+from stickslip.assembly.sides.mistuned import of_all, system_of_all
 from stickslip.assembly.skin import mesh_dofs
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.assembly.pressure import PressureField
+from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.errors import input_error
 
 

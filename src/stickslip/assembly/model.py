@@ -8,23 +8,23 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
+from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
+from stickslip.assembly.joints.pairs import Pairs, pair_contacts
+from stickslip.assembly.joints.surface_checks import refuse_contacts_of_dofs, refuse_joined
+from stickslip.assembly.joints.ties import Ties, tie_joins
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.locations import Places, picked
-from stickslip.assembly.mistuning import Mistuning
-from stickslip.assembly.pairs import Pairs, pair_contacts
-from stickslip.assembly.reduced import Spin, Steady, at_speed, damped, steady_of
-from stickslip.assembly.shared_rotation import joined_displacements
+from stickslip.assembly.parts.reduced import Spin, Steady, at_speed, damped, steady_of
+from stickslip.assembly.sides.mistuning import Mistuning
+from stickslip.assembly.sides.shared_rotation import joined_displacements
+from stickslip.assembly.sides.stages import is_staged, stages_of
+from stickslip.assembly.sides.wheel import Neighbours, neighbours, with_joins
 from stickslip.assembly.skin import on_skin, skin_of
-from stickslip.assembly.stages import is_staged, stages_of
 from stickslip.assembly.statics import StaticState, static_state
-from stickslip.assembly.surface_checks import refuse_contacts_of_dofs, refuse_joined
-from stickslip.assembly.ties import Ties, tie_joins
-from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
 from stickslip.contact.law import held_stiffness
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.report.content import Table
-from stickslip.report.model import of_first_case
 from stickslip.report.node import Node
+from stickslip.report.pictures.model import of_first_case
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
 from stickslip.report.response import Response
 

@@ -9,13 +9,13 @@ import plotly.graph_objects as go
 import xarray as xr
 
 from stickslip.errors import input_error
-from stickslip.report import model
 from stickslip.report.cases import cases_of, varied
 from stickslip.report.content import Table, Words, chooser
-from stickslip.report.forced.tractions import with_bands
+from stickslip.report.forced.contacts.tractions import with_bands
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
 from stickslip.report.inputs import inputs, study_of
 from stickslip.report.node import Node
+from stickslip.report.pictures import model
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, versions

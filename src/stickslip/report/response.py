@@ -17,10 +17,10 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
-from stickslip.study.analyses.forced_response.curve import Curve, branch_length, of_largest_blade, peak_output
-from stickslip.study.analyses.forced_response.quantities import MOTION
-from stickslip.study.analyses.forced_response.stable_words import said_of
+from stickslip.study.analyses.forced_response.records.quantities import MOTION
+from stickslip.study.analyses.forced_response.stability.stable_words import said_of
 from stickslip.study.analyses.forced_response.summary import MEASURED
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve, branch_length, of_largest_blade, peak_output
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")

@@ -13,9 +13,9 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.adaptive_continuation import follow
-from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
-from stickslip.response.starting_solutions import without_branch
+from stickslip.response.continuation.adaptive_continuation import follow
+from stickslip.response.continuation.branch import OneLevel, Route, branch_of, following_vibration, steps_through
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Newton, Solution

@@ -10,8 +10,8 @@ from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.parameter import Discretisation
-from stickslip.response.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
 from stickslip.solve.status import Status

@@ -9,7 +9,7 @@ import xarray as xr
 
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
-from stickslip.study.analyses.forced_response.working_range import with_regimes
+from stickslip.study.analyses.forced_response.verdicts.working_range import with_regimes
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks

@@ -15,7 +15,7 @@ from time import monotonic
 from typing import Any
 
 from stickslip import __version__
-from stickslip.assembly.surface_checks import TENFOLD
+from stickslip.assembly.joints.surface_checks import TENFOLD
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES

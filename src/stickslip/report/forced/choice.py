@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase
 from stickslip.report.content import Table, Words
-from stickslip.report.forced.contact import states
+from stickslip.report.forced.contacts.contact import states
 from stickslip.report.quantities import NONE, number, predicted
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced_response.summary import cost_sentence

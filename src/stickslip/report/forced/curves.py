@@ -11,14 +11,14 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.forced.bifurcations import mark_bifurcations
+from stickslip.report.forced.contacts.tractions import draw_bands, draw_peak_bands
 from stickslip.report.forced.measured import measured_of
-from stickslip.report.forced.tractions import draw_bands, draw_peak_bands
 from stickslip.report.forced.working import shade_working_range
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced_response.summary import amplitude_name
-from stickslip.study.analyses.forced_response.working_range import MIN_PEAKS
+from stickslip.study.analyses.forced_response.verdicts.working_range import MIN_PEAKS
 from stickslip.study.analyses.verdict import POINT_LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel

@@ -10,7 +10,7 @@ from stickslip.report.forced.curves import abscissa
 from stickslip.report.plot import GRID, INK, MUTED, Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import number, percent, scale_for
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.bounds import BOUND
+from stickslip.study.analyses.forced_response.records.bounds import BOUND
 
 GAP = "gap in m"  # at the end of the name of a deviation that is no relative one
 MIN_HISTOGRAM_CASES = 5  # cases from which on their amplifications make a histogram

@@ -7,8 +7,8 @@ from stickslip.report.cases import first_number
 from stickslip.report.content import Words
 from stickslip.report.plot import GRID
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.working_range import MIN_PEAKS, working_ranges
-from stickslip.study.analyses.forced_response.working_words import TITLE, range_lines
+from stickslip.study.analyses.forced_response.verdicts.working_range import MIN_PEAKS, working_ranges
+from stickslip.study.analyses.forced_response.verdicts.working_words import TITLE, range_lines
 
 
 def where_friction_works(response: Response) -> Words | None:

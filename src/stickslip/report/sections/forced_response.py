@@ -6,15 +6,15 @@ import plotly.graph_objects as go
 from stickslip.report.content import Table, Words
 from stickslip.report.forced import tables
 from stickslip.report.forced.bifurcations import bifurcations
-from stickslip.report.forced.bodies import bodies, energy
 from stickslip.report.forced.choice import choice
-from stickslip.report.forced.contact import chosen_case, hysteresis_t, hysteresis_w, state_map
+from stickslip.report.forced.contacts.bodies import bodies, energy
+from stickslip.report.forced.contacts.contact import chosen_case, hysteresis_t, hysteresis_w, state_map
+from stickslip.report.forced.contacts.surface import surface_map
 from stickslip.report.forced.curves import abscissa, frequency_response, low_order, most, optimisation
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
 from stickslip.report.forced.not_periodic import amplitudes_in_time, statistics_in_time
-from stickslip.report.forced.surface import surface_map
 from stickslip.report.forced.wheel import blades, peaks_of_blades, statistics, wheel_at_peak
 from stickslip.report.forced.wheel_motion import wheel_in_motion
 from stickslip.report.forced.working import what_is_needed, where_friction_works
@@ -23,7 +23,7 @@ from stickslip.report.quantities import NONE, fixed, number, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
 from stickslip.response.stability.modulus import modulus_text
-from stickslip.study.analyses.forced_response.stable_words import FEW, all_lines
+from stickslip.study.analyses.forced_response.stability.stable_words import FEW, all_lines
 from stickslip.study.analyses.forced_response.summary import orders_sentence, several_orders
 
 BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided

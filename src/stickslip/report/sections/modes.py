@@ -5,11 +5,11 @@ import plotly.graph_objects as go
 
 from stickslip.report.content import Table, Words
 from stickslip.report.diameters import diameter_axes, mode_lines
-from stickslip.report.mistuned_modes import modes_of_wheel
+from stickslip.report.pictures.mistuned_modes import modes_of_wheel
+from stickslip.report.pictures.shapes import mode_shapes
 from stickslip.report.plot import INK, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.shapes import mode_shapes
 from stickslip.report.waves import NEEDED, Waves
 
 

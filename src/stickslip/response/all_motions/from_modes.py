@@ -11,8 +11,8 @@ from stickslip.harmonic.linear import one_structure
 from stickslip.model.modes import normal_modes
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.continuation.homotopies import GrowingLoad, growing_load
 from stickslip.response.forced.problem import ForcedProblem
-from stickslip.response.homotopies import GrowingLoad, growing_load
 
 PHASES = 8  # of a free motion against the load; a shift by a period of the load gives the same motion
 SPAN = (1e-2, 1e2)  # amplitudes that are looked at, in units of the largest known motion

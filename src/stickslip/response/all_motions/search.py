@@ -29,12 +29,12 @@ from stickslip.response.all_motions.found import SPENT, AllMotions, Kind, Origin
 from stickslip.response.all_motions.from_modes import mode_starts
 from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
-from stickslip.response.branch import following_vibration, steps_through, vibration_weights
+from stickslip.response.continuation.branch import following_vibration, steps_through, vibration_weights
+from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.settled import stability
-from stickslip.response.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point

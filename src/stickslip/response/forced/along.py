@@ -14,11 +14,11 @@ from stickslip.harmonic.ringing import ringing
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.operators import Jacobian
-from stickslip.response.adaptive_continuation import follow
-from stickslip.response.branch import Followed, Judged, Kind, Route
+from stickslip.response.continuation.adaptive_continuation import follow
+from stickslip.response.continuation.branch import Followed, Judged, Kind, Route
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.response.starting_solutions import without_branch
 from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
@@ -240,7 +240,7 @@ def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Ite
     Yields
     ------
     ForcedPoint
-        Points not in `done`, their stage the kind of `stickslip.response.adaptive_continuation.Followed`.
+        Points not in `done`, their stage the kind of `stickslip.response.continuation.adaptive_continuation.Followed`.
     """
     curve = ForcedCurve(problem, problem.sweep.supports)
     yield from followed(curve, route_of(problem), done)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from stickslip.arrays import FloatArray
-from stickslip.response.adaptive_continuation import follow
+from stickslip.response.continuation.adaptive_continuation import follow
 from stickslip.response.forced.accepted import branch_end, points_of_branch, replaced, runs_of_repeats
 from stickslip.response.forced.along import ForcedCurve, of_forced, route_of, to_forced
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.harmonic_set import is_full
-from stickslip.response.branch import Judged
+from stickslip.response.continuation.branch import Judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.time.repeating import Repetition, repetition
 from stickslip.solve.affine_invariant import NaturalLevel

@@ -11,12 +11,12 @@ from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.continuation.starting_solutions import at_rest
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.starting_solutions import at_rest
-from stickslip.response.time.marcher import prepared, step_work
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import start_from_harmonics
+from stickslip.response.time.stepping.marcher import prepared, step_work
 from stickslip.solve.newton_method import Newton, Solution, newton
 
 NO_MOTION = (StickslipError, np.linalg.LinAlgError, FloatingPointError)

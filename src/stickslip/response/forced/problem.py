@@ -16,7 +16,7 @@ from stickslip.harmonic.harmonic_set import ByDof, Harmonics, is_full, kept_by_d
 from stickslip.harmonic.harmonics_per_dof import AnyBalance, LocalBalance
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept
-from stickslip.response.branch import Judged, following_vibration
+from stickslip.response.continuation.branch import Judged, following_vibration
 from stickslip.response.forced.amplitude import amplitudes, error_measure
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.sweep import Sweep
@@ -41,7 +41,7 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        With ``high = "auto"`` the kinds of `stickslip.response.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
+        With ``high = "auto"`` the kinds of `stickslip.response.continuation.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
         passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
         repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
         ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time. ``settled``: with more harmonics, where a prediction alone spoke for a point

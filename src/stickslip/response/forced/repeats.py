@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.strategy import judged
+from stickslip.response.continuation.homotopies import homotopies
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.homotopies import homotopies
 from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.fallbacks import solve_robustly, steps_at_most

@@ -13,7 +13,7 @@ from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of, multiples
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.response.branch import steps_through
+from stickslip.response.continuation.branch import steps_through
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, AmplitudeOf, Passages, RelativeTo, Rescue
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton

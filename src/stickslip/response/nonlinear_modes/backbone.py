@@ -16,8 +16,8 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.adaptive_continuation import LEAPS, follow
-from stickslip.response.branch import Followed, Route, branch_of
+from stickslip.response.continuation.adaptive_continuation import LEAPS, follow
+from stickslip.response.continuation.branch import Followed, Route, branch_of
 from stickslip.response.nonlinear_modes.closer import LOCATED, TAKES_PART, Closer
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.parameter import Discretisation

@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.factors import as_array
 from stickslip.operators import array_of
-from stickslip.response.branch import Followed
+from stickslip.response.continuation.branch import Followed
 from stickslip.response.nonlinear_modes.harmonic_levels import FAINT_RATIO, ModeCurve
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.solve.branch import Latest

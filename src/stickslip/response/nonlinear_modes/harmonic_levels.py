@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.bordered import PeriodicProblem
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.response.branch import Curve, Followed, Judged
+from stickslip.response.continuation.branch import Curve, Followed, Judged
 from stickslip.response.equilibrium import preload
 from stickslip.response.nonlinear_modes.modal_amplitude import by_energy
 from stickslip.response.self_excited.contacts import contacts_of

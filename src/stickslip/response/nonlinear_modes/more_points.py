@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.branch import Followed, Judged
+from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.nonlinear_modes.modal_amplitude import Size, by_energy

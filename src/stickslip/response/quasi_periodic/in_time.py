@@ -14,10 +14,10 @@ from stickslip.contact.interface import Interface
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart
-from stickslip.response.time.step_choice import FINE, with_enough_steps
+from stickslip.response.time.stepping.marcher import prepared
+from stickslip.response.time.stepping.step_choice import FINE, with_enough_steps
 
 KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared

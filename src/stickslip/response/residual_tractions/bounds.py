@@ -14,12 +14,12 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Driven, driven_by
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.branch import Followed
+from stickslip.response.continuation.branch import Followed
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.branches import both_ways, crossings, may_be_several
 from stickslip.response.residual_tractions.problem import TractionProblem, TractionState
 from stickslip.response.residual_tractions.search import Extremes, TractionSearch, extremes
-from stickslip.response.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 

@@ -17,8 +17,8 @@ from stickslip.contact.laws.iwan import Iwan
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.response.branch import Followed
-from stickslip.response.starting_solutions import plain_sweep
+from stickslip.response.continuation.branch import Followed
+from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 

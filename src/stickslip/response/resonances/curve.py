@@ -10,8 +10,8 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.adaptive_continuation import follow
-from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
+from stickslip.response.continuation.adaptive_continuation import follow
+from stickslip.response.continuation.branch import Followed, Judged, OneLevel, Route, steps_through
 from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracker import Tracker, trackers

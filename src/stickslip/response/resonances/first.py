@@ -13,10 +13,10 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
 from stickslip.harmonic.parameters import BalanceAt
 from stickslip.harmonic.peak import Driven, Peak, PeakProblem, driven_by
+from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family, system_at
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.subharmonic import motions_of_several_periods
-from stickslip.response.starting_solutions import plain_sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
 from stickslip.solve.krylov import to_tolerance

@@ -11,8 +11,8 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.response.branch import following_vibration, steps_through
-from stickslip.response.starting_solutions import without_branch
+from stickslip.response.continuation.branch import following_vibration, steps_through
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.branch import Following
 from stickslip.solve.continuation import Point, reversed_point, start_point, trace

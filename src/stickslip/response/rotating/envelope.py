@@ -20,7 +20,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
 from stickslip.harmonic.structured import real_matrix
-from stickslip.response.starting_solutions import without_branch
+from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 

@@ -9,8 +9,8 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.bordered import PeriodicProblem
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.adaptive_continuation import follow
-from stickslip.response.branch import Followed, OneLevel, Route, branch_of, steps_through
+from stickslip.response.continuation.adaptive_continuation import follow
+from stickslip.response.continuation.branch import Followed, OneLevel, Route, branch_of, steps_through
 from stickslip.response.equilibrium import preload
 from stickslip.response.parameter import Parameter
 from stickslip.response.self_excited.contacts import contacts_of

@@ -11,9 +11,9 @@ from stickslip.contact.interface import Interface
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.time.marcher import prepared
 from stickslip.response.time.settling import last_third, overflowed, period_harmonics, remaining_change
 from stickslip.response.time.start import TransientStart
+from stickslip.response.time.stepping.marcher import prepared
 
 KEPT = 32  # samples of a period that are kept
 LAST = 4  # periods whose phases tell the frequency

@@ -1,9 +1,9 @@
 """Public names of `stickslip.response.stability`, written once."""
 
 from .found import Stability as Stability
-from .hill import HillStability as HillStability
-from .hill import hill_exponents as hill_exponents
-from .hill import hill_stability as hill_stability
+from .hill_method.hill import HillStability as HillStability
+from .hill_method.hill import hill_exponents as hill_exponents
+from .hill_method.hill import hill_stability as hill_stability
 from .multipliers import motion_stability as motion_stability
 from .settled import settled_stability as settled_stability
 from .settled import stability as stability

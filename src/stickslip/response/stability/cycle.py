@@ -7,7 +7,7 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.fourier import to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.contact_states import ContactStates, is_located, located_part, located_states
+from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_part, located_states
 
 
 def cycle_of(problem: ForcedProblem, point: ForcedPoint) -> bytes | None:

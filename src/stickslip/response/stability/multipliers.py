@@ -11,12 +11,12 @@ from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.structure import Structure
-from stickslip.response.stability.contact_states import ContactStates, is_located, located_part, located_states
+from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_part, located_states
+from stickslip.response.stability.flow_map.modal_states import ModalStates, modal_states
+from stickslip.response.stability.flow_map.monodromy import monodromy, share_of_monodromy
+from stickslip.response.stability.flow_map.sampled_monodromy import sample_times, sampled_monodromy
+from stickslip.response.stability.flow_map.sampled_tangents import Path, SampledTangents, sampled_tangents
 from stickslip.response.stability.found import Stability, changes, partners
-from stickslip.response.stability.modal_states import ModalStates, modal_states
-from stickslip.response.stability.monodromy import monodromy, share_of_monodromy
-from stickslip.response.stability.sampled_monodromy import sample_times, sampled_monodromy
-from stickslip.response.stability.sampled_tangents import Path, SampledTangents, sampled_tangents
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet, floquet
 from stickslip.response.time.sectors import InTime
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.response.time.contact_step import StepState
 from stickslip.response.time.floquet import Floquet, floquet
-from stickslip.response.time.marcher import Marcher, Record
 from stickslip.response.time.sectors import WaveMotion
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart
-from stickslip.response.time.step_tangent import (
+from stickslip.response.time.stepping.contact_step import StepState
+from stickslip.response.time.stepping.marcher import Marcher, Record
+from stickslip.response.time.stepping.step_tangent import (
     TangentOperators,
     advanced,
     first_tangent,
@@ -23,7 +23,7 @@ from stickslip.response.time.step_tangent import (
     law_derivatives,
     tangent_operators,
 )
-from stickslip.response.time.time_step import StepLog
+from stickslip.response.time.stepping.time_step import StepLog
 
 SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
 

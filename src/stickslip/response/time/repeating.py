@@ -15,12 +15,12 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.harmonic.linear import LinearSide
-from stickslip.response.time.contact_step import StepState
-from stickslip.response.time.marcher import Marcher, prepared
-from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import rest
-from stickslip.response.time.step_choice import MOST_STEPS, ROUGH, with_enough_steps
+from stickslip.response.time.stepping.contact_step import StepState
+from stickslip.response.time.stepping.marcher import Marcher, prepared
+from stickslip.response.time.stepping.propagator import PeriodicLoad
+from stickslip.response.time.stepping.step_choice import MOST_STEPS, ROUGH, with_enough_steps
 
 Told = Literal["periodic", "not periodic", "not known"]
 STEPS = 512  # in a period, at least
@@ -145,7 +145,7 @@ def repetition(
     order
         Highest harmonic.
     steps
-        In a period, at least; doubled until the finer march follows the impacts, see `stickslip.response.time.step_choice`.
+        In a period, at least; doubled until the finer march follows the impacts, see `stickslip.response.time.stepping.step_choice`.
     """
 
     def made(steps: int) -> Marcher:

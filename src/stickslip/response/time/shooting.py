@@ -17,13 +17,13 @@ from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
-from stickslip.response.time.marcher import Marcher, prepared
 from stickslip.response.time.period_map import Derivative, PeriodMap, period_map
-from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.sectors import WaveMotion
 from stickslip.response.time.settling import remaining_change
 from stickslip.response.time.start import TransientStart, check_start, rest
-from stickslip.response.time.step_check import COARSE, StepErrors, harmonics, step_errors
+from stickslip.response.time.stepping.marcher import Marcher, prepared
+from stickslip.response.time.stepping.propagator import PeriodicLoad
+from stickslip.response.time.stepping.step_check import COARSE, StepErrors, harmonics, step_errors
 from stickslip.response.time.transient import TimeStepping, check_outputs
 
 ShootingStatus = Literal["converged", "coarse", "not converged", "diverged"]

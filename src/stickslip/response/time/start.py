@@ -15,9 +15,9 @@ from stickslip.contact.addresses import law_at
 from stickslip.contact.cache import njit
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
-from stickslip.response.time.contact_step import KERNEL, PARAMETERS, STATES
-from stickslip.response.time.contacts import TimeContacts, time_contacts
-from stickslip.response.time.propagator import require_array
+from stickslip.response.time.stepping.contact_step import KERNEL, PARAMETERS, STATES
+from stickslip.response.time.stepping.contacts import TimeContacts, time_contacts
+from stickslip.response.time.stepping.propagator import require_array
 
 SAMPLES = 1024  # of a period over which laws are marched
 MOST_PERIODS = 50  # of a march; what is forgotten more slowly the motion itself settles

@@ -19,12 +19,12 @@ from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.time.contact_step import StepState
-from stickslip.response.time.marcher import Marcher, Record, prepared
-from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.settling import Progress, SettlingStatus, overflowed, period_harmonics
 from stickslip.response.time.start import TransientStart, check_start, rest
-from stickslip.response.time.step_choice import FINE
+from stickslip.response.time.stepping.contact_step import StepState
+from stickslip.response.time.stepping.marcher import Marcher, Record, prepared
+from stickslip.response.time.stepping.propagator import PeriodicLoad
+from stickslip.response.time.stepping.step_choice import FINE
 from stickslip.units import check_quantities, quantity
 
 MOST_STEPS = 10_000_000  # a period of which fills the memory of a large machine
@@ -111,7 +111,7 @@ class TransientResult:
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     step_angle
         By which the fastest contact that opens or closes in the last period turns within a step, rad: frequency of its stiffness on the mass
-        that moves with it alone, times the step. See `stickslip.response.time.step_choice`.
+        that moves with it alone, times the step. See `stickslip.response.time.stepping.step_choice`.
     """
 
     status: SettlingStatus

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import Store, in_memory
+from stickslip.assembly.parts.reduced import Store, in_memory
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.verdict import Verdict
 

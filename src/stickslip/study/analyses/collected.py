@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
-from stickslip.study.analyses.waves.about import told
+from stickslip.study.analyses.waves.records.about import told
 from stickslip.study.store.netcdf import alike, one_case, stacked, variable
 
 Variables = dict[str, xr.Variable]

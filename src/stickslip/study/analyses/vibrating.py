@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import Store
+from stickslip.assembly.parts.reduced import Store
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.reduction.tuned import TunedWheel

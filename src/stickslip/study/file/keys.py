@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.errors import did_you_mean, input_error
-from stickslip.study.file.contacts import keys_of
+from stickslip.study.file.model.contacts import keys_of
 from stickslip.study.file.tables import study_tables
 
 REQUIRED = "required"

@@ -10,13 +10,13 @@ from pydantic import Field, create_model
 from stickslip.contact.evaluators import Evaluator
 from stickslip.response.forced.choices import Rescue
 from stickslip.study.analyses import ANALYSES, TABLES
-from stickslip.study.file.aero import AeroTable
-from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
-from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
-from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
-from stickslip.study.file.mistuning import MistuningTable
-from stickslip.study.file.parts import AnyPart, Copy
+from stickslip.study.file.model.aero import AeroTable
+from stickslip.study.file.model.contacts import ContactTable, JoinTable
+from stickslip.study.file.model.loads import Limits, LoadTable, Output, Retention, Rotation
+from stickslip.study.file.model.material import DampingTable, MaterialTable, StudyReduction
+from stickslip.study.file.model.mistuning import MistuningTable
+from stickslip.study.file.model.parts import AnyPart, Copy
 from stickslip.study.file.section import FilePath, Name, Section
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.assembly.aerodynamics import Aerodynamics
+from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
 from stickslip.reduction.aerodynamics import InfluenceCoefficients, from_phase_angles, one_twice
-from stickslip.study.file.aero import AeroTable
+from stickslip.study.file.model.aero import AeroTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.file.toml import read_toml
 from stickslip.units import DEG, HZ, RPM

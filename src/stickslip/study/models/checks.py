@@ -12,8 +12,8 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
 from stickslip.model.dofs import is_numbered
 from stickslip.study.analyses import ANALYSES
-from stickslip.study.file.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
-from stickslip.study.file.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
+from stickslip.study.file.model.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
+from stickslip.study.file.model.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.section import Section
 from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables, original

@@ -7,8 +7,8 @@ from typing import Any
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
-from stickslip.study.file.loads import Limits
-from stickslip.study.file.parts import BeamTable, FileModel, Lumped, PrismBlades, Sector
+from stickslip.study.file.model.loads import Limits
+from stickslip.study.file.model.parts import BeamTable, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.quantities import build
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import MESHES

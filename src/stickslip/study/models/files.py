@@ -27,7 +27,7 @@ from stickslip.model.readers.definite import negative_damping, refuse_indefinite
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
-from stickslip.study.file.parts import FileModel
+from stickslip.study.file.model.parts import FileModel
 from stickslip.study.models.sets import with_sets
 
 ROOT = "root"

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.assembly.deviations import blade_alone_hz
-from stickslip.assembly.mistuning import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.assembly.model import Model
+from stickslip.assembly.sides.deviations import blade_alone_hz
+from stickslip.assembly.sides.mistuning import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
 from stickslip.model.readers.measured_columns import read_columns
-from stickslip.study.file.mistuning import MOST_MODES, MistuningTable
+from stickslip.study.file.model.mistuning import MOST_MODES, MistuningTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.store.progress import LOG
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
+from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.part import Part
-from stickslip.study.file.loads import LoadTable
+from stickslip.study.file.model.loads import LoadTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.aero import aerodynamics_of
 from stickslip.study.models.files import alike

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import NEXT
-from stickslip.assembly.part_copies import copy_of, place_of, placed_body
+from stickslip.assembly.parts.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
@@ -27,9 +27,9 @@ from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
 from stickslip.model.rigid.sides import ContactPoints
-from stickslip.study.file.bodies import AXES, BODIES, Cylinder, FlatCurved, Placed, RigidBodyTable, Surface, Wedge
-from stickslip.study.file.material import ReductionTable
-from stickslip.study.file.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
+from stickslip.study.file.model.bodies import AXES, BODIES, Cylinder, FlatCurved, Placed, RigidBodyTable, Surface, Wedge
+from stickslip.study.file.model.material import ReductionTable
+from stickslip.study.file.model.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables

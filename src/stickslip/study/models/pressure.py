@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.assembly.pressure import PressureField
+from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.errors import InputError, input_error, missing_package
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
 from stickslip.study.file.tables import Tables

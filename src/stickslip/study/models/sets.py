@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, input_error, nearest_and_known
-from stickslip.study.file.sets import SetTable
+from stickslip.study.file.model.sets import SetTable
 
 EDGE = 1e-9  # of the size of the mesh, by which boxes and cylinders are larger: nodes lie on their faces
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from stickslip.assembly.contact import NEXT
 from stickslip.errors import InputError, did_you_mean, input_error
-from stickslip.study.file.mistuning import MistuningTable
-from stickslip.study.file.parts import Lumped
+from stickslip.study.file.model.mistuning import MistuningTable
+from stickslip.study.file.model.parts import Lumped
 from stickslip.study.file.tables import Tables, original
 
 

@@ -11,7 +11,7 @@ from stickslip.response.all_motions.found import AllMotions, AtFrequency
 from stickslip.study.analyses.all_motions.verdicts import case_verdicts
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.collected import Variables, of_cases, rows
-from stickslip.study.analyses.waves.about import told
+from stickslip.study.analyses.waves.records.about import told
 from stickslip.study.store.netcdf import variable
 from stickslip.units import HZ
 

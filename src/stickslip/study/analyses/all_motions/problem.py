@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.linear import one_structure

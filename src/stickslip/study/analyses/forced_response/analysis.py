@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import unreduced_line
+from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import named
@@ -16,16 +16,10 @@ from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced_response.bifurcating import bifurcations_line, followed, located, of_bifurcations
-from stickslip.study.analyses.forced_response.blades import of_blades
-from stickslip.study.analyses.forced_response.comparison import Check
-from stickslip.study.analyses.forced_response.dataset import put_together
-from stickslip.study.analyses.forced_response.elsewhere import motions_elsewhere
 from stickslip.study.analyses.forced_response.estimate import estimate
-from stickslip.study.analyses.forced_response.examining import neighbours_of
-from stickslip.study.analyses.forced_response.in_time import FLOPS, chosen
-from stickslip.study.analyses.forced_response.kinematics import motion_at_peak
-from stickslip.study.analyses.forced_response.known import (
+from stickslip.study.analyses.forced_response.more_harmonics import check_harmonics
+from stickslip.study.analyses.forced_response.physics.kinematics import motion_at_peak
+from stickslip.study.analyses.forced_response.physics.known import (
     doubts_of_model,
     inside,
     known,
@@ -34,12 +28,15 @@ from stickslip.study.analyses.forced_response.known import (
     nothing_pressed,
     off_engine_order,
 )
-from stickslip.study.analyses.forced_response.model_change import model_changes, stiffness_changes
-from stickslip.study.analyses.forced_response.more_harmonics import check_harmonics
-from stickslip.study.analyses.forced_response.not_periodic import in_time_instead, of_answers, without_periodic
-from stickslip.study.analyses.forced_response.physics import PHYSICS, beforehand, driven_line, of_physics, physics_of
-from stickslip.study.analyses.forced_response.points import Response, lost_point
-from stickslip.study.analyses.forced_response.pressures import pressure_lines
+from stickslip.study.analyses.forced_response.physics.limits import (
+    PHYSICS,
+    beforehand,
+    driven_line,
+    of_physics,
+    physics_of,
+)
+from stickslip.study.analyses.forced_response.physics.model_change import model_changes, stiffness_changes
+from stickslip.study.analyses.forced_response.physics.retention import peak_shift
 from stickslip.study.analyses.forced_response.problem import (
     HARMONICS,
     IN_TIME,
@@ -48,12 +45,11 @@ from stickslip.study.analyses.forced_response.problem import (
     question_of,
     with_comparisons,
 )
-from stickslip.study.analyses.forced_response.retention import peak_shift
-from stickslip.study.analyses.forced_response.section import ForcedResponse
-from stickslip.study.analyses.forced_response.stable import Examined, cost_line, with_motion
-from stickslip.study.analyses.forced_response.stable_words import peak_word, point_of, stability_log
-from stickslip.study.analyses.forced_response.summary import tables
-from stickslip.study.analyses.forced_response.values import (
+from stickslip.study.analyses.forced_response.records.blades import of_blades
+from stickslip.study.analyses.forced_response.records.dataset import put_together
+from stickslip.study.analyses.forced_response.records.points import Response, lost_point
+from stickslip.study.analyses.forced_response.records.pressures import pressure_lines
+from stickslip.study.analyses.forced_response.records.values import (
     Values,
     of_checks,
     of_doubt,
@@ -61,8 +57,27 @@ from stickslip.study.analyses.forced_response.values import (
     of_model,
     of_response,
 )
-from stickslip.study.analyses.forced_response.verdicts import verdicts
-from stickslip.study.analyses.forced_response.with_stability import integrated, with_stability
+from stickslip.study.analyses.forced_response.section import ForcedResponse
+from stickslip.study.analyses.forced_response.stability.bifurcating import (
+    bifurcations_line,
+    followed,
+    located,
+    of_bifurcations,
+)
+from stickslip.study.analyses.forced_response.stability.comparison import Check
+from stickslip.study.analyses.forced_response.stability.elsewhere import motions_elsewhere
+from stickslip.study.analyses.forced_response.stability.examining import neighbours_of
+from stickslip.study.analyses.forced_response.stability.in_time import FLOPS, chosen
+from stickslip.study.analyses.forced_response.stability.not_periodic import (
+    in_time_instead,
+    of_answers,
+    without_periodic,
+)
+from stickslip.study.analyses.forced_response.stability.stable import Examined, cost_line, with_motion
+from stickslip.study.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
+from stickslip.study.analyses.forced_response.stability.with_stability import integrated, with_stability
+from stickslip.study.analyses.forced_response.summary import tables
+from stickslip.study.analyses.forced_response.verdicts.cases import verdicts
 from stickslip.study.analyses.verdict import Verdict, to_json
 from stickslip.study.store.progress import LOG, advance, sum_up
 from stickslip.units import HZ, millimetres

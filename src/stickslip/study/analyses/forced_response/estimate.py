@@ -6,13 +6,13 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import kept_whole
+from stickslip.assembly.sides.unreduced import kept_whole
 from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
 from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS
-from stickslip.study.file.loads import Limits
+from stickslip.study.file.model.loads import Limits
 from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns

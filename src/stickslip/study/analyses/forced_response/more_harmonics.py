@@ -10,8 +10,8 @@ from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.verification import check_support
 from stickslip.study.analyses.forced_response.chooser import error_text
-from stickslip.study.analyses.forced_response.points import Response
 from stickslip.study.analyses.forced_response.problem import MORE_THAN_LOW, Question
+from stickslip.study.analyses.forced_response.records.points import Response
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.units import HZ
 

@@ -12,8 +12,8 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import static_state
 from stickslip.assembly.extent import Extent, extent_of
 from stickslip.assembly.model import Model
-from stickslip.assembly.more_modes import more_modes
-from stickslip.assembly.unreduced import KEPT, refuse_whole
+from stickslip.assembly.parts.more_modes import more_modes
+from stickslip.assembly.sides.unreduced import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -29,7 +29,7 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced_response.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced_response.estimate import check_limits, estimate, within_limits
-from stickslip.study.analyses.forced_response.examination import examines_every_wave
+from stickslip.study.analyses.forced_response.stability.examination import examines_every_wave
 from stickslip.study.analyses.forced_response.sweeps import measured, sweep_of
 from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM

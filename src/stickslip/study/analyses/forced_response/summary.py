@@ -5,10 +5,10 @@ import xarray as xr
 
 from stickslip.harmonic.harmonic_set import named
 from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.forced_response.bounds import BOUND
-from stickslip.study.analyses.forced_response.curve import Curve
-from stickslip.study.analyses.forced_response.stable_words import all_lines, said_of
-from stickslip.study.analyses.forced_response.working_words import TITLE, range_lines
+from stickslip.study.analyses.forced_response.records.bounds import BOUND
+from stickslip.study.analyses.forced_response.stability.stable_words import all_lines, said_of
+from stickslip.study.analyses.forced_response.verdicts.curve import Curve
+from stickslip.study.analyses.forced_response.verdicts.working_words import TITLE, range_lines
 from stickslip.study.analyses.verdict import LEVELS, said
 
 FIRST = "first harmonic"  # what amplitudes are as a rule

@@ -6,7 +6,7 @@ import xarray as xr
 
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced_response.examination import too_long
+from stickslip.study.analyses.forced_response.stability.examination import too_long
 from stickslip.study.analyses.limit_cycle.dataset import dataset
 from stickslip.study.analyses.limit_cycle.problem import IN_TIME, Question, question_of
 from stickslip.study.analyses.limit_cycle.records import CycleBranch

@@ -14,7 +14,7 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import CycleStability, cycle_stability
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.forced_response.examination import too_long
+from stickslip.study.analyses.forced_response.stability.examination import too_long
 from stickslip.study.analyses.limit_cycle.problem import Question
 from stickslip.study.analyses.limit_cycle.records import CycleBranch
 from stickslip.study.analyses.limit_cycle.time import compete, settle_cycles

@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.nonlinear_modes.backbone import ModeSweep

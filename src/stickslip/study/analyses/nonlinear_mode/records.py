@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.response.branch import Followed, Judged, Kind, branch_of
+from stickslip.response.continuation.branch import Followed, Judged, Kind, branch_of
 from stickslip.response.nonlinear_modes.backbone import ModeWay, mode_point
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.solve.continuation import Point
@@ -31,7 +31,7 @@ class ModeRecord:
     wave_number, mode
         -1 for a single structure; from 1, by frequency with contacts stuck.
     kind
-        As of `stickslip.response.branch.Followed`, or ``end``.
+        As of `stickslip.response.continuation.branch.Followed`, or ``end``.
     index, level, seconds, bound
         As of `Followed`, and of its judgement.
     x, p, tangent, step, orientation, bend

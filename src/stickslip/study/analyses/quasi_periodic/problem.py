@@ -10,7 +10,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.reduction.tuned import TunedWheel
@@ -18,8 +18,8 @@ from stickslip.response.quasi_periodic.problem import TwoTones, two_tones
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
-from stickslip.study.analyses.forced_response.in_time import seconds_in_time
 from stickslip.study.analyses.forced_response.problem import peak_first
+from stickslip.study.analyses.forced_response.stability.in_time import seconds_in_time
 from stickslip.study.analyses.quasi_periodic.table import QuasiPeriodicTable
 from stickslip.study.analyses.vibrating import modes_of
 from stickslip.units import HZ, RPM

@@ -13,7 +13,7 @@ from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import Solving, TwoTones, with_enough
 from stickslip.response.quasi_periodic.tone import solve_free
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.forced_response.examination import too_long
+from stickslip.study.analyses.forced_response.stability.examination import too_long
 from stickslip.study.analyses.quasi_periodic.problem import NAME, Question, hertz
 from stickslip.study.analyses.quasi_periodic.records import TwoFrequencies
 from stickslip.study.analyses.quasi_periodic.time import compared

@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.initial_sliders import starts_of
 from stickslip.errors import InputError, input_error

@@ -13,7 +13,7 @@ from stickslip.study.analyses.collected import Variables, of_cases
 from stickslip.study.analyses.resonance.envelope import along_span, heights, overtakings
 from stickslip.study.analyses.resonance.verdicts import case_verdicts
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.analyses.waves.about import told
+from stickslip.study.analyses.waves.records.about import told
 from stickslip.study.store.netcdf import variable
 from stickslip.units import DEG, HZ
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import Store
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.parts.reduced import Store
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad

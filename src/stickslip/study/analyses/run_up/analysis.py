@@ -6,7 +6,7 @@ from dataclasses import replace
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.unreduced import refuse_whole
+from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.response.forced.response import forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced_response.estimate import estimate

@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
-from stickslip.assembly.engine_order_sweep import over_speed, with_engine_order
 from stickslip.assembly.model import Model
+from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import input_error
 from stickslip.harmonic.judging import REACH
 from stickslip.model.gyroscopic import gyroscopic_modes

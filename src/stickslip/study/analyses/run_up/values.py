@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.recovery import signals
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.forced_response.points import Accepted, Response, collect
+from stickslip.study.analyses.forced_response.records.points import Accepted, Response, collect
 from stickslip.study.analyses.run_up.fast import name_of
 from stickslip.study.analyses.run_up.problem import DRAWN, Along, Question, RunUpPoint
 from stickslip.study.store.netcdf import stacked, variable

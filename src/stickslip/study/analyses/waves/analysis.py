@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.verdict import Verdict, stored
-from stickslip.study.analyses.waves.dataset import Variables, dataset
+from stickslip.study.analyses.waves.records.dataset import Variables, dataset
 from stickslip.study.analyses.waves.solve import Question, each_wave
 from stickslip.study.analyses.waves.tables import WaveTable
 from stickslip.study.analyses.waves.texts import of_cases

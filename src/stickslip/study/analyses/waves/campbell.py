@@ -10,11 +10,11 @@ from stickslip.errors import input_error
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
-from stickslip.study.analyses.waves.dataset import Variables, frequencies
 from stickslip.study.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
-from stickslip.study.analyses.waves.left_out import in_still_fluid
-from stickslip.study.analyses.waves.numbers import Wheel
-from stickslip.study.analyses.waves.results import WaveBranches
+from stickslip.study.analyses.waves.records.dataset import Variables, frequencies
+from stickslip.study.analyses.waves.records.left_out import in_still_fluid
+from stickslip.study.analyses.waves.records.numbers import Wheel
+from stickslip.study.analyses.waves.records.results import WaveBranches
 from stickslip.study.analyses.waves.solve import Question, follow_wave
 from stickslip.study.analyses.waves.tables import CampbellTable
 from stickslip.study.analyses.waves.texts import campbell_tables

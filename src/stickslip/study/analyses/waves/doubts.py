@@ -9,7 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.statics import MOST_DISPLACEMENT, MOST_ROTATION, MOST_STRAIN, StaticState
 from stickslip.response.rotating.safe import Safe
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.analyses.waves.results import WaveBranches
+from stickslip.study.analyses.waves.records.results import WaveBranches
 from stickslip.units import HZ, RPM, millimetres
 
 BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above which there is a warning

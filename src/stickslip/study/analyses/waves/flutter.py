@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.build import flow_around
 from stickslip.assembly.model import Model
-from stickslip.assembly.wheel_modes import wheel_in_flow
+from stickslip.assembly.sides.wheel_modes import wheel_in_flow
 from stickslip.errors import input_error
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
 from stickslip.reduction.waves import wave
@@ -17,10 +17,10 @@ from stickslip.response.rotating.flutter import damping_ratio, least_stable_curv
 from stickslip.study.analyses.analysis import Case, Notes, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
-from stickslip.study.analyses.waves.dataset import Variables
 from stickslip.study.analyses.waves.in_flow import wave_in_flow
-from stickslip.study.analyses.waves.numbers import Wheel, label
-from stickslip.study.analyses.waves.results import WaveFlutter
+from stickslip.study.analyses.waves.records.dataset import Variables
+from stickslip.study.analyses.waves.records.numbers import Wheel, label
+from stickslip.study.analyses.waves.records.results import WaveFlutter
 from stickslip.study.analyses.waves.solve import Question
 from stickslip.study.analyses.waves.tables import FlutterTable
 from stickslip.study.analyses.waves.texts import flutter_tables

@@ -2,7 +2,7 @@
 
 from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.waves import damping_by_modes
+from stickslip.assembly.sides.waves import damping_by_modes
 from stickslip.model.damping import Damping
 from stickslip.response.rotating.flutter import FlutterOfWave, flutter_of_wave
 

@@ -12,12 +12,12 @@ from stickslip.response.rotating.flutter import damping_ratio
 from stickslip.study.analyses.analysis import Case, Notes, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
-from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
-from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.of_wheel import NOTE, variables
 from stickslip.study.analyses.waves.of_wheel import solved as solved_wheel
+from stickslip.study.analyses.waves.records.dataset import Variables, frequencies, growth
+from stickslip.study.analyses.waves.records.numbers import Wheel
+from stickslip.study.analyses.waves.records.results import WaveModes
 from stickslip.study.analyses.waves.reference import Reference, read_reference
-from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.analyses.waves.stages import (
     StagesQuestion,

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.assembly.wheel_modes import wheel_modes
+from stickslip.assembly.sides.wheel_modes import wheel_modes
 from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.forced_response.bounds import localisation
-from stickslip.study.analyses.waves.dataset import Variables
+from stickslip.study.analyses.forced_response.records.bounds import localisation
+from stickslip.study.analyses.waves.records.dataset import Variables
 from stickslip.study.analyses.waves.solve import Question
 from stickslip.study.store.netcdf import variable
 

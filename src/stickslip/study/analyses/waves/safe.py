@@ -12,11 +12,11 @@ from stickslip.response.rotating.safe import Safe, safe
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
-from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.doubts import safe_doubts
-from stickslip.study.analyses.waves.left_out import in_still_fluid
-from stickslip.study.analyses.waves.numbers import Wheel
-from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.records.dataset import Variables, frequencies, growth
+from stickslip.study.analyses.waves.records.left_out import in_still_fluid
+from stickslip.study.analyses.waves.records.numbers import Wheel
+from stickslip.study.analyses.waves.records.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.analyses.waves.tables import SafeTable
 from stickslip.study.analyses.waves.texts import safe_tables

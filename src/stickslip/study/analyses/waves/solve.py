@@ -11,10 +11,10 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.aero_forces import own_dofs, phases
 from stickslip.assembly.build import holding_points
+from stickslip.assembly.fluid.aero_forces import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.reduced import stiffening
+from stickslip.assembly.parts.reduced import stiffening
 from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
@@ -24,10 +24,10 @@ from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
 from stickslip.study.analyses.waves.in_flow import wave_in_flow
-from stickslip.study.analyses.waves.numbers import Wheel
-from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
+from stickslip.study.analyses.waves.records.about import ABOUT, about, skin_note
+from stickslip.study.analyses.waves.records.numbers import Wheel
+from stickslip.study.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes
 from stickslip.study.store.progress import advance
 
 FEW = 300  # dofs of a sector, of which all waves are solved in no time

@@ -15,8 +15,8 @@ from stickslip.reduction.coupled_stages import Multistage, Wave, multistage_mode
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.verdict import Verdict, doubt, to_json
-from stickslip.study.analyses.waves.about import ABOUT, STATIC
-from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.records.about import ABOUT, STATIC
+from stickslip.study.analyses.waves.records.results import WaveModes
 from stickslip.study.store.progress import advance
 
 LEFT_OUT = 0.01  # of a frequency: so much harmonics that are not coupled may change it without a doubt

@@ -7,8 +7,8 @@ import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import told_apart
-from stickslip.study.analyses.waves.numbers import label, wave_name
 from stickslip.study.analyses.waves.of_wheel import table as of_wheel
+from stickslip.study.analyses.waves.records.numbers import label, wave_name
 
 LEAST = 5  # modes of a mistuned wheel that are shown
 MOST_PAIRS = 30  # of an interference table on the screen

@@ -1,0 +1,242 @@
+"""Pressure fields of a flow solver as nodal forces."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.assembly.fluid.pressure_mapping import Feet, between_sides, nearest, on_sides, unit_normals
+from stickslip.assembly.joints.clamped_rim import with_rim
+from stickslip.assembly.locations import Places, Spot
+from stickslip.contact.facets import corner_counts, interpolation, normals, positions
+from stickslip.contact.surface import Surface
+from stickslip.errors import input_error
+
+FAR = 0.1  # of the surface's size: no flow solver's mesh stands so far off
+BETWEEN = 0.1  # share of the points of a field that may stand nearer to the middle of a thin body than to its surface
+AROUND = 8  # points of a field from which the pressure between them follows
+ELSEWHERE = 1.2  # distance of a place from the field over that of the field's points from each other: from here on the field is elsewhere
+BARE = 0.1, 0.25  # share of a surface where the field is elsewhere: told, refused
+PLANE = 1e-6  # singular values below this share of the largest: the points lie on a line
+
+
+@dataclass(frozen=True, eq=False)
+class PressureField:
+    """Complex pressure at points of a blade's surface, ``Re(p e^{ihωt})``; real for a static one.
+
+    Parameters
+    ----------
+    points
+        (n, 3) places in m, in the axes of the model.
+    pressure
+        (n,) in Pa: positive presses on the surface.
+    area
+        (n, 3) vector of the area in m² that belongs to each point, normal to the surface; all point out of the body, or all into it.
+        None: the pressure is interpolated and integrated on the facets of the structure.
+    source
+        Where it comes from, for messages.
+
+    Raises
+    ------
+    InputError
+        If shapes do not agree, or there are too few points.
+    """
+
+    points: FloatArray
+    pressure: ComplexArray
+    area: FloatArray | None = None
+    source: str = "pressure"
+    memo: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.points)
+        shapes = (self.points.shape, np.shape(self.pressure))
+        if shapes != ((n, 3), (n,)) or n < 3 or (self.area is not None and self.area.shape != (n, 3)):
+            raise input_error(
+                self.source, f"has {shapes[0]} points for {shapes[1]} pressures", "Give (n, 3) and (n,), n from 3 on."
+            )
+
+    def on(self, places: Places, name: str, place: str) -> "Projected":
+        """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the key that names the surface.
+
+        Raises
+        ------
+        InputError
+            If the surface has no facets, the field lies elsewhere, or its normals point partly out of the body and partly into it.
+        """
+        spot = places.spot(name, place)
+        surface = _with_facets(spot, place)
+        moves = scipy.sparse.csr_array(surface.displacement)
+        key = (name, places.n, surface.points.tobytes(), moves.indptr.tobytes(), moves.indices.tobytes())
+        if key not in self.memo:
+            self.memo[key] = put_on(self, with_rim(places, spot), name)
+        found: Projected = self.memo[key]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """A pressure field on the nodes of a surface.
+
+    Parameters
+    ----------
+    force
+        (N,) on the dofs of all parts, N; what acts on clamped nodes is in none of them.
+    before, after
+        (2, 3) force in N and moment about the origin in N m: of the field, and of the forces on all nodes of the surface.
+    clamped
+        (3,) force in N on clamped nodes.
+    offset
+        Largest distance of a point of the field from the surface, m.
+    inward
+        Whether its normals point into the body.
+    warnings
+        What the user should know.
+    """
+
+    force: ComplexArray
+    before: ComplexArray
+    after: ComplexArray
+    clamped: ComplexArray
+    offset: float
+    inward: bool = False
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def newton(self) -> float:
+        """Magnitude of the whole force, N."""
+        return float(np.linalg.norm(self.after[0]))
+
+
+def _with_facets(spot: Spot, place: str) -> Surface:
+    if spot.surface is None or not len(spot.surface.facets):
+        raise input_error(
+            place,
+            f"{spot.name!r} has no facets, on which a pressure could act",
+            "Name a node set that holds whole faces of elements.",
+        )
+    return spot.surface
+
+
+def put_on(given: PressureField, surface: Surface, name: str) -> Projected:
+    """Return a field as forces on the nodes of a surface; `name` is that of the surface, for messages.
+
+    Raises
+    ------
+    InputError
+        As `PressureField.on`.
+    """
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    feet = nearest(surface, given.points)
+    warnings: tuple[str, ...] = ()
+    offset = feet.offset
+    farthest = int(offset.argmax())
+    if offset[farthest] > FAR * size:
+        raise input_error(
+            given.source,
+            f"has a point {given.points[farthest].tolist()} m that is {offset[farthest]:.3g} m away from {name!r}, "
+            f"which is {size:.3g} m large",
+            "Check the unit and the axes of its points: they are those of the sector.",
+        )
+    if given.area is None:
+        facet, reference, at, forces, bare = _integrated(given, surface, feet)
+        warnings = _bare(bare, given.source, name)
+        if between_sides(surface, feet, given.points, FAR * size) > BETWEEN:
+            text = (
+                f"the points of {given.source} stand {1e3 * float(np.median(offset)):.3g} mm off {name} (median), where it is so "
+                "thin that the pressures of both its sides are mixed. Put the points in place, or give area_m2 and the normals."
+            )
+            warnings = (*warnings, text)
+    else:
+        feet, warnings = on_sides(surface, given.points, given.area, FAR * size, given.source, name)
+        facet, reference, at, offset = feet.facet, feet.reference, given.points, feet.offset
+        forces = -feet.sense * given.pressure[:, None] * given.area
+    nodes = surface.facets[facet]
+    weights = interpolation(nodes, reference)
+    on_nodes = np.zeros((len(surface.points), 3), dtype=complex)
+    np.add.at(on_nodes, np.maximum(nodes, 0), weights[:, :, None] * forces[:, None])
+    moves = scipy.sparse.csr_array(surface.displacement)
+    still = (np.diff(moves.indptr) == 0).reshape(-1, 3)
+    return Projected(
+        moves.T @ on_nodes.ravel(),
+        _sums(at, forces),
+        _sums(surface.points, on_nodes),
+        np.where(still, on_nodes, 0).sum(axis=0),
+        float(offset.max()),
+        feet.sense < 0,
+        warnings,
+    )
+
+
+def _sums(points: FloatArray, forces: ComplexArray) -> ComplexArray:
+    """Return the (2, 3) force and moment about the origin of forces (n, 3)."""
+    return np.array([forces.sum(axis=0), np.cross(points, forces).sum(axis=0)])
+
+
+def _integrated(
+    given: PressureField, surface: Surface, feet: Feet
+) -> tuple[IntArray, FloatArray, FloatArray, ComplexArray, float]:
+    """Return quadrature points on the facets, their places and the forces of the interpolated pressure there, and the share of bare area."""
+    x, w = np.polynomial.legendre.leggauss(4)
+    square = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
+    weights = np.outer(w, w).ravel()
+    u, v = (1 + square.T) / 2
+    rules = {4: (square, weights), 3: (np.column_stack([u, v * (1 - u)]), weights * (1 - u) / 4)}
+    facet, reference, share = [], [], []
+    corners = corner_counts(surface.facets)
+    for count, (at, weight) in rules.items():
+        rows = np.flatnonzero(corners == count)
+        facet.append(np.repeat(rows, len(at)))
+        reference.append(np.tile(at, (len(rows), 1)))
+        share.append(np.tile(weight, len(rows)))
+    f, r, s = np.concatenate(facet), np.concatenate(reference), np.concatenate(share)
+    area = normals(surface.points, surface.facets[f], r) * s[:, None]
+    place = positions(surface.points, surface.facets[f], r)
+    theirs = unit_normals(surface, feet.facet, feet.reference)
+    pressure, elsewhere = _interpolated(given, theirs, place, unit_normals(surface, f, r))
+    size = np.linalg.norm(area, axis=1)
+    return f, r, place, -pressure[:, None] * area, float(size[elsewhere].sum() / size.sum())
+
+
+def _bare(share: float, source: str, name: str) -> tuple[str, ...]:
+    """Say or refuse that a field covers only part of a surface."""
+    told, refused = BARE
+    if share <= told:
+        return ()
+    why = f"leaves {100 * share:.0f} % of the area of {name!r} without a point near that looks the same way"
+    remedy = "Name a set of the faces that the field covers, or give area_m2 and the normals."
+    if share > refused:
+        raise input_error(source, why, remedy)
+    return (f"{source} {why}: the nearest pressure acts there, too. {remedy}",)
+
+
+def _interpolated(
+    given: PressureField, theirs: FloatArray, places: FloatArray, outward: FloatArray
+) -> tuple[ComplexArray, BoolArray]:
+    """Return the pressure at places, and where the field is elsewhere: by a plane through the nearest points, the nearer the heavier; between all of them.
+
+    Points count as nearer where the normals of their facets, `theirs`, are alike to those of the places, `outward`: a thin body has
+    another pressure on its other side. The plane lies along the surface, so that points may stand off it.
+    """
+    from scipy.spatial import cKDTree
+
+    count = min(AROUND, len(given.points))
+    apart = cKDTree(given.points).query(given.points, k=count)[0][:, -1]
+    far = float(np.median(apart))
+    tree = cKDTree(np.hstack([given.points, far * theirs]))
+    away, near = tree.query(np.hstack([places, far * outward]), k=count)
+    reach = away[:, -1:] * 1.001 + np.finfo(float).tiny
+    weight = (1 - (away / reach) ** 2) ** 2
+    shift = (given.points[near] - places[:, None]) / reach[:, :, None]
+    shift -= np.einsum("pkc,pc->pk", shift, outward)[:, :, None] * outward[:, None]
+    rows = np.concatenate([np.ones((*shift.shape[:2], 1)), shift], axis=2)
+    inverse = np.linalg.pinv(weight[:, :, None] * rows, rcond=PLANE)
+    values = given.pressure[near]
+    found = np.einsum("pk,pk->p", inverse[:, 0], weight * values)
+    # no pressure beyond those around it
+    low, high = (part(values.real, axis=1) for part in (np.min, np.max))
+    below, above = (part(values.imag, axis=1) for part in (np.min, np.max))
+    inside = np.clip(found.real, low, high) + 1j * np.clip(found.imag, below, above)
+    return np.asarray(inside), away[:, 0] > ELSEWHERE * far

@@ -1,0 +1,358 @@
+"""Contacts of a model as pairs of points, on the dofs of all parts: gaps, frames, areas, and each point's share of the law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
+from stickslip.assembly.joints.frames import direction, normals_of, whole, with_normals
+from stickslip.assembly.joints.point_laws import at_rest, shared
+from stickslip.assembly.joints.surface_checks import (
+    flat_warning,
+    named,
+    overlap_warning,
+    refuse_averted,
+    refuse_held,
+    refuse_without_direction,
+    refuse_without_facets,
+    rim_warning,
+    tilt_warning,
+    twice_warning,
+    with_hint,
+    with_pairing,
+)
+from stickslip.assembly.locations import AXES, NO_FACETS, Places, Spot
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.pairing import Pairing, node_to_node, node_to_segment, segment_to_segment
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+from stickslip.model.axis import Axis
+from stickslip.reduction.turning import dof_rotation
+
+NODE_TO_NODE_DISTANCE_M = 1e-6  # m: partners node to node
+ROWS = {"tangential": 0, "normal": 2}
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How the next sector lies to this one.
+
+    Parameters
+    ----------
+    sectors
+        Of the wheel.
+    axis
+        None where a turn changes no coordinate.
+    """
+
+    sectors: int
+    axis: Axis | None
+
+    @property
+    def matrix(self) -> FloatArray:
+        """(3, 3) rotation of vectors by one pitch."""
+        if self.axis is None:
+            return np.eye(3)
+        return self.axis.rotation(2 * np.pi / self.sectors)
+
+    def points(self, points: FloatArray) -> FloatArray:
+        """Return points (n, 3) of this sector as those of the next."""
+        return points if self.axis is None else self.axis.turned(points, 2 * np.pi / self.sectors)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Contact points, on N dofs.
+
+    Parameters
+    ----------
+    own, following
+        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, the second for the next sector's dofs in its own axes.
+    names, groups
+        Of each point, and the contact that it belongs to.
+    laws
+        Of each point, its share of the contact's.
+    position, frame, area
+        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where there is none.
+    nodes
+        (p, 3) dofs x, y, z of the node that a point is, of the first side, or of the second where the first is a rigid body; -1
+        where there is none.
+    warnings
+        What the user should know.
+    """
+
+    own: Matrix
+    following: Matrix
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    laws: tuple[ContactLaw, ...]
+    position: FloatArray
+    frame: FloatArray
+    area: FloatArray
+    nodes: IntArray
+    warnings: tuple[str, ...] = ()
+
+
+def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | None) -> Pairs:
+    """Pair the points of all contacts.
+
+    Parameters
+    ----------
+    places
+        What the names mean.
+    contacts
+        By name.
+    turn
+        Of the wheel that the model is a sector of; None for none.
+
+    Raises
+    ------
+    InputError
+        Naming the contact and what is wrong with it.
+    """
+    n = places.n
+    found = [one_contact(places, name, contact, turn) for name, contact in contacts.items()]
+    twice = twice_warning(
+        {
+            name: (p.own + p.following, bool(np.all(np.isfinite(p.position))))
+            for name, p in zip(contacts, found, strict=True)
+        }
+    )
+    names = [name for pairs in found for name in pairs.names]
+    if len(set(names)) < len(names):  # the points of two bodies may have the same names
+        names = [f"{g}.{x}" for p in found for g, x in zip(p.groups, p.names, strict=True)]
+
+    def stacked(which: str, empty: Any) -> FloatArray:
+        return np.concatenate([empty, *(getattr(pairs, which) for pairs in found)])
+
+    rows = [scipy.sparse.csr_array((0, n))]
+    return Pairs(
+        scipy.sparse.vstack([*rows, *(p.own for p in found)], format="csr"),
+        scipy.sparse.vstack([*rows, *(p.following for p in found)], format="csr"),
+        tuple(names),
+        tuple(group for p in found for group in p.groups),
+        tuple(law for p in found for law in p.laws),
+        stacked("position", np.zeros((0, 3))),
+        stacked("frame", np.zeros((0, 3, 3))),
+        stacked("area", np.zeros(0)),
+        np.concatenate([np.zeros((0, 3), dtype=np.int64), *(p.nodes for p in found)]),
+        (*(text for p in found for text in p.warnings), *twice),
+    )
+
+
+def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) -> Pairs:
+    """Pair the points of one contact."""
+    key = f"contact.{name}"
+    first, second, ahead = sides(places, key, contact, turn)
+    law = at_rest(key, contact)
+    if first.surface is None or (second is not None and second.surface is None):
+        return _single_dofs(places, name, contact, law, first, second, ahead)
+    pairing, said = _paired(places, key, contact, law, first, second, ahead)
+    n, p = places.n, pairing.n_points
+    operator = scipy.sparse.csr_array(pairing.gap_operator)
+    on_facets = contact.pairing == "segment_to_segment" and second is not None
+    has_area = on_facets or whole(first.surface)
+    area = pairing.weights if has_area else np.full(p, np.nan)
+    area = area if first.area is None else first.area
+    refuse_held(key, operator)
+    labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
+    rims = (text for side in (first, second) if side for text in rim_warning(places, key, side))
+    warnings = (*said, *rims, *flat_warning(key, operator, law))
+    if contact.pairing != "node_to_node" and len(first.surface.facets):
+        lost = len(first.surface.points) - len(first.surface.used)
+        if lost:
+            text = f"{key}: {lost} nodes of {first.name} span no facet and take no part."
+            warnings = (*warnings, text)
+    return Pairs(
+        operator[:, :n],
+        operator[:, n:] if ahead else scipy.sparse.csr_array((3 * p, n)),
+        labels,
+        (name,) * p,
+        shared(key, contact, law, area),
+        pairing.positions,
+        pairing.frames,
+        area,
+        _nodes(places, contact, first, operator[:, :n]),
+        warnings,
+    )
+
+
+def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArray:
+    """Return the dofs of the node that each point is."""
+    assert first.surface is not None
+    p = own.shape[0] // 3
+    found = np.full((p, 3), -1, dtype=np.int64)
+    if first.nodes is not None and contact.pairing != "segment_to_segment":
+        return first.nodes if p == len(first.nodes) else first.nodes[first.surface.used]
+    if first.nodes is not None:
+        return found
+    table = places.dofs
+    for i in range(p):
+        used = np.unique(own[3 * i : 3 * i + 3].indices)
+        used = used[table.node[used] >= 0]
+        if np.unique(table.node[used]).size == 1:
+            axes = [AXES.index(table.component[dof]) for dof in used]
+            found[i, axes] = used
+    return found
+
+
+def sides(
+    places: Places, key: str, contact: Contact | Join, turn: Turn | None
+) -> tuple[Spot, Spot | None, Turn | None]:
+    """Return both sides of a contact or join, None for the ground, and the turn of the second where it is the next sector's."""
+    one, two = contact.between
+    place = f"{key}.between"
+    if one.startswith(NEXT) or one == GROUND:
+        raise input_error(place, f"has {one!r} as its first side", "Let it be the second one.")
+    first = places.spot(one, place)
+    if two == GROUND:
+        return first, None, None
+    second = places.spot(two.removeprefix(NEXT), place)
+    if not two.startswith(NEXT):
+        refuse_itself(place, first, second)
+        return first, second, None
+    if turn is None or (places.parts[second.part].sectors == 1 and places.parts[second.part].mesh):
+        raise input_error(
+            place,
+            f"has {two!r}, and {second.part!r} is no sector of a wheel",
+            f"Leave {NEXT!r} out, or give the part its number of sectors.",
+        )
+    return first, second, turn
+
+
+def refuse_itself(place: str, first: Spot, second: Spot) -> None:
+    """Refuse two sides that are the same, or single dofs of which one meets itself."""
+    same = first.name == second.name
+    met = first.dofs.shape == second.dofs.shape and bool(np.any(first.dofs == second.dofs))
+    if same or met:
+        whom = repr(first.name) if same else f"{first.name!r} and {second.name!r}, one dof of which"
+        raise input_error(
+            place,
+            f"pairs {whom} with itself, where nothing moves relative to anything",
+            'Name the other side, or "ground".',
+        )
+
+
+def _paired(
+    places: Places, key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
+) -> tuple[Pairing, tuple[str, ...]]:
+    """Pair two surfaces, and say what is doubtful; the dofs of the next sector follow those of this one where there is a turn."""
+    assert first.surface is not None
+    a, b = widened(first.surface, second, turn)
+    facing = with_normals(key, contact, first, a, second, b)
+    along = direction(key, contact, law, first, facing, second, b)
+    if b is None:
+        empty = scipy.sparse.csr_array(facing.displacement.shape)
+        b = Surface(facing.points, empty, NO_FACETS)
+        held = named(key, contact, lambda: node_to_node(facing, b, tolerance=NODE_TO_NODE_DISTANCE_M, direction=along))
+        return held, ()
+    assert second is not None
+    normals = facing.node_normals()[facing.used]
+    opposite = normals_of(second, b)
+    if opposite is not None and turn is not None and second.frame is not None:
+        opposite = opposite[0], opposite[1] @ turn.matrix.T
+    mine = facing.points[facing.used], normals
+    refuse_without_facets(key, contact, facing, b)
+    try:
+        refuse_averted(key, contact, mine, opposite)
+        found = named(key, contact, lambda: match(contact, facing, b, along), (facing, b))
+    except InputError as error:
+        told = with_pairing(error, contact, facing, b)
+        raise (told if turn is not None else with_hint(told, places, facing, second)) from None
+    rigid = places.parts[first.part].body is not None and len(b.facets)
+    tilted = tilt_warning(key, contact, first.part, mine, opposite) if rigid else ()
+    return found, (*tilted, *overlap_warning(key, contact, found, (facing, b)))
+
+
+def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
+    """Pair two surfaces as a contact or join says."""
+    reach = contact.tolerance
+    if contact.pairing == "node_to_node":
+        return node_to_node(a, b, tolerance=NODE_TO_NODE_DISTANCE_M if reach is None else reach, direction=along)
+    if contact.pairing == "node_to_segment":
+        return node_to_segment(a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along)
+    return segment_to_segment(a, b, reach=reach, direction=along)
+
+
+def widened(first: Surface, second: Spot | None, turn: Turn | None) -> tuple[Surface, Surface | None]:
+    """Return both surfaces, the second turned to where the next sector has it, on the dofs of this sector and then of the next."""
+    if second is None:
+        return first, None
+    b = second.surface
+    assert b is not None
+    if turn is None:
+        return first, b
+    empty = [scipy.sparse.csr_array(s.displacement.shape) for s in (first, b)]
+    turned = scipy.sparse.kron(scipy.sparse.eye_array(len(b.points)), turn.matrix) @ b.displacement
+    own = scipy.sparse.hstack([first.displacement, empty[0]], format="csr")
+    theirs = scipy.sparse.hstack([empty[1], turned], format="csr")
+    normals = None if b.normals is None else b.normals @ turn.matrix.T
+    return (replace(first, displacement=own), Surface(turn.points(b.points), theirs, b.facets, normals, b.numbers))
+
+
+def _single_dofs(
+    places: Places, name: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
+) -> Pairs:
+    """Pair single dofs, in the order in which they are named."""
+    key = f"contact.{name}"
+    one, two = first.dofs, first.dofs[:0] if second is None else second.dofs
+    if first.surface is not None or (second is not None and len(one) != len(two)):
+        raise input_error(
+            f"{key}.between",
+            f"{contact.between[0]!r} is not of the kind of {contact.between[1]!r}: single dofs and points, or of another number",
+            "Pair single dofs with as many single dofs or the ground.",
+        )
+    refuse_without_direction(name, contact, first)
+    assert contact.acts is not None
+    _refuse_unused(key, contact)
+    p, n = len(one), places.n
+    row = 3 * np.arange(p) + ROWS[contact.acts]
+
+    def rows(dofs: Any, sign: float) -> Matrix:
+        return scipy.sparse.csr_array((np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n))
+
+    own, theirs = rows(one, -1.0), rows(two, 1.0)
+    if turn is not None and second is not None:
+        theirs = theirs @ _turned_dofs(places, key, second.part, turn)
+    names = (name,) if p == 1 else tuple(f"{name}.{i + 1}" for i in range(p))
+    area = np.full(p, np.nan)
+    return Pairs(
+        own if turn is not None else own + theirs,
+        theirs if turn is not None else rows(two[:0], 1.0),
+        names,
+        (name,) * p,
+        shared(key, contact, law, area),
+        np.full((p, 3), np.nan),
+        np.tile(np.eye(3), (p, 1, 1)),
+        area,
+        np.column_stack([one, np.full((p, 2), -1)]),
+    )
+
+
+def _refuse_unused(key: str, contact: Contact) -> None:
+    """Refuse what is said of surfaces in a contact of single dofs."""
+    pairing = None if contact.pairing == "node_to_node" else contact.pairing
+    said = {"pairing": pairing, "normal": contact.normal, "tangent": contact.tangent}
+    for word, given in said.items():
+        if given is not None:
+            raise input_error(
+                f"{key}.{word}",
+                f"is given, and {contact.between[0]!r} is a single dof: the contact acts along its motion alone",
+                "Leave it out; acts says whether that motion is tangential or normal. Or name a node or a surface.",
+            )
+
+
+def _turned_dofs(places: Places, key: str, name: str, turn: Turn) -> Matrix:
+    """Return the (N, N) matrix from the next sector's dofs in its own axes to those along the axes of this one; masses on a line have none."""
+    part, n = places.parts[name], places.n
+    if turn.axis is None or (part.body is None and part.mesh is None):
+        return scipy.sparse.eye_array(n, format="csr")
+    own = dof_rotation(part.structure.dofs, turn.matrix, f"{key}.between")
+    first = places.offset(name)
+    before, after = first, n - first - part.structure.n
+    sides = [scipy.sparse.eye_array(before), own, scipy.sparse.eye_array(after)]
+    return scipy.sparse.block_diag(sides, format="csr")

@@ -1,0 +1,208 @@
+"""Joins of a model: the first side's dofs follow the second's, ``u = tie @ q``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.assembly.contact import ALONE, SPATIAL, Join
+from stickslip.assembly.joints.pairs import Turn, match, sides
+from stickslip.assembly.joints.surface_checks import named
+from stickslip.assembly.locations import NO_FACETS, Places, Spot, picked
+from stickslip.contact.mortar import mortar_tie
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+
+MEAN = "segment_to_segment"
+TINY = 1e-12  # weights of partners below are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """What follows what, on the N dofs of all parts.
+
+    Parameters
+    ----------
+    followers
+        (m,) dofs that follow.
+    weights
+        (m, N) CSR: each as a sum of dofs that do not follow.
+    low, high
+        Dofs tied from sector to sector: those of this sector's `high` follow `low` of the next.
+    onward
+        (high, low) CSR weights of the latter.
+    """
+
+    followers: IntArray
+    weights: Matrix
+    low: IntArray
+    high: IntArray
+    onward: Matrix
+
+    def matrix(self, index: IntArray) -> tuple[Matrix, IntArray]:
+        """Return the tie of some of the dofs, and which of them stay.
+
+        Parameters
+        ----------
+        index
+            (n,) dofs in the order of coordinates, -1 for modal ones; those that a follower needs are among them.
+
+        Returns
+        -------
+        tie
+            (n, m) CSR from the coordinates that stay to all of `index`.
+        stays
+            (m,) positions in `index`.
+        """
+        follows = np.isin(index, self.followers)
+        stays = np.flatnonzero(~follows)
+        own = picked(np.where(follows, -1, np.cumsum(~follows) - 1), stays.size)
+        if not follows.any():
+            return own, stays
+        column = np.full(self.weights.shape[1], -1)
+        column[index[stays][index[stays] >= 0]] = np.flatnonzero(index[stays] >= 0)
+        mine = self.weights[np.searchsorted(self.followers, index[follows])].tocoo()
+        entries = (mine.data, (mine.row, column[mine.col]))
+        followed = scipy.sparse.csr_array(entries, shape=(mine.shape[0], stays.size))
+        into = picked(np.where(follows, np.cumsum(follows) - 1, -1), mine.shape[0])
+        return scipy.sparse.csr_array(own + into @ followed), stays
+
+
+def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> Ties:
+    """Find what the joins of a model tie.
+
+    Raises
+    ------
+    InputError
+        Naming the join, if surfaces do not meet, a node follows twice or in a circle, or a follower is clamped.
+    """
+    n = places.n
+    rows: dict[int, Matrix] = {}
+    ahead_of: dict[int, Matrix] = {}
+    for name, join in joins.items():
+        key = f"join.{name}"
+        if join.pairing == SPATIAL:
+            raise input_error(
+                f"{key}.pairing", f"is {SPATIAL}, and of wheels coupled so only the modes are known", ALONE
+            )
+        first, second, ahead = sides(places, key, join, turn)
+        if second is None or first.surface is None or second.surface is None:
+            raise input_error(f"{key}.between", "needs two surfaces", "Clamp a part to hold it against the ground.")
+        found = _followed(key, join, first, second, ahead)
+        if ahead is not None:
+            ahead_of |= {dof: row for dof, row in found.items() if dof not in ahead_of}
+            continue
+        _refuse_twice(places, key, found, rows)
+        rows |= found
+    followers = np.array(sorted(rows), dtype=np.int64)
+    weights = scipy.sparse.vstack([scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr")
+    weights = _resolved(places, followers, weights, len(joins))
+    onward = scipy.sparse.vstack([scipy.sparse.csr_array((0, n)), *ahead_of.values()], format="csr")
+    low = np.unique(onward.indices).astype(np.int64)
+    high = np.array(list(ahead_of), dtype=np.int64)
+    return Ties(followers, weights, low, high, onward[:, low])
+
+
+def _followed(key: str, join: Join, first: Spot, second: Spot, turn: Turn | None) -> dict[int, Matrix]:
+    """Return each dof of the first side with its row of weights; of the next sector, in its own axes."""
+    assert first.surface is not None
+    assert second.surface is not None
+    if first.nodes is None:
+        raise input_error(
+            f"{key}.between",
+            f"the points of {first.name!r} are those of a rigid body, which cannot follow",
+            "Let it be the second side.",
+        )
+    a, b = first.surface, second.surface
+    if turn is not None:
+        b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
+    theirs = _in_the_mean(key, join, a, b) if join.pairing == MEAN else _by_nodes(key, join, _towards(a, b), b)
+    theirs.data[np.abs(theirs.data) < TINY] = 0.0
+    theirs.eliminate_zeros()
+    dofs = first.nodes.ravel()
+    _refuse_clamped(key, first, dofs, theirs)
+    return {int(d): theirs[[i]] for i, d in enumerate(dofs) if d >= 0}
+
+
+def _by_nodes(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
+    """Return the motion (3 n_A, N) of the partners of all nodes of side A."""
+    try:
+        pairing = named(key, join, lambda: match(join, a, b, _across(a)))
+    except InputError as error:
+        if join.pairing != "node_to_node":
+            raise
+        remedy = "Use node_to_segment, or raise the tolerance."
+        raise input_error(error.place, error.problem, remedy) from None
+    # gap = frameᵀ (u_b - u_a): back to global axes
+    p = pairing.n_points
+    blocks = (pairing.frames, np.arange(p), np.arange(p + 1))
+    back = scipy.sparse.bsr_array(blocks, shape=(3 * p, 3 * p)).tocsr()
+    return scipy.sparse.csr_array(back @ pairing.gap_operator + a.displacement)
+
+
+def _in_the_mean(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
+    """Return the motion (3 n_A, N) that side B gives the nodes of side A in the mean."""
+    weights = named(key, join, lambda: mortar_tie(a, b, reach=join.tolerance))
+    return scipy.sparse.csr_array(scipy.sparse.kron(weights, np.eye(3)) @ b.displacement)
+
+
+def _across(a: Surface) -> tuple[float, float, float]:
+    normals = a.node_normals()[a.used]
+    sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
+    x, y, z = (float(v) for v in np.eye(3)[int(np.argmax(sines))])
+    return x, y, z
+
+
+def _towards(a: Surface, b: Surface) -> Surface:
+    """Return all nodes of side A with normals towards side B; without facets of B any will do."""
+    from scipy.spatial import cKDTree
+
+    normals = np.tile([0.0, 0.0, 1.0], (len(a.points), 1))
+    if len(b.facets):
+        near = b.used[cKDTree(b.points[b.used]).query(a.points)[1]]
+        normals = -b.node_normals()[near]
+    return Surface(a.points, a.displacement, NO_FACETS, normals, a.numbers)
+
+
+def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> None:
+    moving = np.diff(theirs.indptr) > 0
+    stuck = np.flatnonzero((dofs < 0) & moving)
+    if stuck.size:
+        assert first.surface is not None
+        assert first.surface.numbers is not None
+        node = first.surface.numbers[stuck[0] // 3]
+        raise input_error(
+            f"{key}.between",
+            f"node {node} of {first.name!r} is clamped and cannot follow, {stuck.size} such dofs in all",
+            "Clamp its partner as well, or take it out of the set.",
+        )
+
+
+def _refuse_twice(places: Places, key: str, found: Mapping[int, Matrix], rows: Mapping[int, Matrix]) -> None:
+    for dof in found:
+        if dof in rows:
+            raise input_error(
+                f"{key}.between",
+                f"{places.dofs.labels[dof]} follows another surface already",
+                "Tie it once: take the node out of one of the sets.",
+            )
+
+
+def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int) -> Matrix:
+    """Replace followers among those followed by what they follow."""
+    for _ in range(rounds + 1):
+        chained = weights[:, followers]
+        if not chained.nnz:
+            return weights
+        keep = np.ones(weights.shape[1])
+        keep[followers] = 0.0
+        weights = scipy.sparse.csr_array(weights @ scipy.sparse.diags_array(keep) + chained @ weights)
+        weights.eliminate_zeros()
+    dof = int(followers[weights[:, followers].nonzero()[1][0]])
+    raise input_error(
+        "join",
+        f"{places.dofs.labels[dof]} follows itself round a circle of joins",
+        "Turn the sides of one of the joins round.",
+    )

@@ -1,0 +1,1 @@
+"""Parts reduced, copied, and with more modes for comparison."""

@@ -1,0 +1,321 @@
+"""Reduction of the parts, each once: copies and later models share it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.locations import node_rows
+from stickslip.assembly.parts.part_copies import turned_dofs, turned_structure
+from stickslip.errors import InputError, SingularError
+from stickslip.model.axis import Axis
+from stickslip.model.dofs import Dofs
+from stickslip.model.fe.free_solid import inertia_relief
+from stickslip.model.part import Part
+from stickslip.model.structure import Structure
+from stickslip.reduction.basis import surviving_sets, with_modal_dofs
+from stickslip.reduction.cache import content_hash
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.common_modes import modes_of, on_modes_of_others
+
+Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
+REMEMBERED = 4  # reductions of a part that are kept in memory
+
+
+@dataclass(frozen=True)
+class Spin:
+    """How a model turns.
+
+    Parameters
+    ----------
+    speed
+        In rad/s.
+    tangent, coriolis
+        As in `RotatingSolid.at_speed`.
+    axis
+        That rigid bodies turn about; solids have their own.
+    like
+        Speeds in rad/s whose modes those of reductions are to be near to, see `Model.modes_like`; empty: any.
+    """
+
+    speed: float = 0.0
+    tangent: Literal["consistent", "textbook"] = "consistent"
+    coriolis: bool = False
+    axis: Axis = Axis()  # noqa: RUF009  # frozen
+    like: tuple[float, ...] = ()
+
+    @property
+    def references(self) -> tuple["Spin", ...]:
+        """How it turns where its modes are known; empty: here."""
+        if self.like in ((), (self.speed,)):
+            return ()
+        return tuple(replace(self, speed=speed, like=()) for speed in self.like)
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """What the displacement of steady rotation of a part obeys.
+
+    Parameters
+    ----------
+    tie
+        That of its cyclic faces; None for none.
+    unit
+        (n,) the displacement itself at 1 rad/s in m s², where joined parts share in it; None: that of the part alone.
+    carried
+        (n,) of a part that contacts alone hold: what they have to carry at 1 rad/s, N s²; None where it is held.
+    """
+
+    tie: Matrix | None = None
+    unit: FloatArray | None = None
+    carried: FloatArray | None = None
+
+    def displacement(self, part: Part, speed: float) -> FloatArray:
+        """Return the (n,) displacement in m of a part with a solid at a speed in rad/s."""
+        assert part.solid is not None
+        if self.unit is not None:
+            return np.asarray(speed**2 * self.unit)
+        return part.solid.displacement(speed, tie=self.tie)
+
+
+ALONE = Steady()
+
+
+def steady_of(part: Part, tie: Matrix | None) -> Steady:
+    """Return what the displacement of steady rotation of a part by itself obeys; of a free one that in balance with its inertia."""
+    relief = None if part.solid is None else inertia_relief(part.solid, tie)
+    return Steady(tie) if relief is None else Steady(tie, *relief)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedPart:
+    """A part on few coordinates.
+
+    Parameters
+    ----------
+    structure
+        Kept dofs, then modal coordinates; without the way back unless `with_ways_back` asks for it.
+    kept
+        (k,) dofs of the part that the first coordinates are.
+    steady
+        (n,) static load that leads to the displacement of steady rotation, N; zeros at rest.
+    """
+
+    structure: Structure
+    kept: IntArray
+    steady: FloatArray
+
+
+def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Keep nothing: the store of a model that no study has."""
+    return make()
+
+
+def with_ways_back(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Keep nothing either: the store that asks reductions for their way back to all dofs."""
+    return make()
+
+
+def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structure:
+    """Return the full structure of a part at a speed."""
+    if part.body is not None and spin.speed != 0.0:
+        return part.body.at_speed(spin.speed, spin.axis, coriolis=spin.coriolis)
+    if part.solid is None or spin.speed == 0.0:
+        return part.structure
+    try:
+        return part.solid.at_speed(
+            spin.speed, tie=rest.tie, unit=rest.unit, tangent=spin.tangent, coriolis=spin.coriolis
+        )
+    except SingularError as error:
+        raise SingularError(f"part.{name}: {error}") from None
+
+
+def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
+    """Return the (n, n) derivative by Ω² of the stiffness of `at_speed`, N s²/m."""
+    if part.body is not None:
+        return scipy.sparse.csr_array(part.body.at_speed(1.0, spin.axis).stiffness)
+    if part.solid is None:
+        return scipy.sparse.csr_array((part.structure.n, part.structure.n))
+    found = part.solid.polynomial(rest.tie, tangent=spin.tangent, unit=rest.unit)
+    return found.by_square(spin.speed)
+
+
+def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:
+    """Return the (n,) load on a part's dofs, at a speed, under which it comes to the displacement of steady rotation."""
+    if part.solid is None or spin.speed == 0.0:
+        return np.zeros(part.structure.n)
+    load = np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
+    return load if rest.carried is None else load + spin.speed**2 * rest.carried
+
+
+def damped(name: str, part: Part, structure: Structure) -> Structure:
+    """Return a structure of a part with the damping that follows from its matrices."""
+    if part.damping is None:
+        return structure
+    try:
+        # neither tension nor spin softening dissipates
+        return part.damping.of_matrices(structure, part.structure.stiffness)
+    except InputError as error:
+        raise error.inside(f"part.{name}") from None
+
+
+def whole_nodes(table: Dofs, dofs: IntArray) -> IntArray:
+    """Return the dofs of all nodes of which one dof is among `dofs`, in rising order."""
+    numbers = np.unique(table.node[dofs])
+    rows = node_rows(table, numbers[numbers >= 0])
+    return np.union1d(dofs, rows[rows >= 0])
+
+
+def reduced_parts(
+    parts: Mapping[str, Part],
+    kept: Mapping[str, IntArray],
+    spin: Spin,
+    rest: Mapping[str, Steady],
+    store: Store = in_memory,
+) -> dict[str, ReducedPart]:
+    """Reduce all parts of a single structure.
+
+    Parameters
+    ----------
+    parts
+        By name.
+    kept
+        Dofs of each part that stay physical.
+    spin
+        At what speed.
+    rest
+        What the displacements of steady rotation obey.
+    store
+        Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+
+    Raises
+    ------
+    InputError
+        If a part has fewer dofs than modes are asked of it.
+    SingularError
+        If a part is free to move although its kept dofs are fixed.
+    """
+    wanted: dict[int, IntArray] = {}
+    for name, part in parts.items():
+        root = _root(part, spin, rest[name])
+        own = whole_nodes(part.structure.dofs, kept[name])
+        wanted[id(root)] = np.union1d(wanted.get(id(root), own), own)
+    found = {}
+    for name, part in parts.items():
+        root = _root(part, spin, rest[name])
+        steady = rest[name] if root.solid is not None and spin.speed != 0.0 else ALONE
+        made = _reduced(name, root, wanted[id(root)], (spin, steady), store)
+        found[name] = made if root is part else _placed(made, part)
+    return found
+
+
+def _root(part: Part, spin: Spin, rest: Steady) -> Part:
+    """Return the part whose reduction a part shares."""
+    if part.template is None or part.place is None or part.body is not None:
+        return part
+    turns = part.solid is not None and spin.speed != 0.0
+    alike = part.place.keeps(part.axis) and rest.unit is None
+    return part if turns and not alike else part.template
+
+
+def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store) -> ReducedPart:
+    changes = part.solid is not None or part.body is not None
+    spin, rest = turning if changes else (Spin(), ALONE)
+    shared = None if rest.unit is None else rest.unit.tobytes()
+    whole = store is with_ways_back
+    key = (spin, shared, kept.tobytes(), whole)
+    if key not in part.memo:
+
+        def make() -> ReducedPart:
+            made = _reduce(name, part, kept, spin, rest)
+            return made if whole else replace(made, structure=replace(made.structure, basis=None))
+
+        if part.reduction is None or part.body is not None or whole:
+            made = make()
+        else:
+            content = _content(part, spin, rest, kept)
+            values = store(content, lambda: _packed(make()))
+            structure, steady = unpacked(values, part.structure, kept)
+            made = ReducedPart(structure, kept, steady)
+        part.memo[key] = made
+        forget(part.memo, ReducedPart, REMEMBERED)
+    found: ReducedPart = part.memo[key]
+    return found
+
+
+def _packed(made: ReducedPart) -> dict[str, Any]:
+    return packed(made.structure, made.steady)
+
+
+def forget(memo: dict[Any, Any], kind: type, most: int) -> None:
+    """Leave `most` values of a kind in memory: the last ones."""
+    for key in [key for key, value in memo.items() if isinstance(value, kind)][:-most]:
+        del memo[key]
+
+
+def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> ReducedPart:
+    full = at_speed(name, part, spin, rest)
+    steady = steady_load(part, spin, full, rest)
+    full = damped(name, part, full)
+    try:
+        if part.reduction is None or part.body is not None:
+            whole = full if part.damping is None else part.damping.of_modes(full)
+            return ReducedPart(whole, np.arange(full.n), steady)
+        if spin.references and part.solid is not None and isinstance(part.reduction, Reduction):
+            known = [at_speed(name, part, other, rest) for other in spin.references]
+            others = [modes_of(one, kept, part.reduction) for one in known]
+            small = on_modes_of_others(full, kept, part.reduction, others)
+        else:
+            small = part.reduction.of(full, kept)
+        if part.damping is not None:
+            small = part.damping.of_modes(small)
+    except InputError as error:
+        raise error.inside(f"part.{name}") from None
+    except SingularError as error:
+        raise SingularError(f"part.{name}: {error}") from None
+    return ReducedPart(small, kept, np.asarray(small.project(steady)))
+
+
+def _placed(made: ReducedPart, part: Part) -> ReducedPart:
+    """Return the reduction of a part for a copy of it: physical coordinates turn, modal ones stay."""
+    assert part.place is not None
+    structure = turned_structure(made.structure, part.place)
+    turn = turned_dofs(made.structure.dofs, part.place)
+    if made.structure.basis is not None:
+        assert part.template is not None
+        whole = turned_dofs(part.template.structure.dofs, part.place)
+        structure = replace(structure, basis=whole @ made.structure.basis @ turn.T)
+    return ReducedPart(structure, made.kept, np.asarray(turn @ made.steady))
+
+
+def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
+    solid = part.solid
+    turning: tuple[object, ...] = ()
+    if solid is not None and spin.speed != 0.0:
+        mesh, material = solid.mesh, solid.material
+        given = (material,) if not isinstance(material, list | tuple) else tuple(material)
+        turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
+    return content_hash("reduced", part.structure, kept, part.reduction, part.damping, turning)
+
+
+def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
+    """Return a reduced structure and its load of steady rotation as named arrays."""
+    s = structure
+    arrays = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "loss": s.loss}
+    own = {name: _dense(matrix) for name, matrix in arrays.items() if matrix is not None}
+    return own | {"steady": steady}
+
+
+def unpacked(values: Mapping[str, Any], full: Structure, kept: IntArray) -> tuple[Structure, Matrix]:
+    """Return both from the arrays: the table of its dofs and its sets follow from the full structure."""
+    mass, loss = np.asarray(values["mass"]), values.get("loss")
+    dofs, sets = (with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size), surviving_sets(full, kept))
+    own = mass, values["damping"], values["stiffness"]
+    return Structure(*own, dofs, sets, None, loss), np.asarray(values["steady"])
+
+
+def _dense(matrix: Matrix) -> FloatArray:
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)

@@ -1,0 +1,247 @@
+"""Mistuning as changes of the wheel's matrices, of low rank."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.locations import picked, stacked
+from stickslip.assembly.model import Model
+from stickslip.assembly.parts.reduced import at_speed, damped
+from stickslip.assembly.sides.mistuning import BladeMistuning, OwnSector
+from stickslip.assembly.sides.wheel import faces_of, leaders, own_and_onward
+from stickslip.errors import input_error
+from stickslip.model.dofs import numbered_dofs
+from stickslip.model.fe.factorisation import factorise
+from stickslip.model.modes import normal_modes
+from stickslip.model.part import Part
+from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic import CyclicSector
+from stickslip.reduction.sectors import of_alike, strip
+from stickslip.units import HZ
+
+FEW_ROWS = 30  # shares of a sector's motion: above, all coordinates of the wheel are no more
+Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s m)
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """A deviation of sectors.
+
+    Parameters
+    ----------
+    rows
+        (r, N) CSR on the dofs of all parts: shares of a sector's motion that it acts on.
+    factors
+        (n_s, r) stiffness that each share has beyond the tuned one; None where shares are many and `change` tells it all.
+    change
+        From the couplings (n_s, r, m) of these rows with all coordinates to what the matrices of the wheel change by.
+    behind
+        (r, N) CSR: what the motion of the sector before adds to each share; None: nothing.
+    """
+
+    rows: Matrix
+    factors: FloatArray | None = None
+    change: Callable[[Matrix], Changes] | None = None
+    behind: Matrix | None = None
+
+
+def deviations(model: Model) -> list[Deviation]:
+    """Return all deviations of the matrices of a model's sectors.
+
+    Raises
+    ------
+    InputError
+        If a name is none, or a part that is to stand in a sector has other dofs.
+    """
+    here = model.mistuning
+    assert here is not None
+    found = [_of_blades(model, name, one) for name, one in here.blades.items()]
+    return [*found, *(_of_own(model, name, one) for name, one in here.own.items())]
+
+
+@dataclass(frozen=True, eq=False)
+class Blade:
+    """A blade held where it meets the rest of its part, in its own sector and in those beside it.
+
+    Parameters
+    ----------
+    stiffness, mass
+        (b, b) of its own dofs.
+    rows
+        (b, N) CSR: the forces on them by the motion of the whole part, on the dofs of all parts.
+    whole
+        Whether it is the whole part, which nothing holds.
+    behind
+        (b, N) CSR: the forces on them by the motion of the sector before, whose high face they are; None: no dof lies on a face.
+    """
+
+    stiffness: Matrix
+    mass: Matrix
+    rows: Matrix
+    whole: bool
+    behind: Matrix | None = None
+
+
+def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> Blade:
+    """Return the blade that a name ``part`` or ``part.set`` means, `beyond` a radius in m; `place` is the key that has it."""
+    head, _, rest = of.partition(".")
+    part = model.places.part_of(head, place)
+    structure = at_speed(head, part, model.spin(model.speed), model.steady[head])
+    first, n = model.places.offset(head), model.places.n
+    own = np.arange(structure.n)
+    if rest:
+        spot = model.places.spot(of, place)
+        dofs = spot.dofs if spot.nodes is None else spot.nodes[spot.nodes >= 0]
+        own = np.unique(dofs) - first
+    if beyond is not None:
+        arm = np.linalg.norm(part.axis.arm(structure.dofs.position[own]), axis=1)
+        own = own[arm > beyond]
+    if not own.size or part.body is not None:
+        raise input_error(place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part.")
+    K, M = (scipy.sparse.csr_array(m) for m in (structure.stiffness, structure.mass))
+    wide = picked(first + np.arange(structure.n), n)
+    sector = faces_of(head, part) if part.sectors > 1 else None
+    if own.size == structure.n:
+        return Blade(K, M, K @ wide, whole=True)
+    if np.isin(first + own, np.concatenate([model.ties.low, model.ties.high])).any():
+        raise input_error(
+            place,
+            f"{of!r} has dofs that a join ties to the next sector, so that none of them is of one blade alone",
+            "Leave the joined surfaces out of the set.",
+        )
+    if sector is None:
+        return Blade(K[own][:, own], M[own][:, own], K[own] @ wide, whole=False)
+    own = _of_one_blade(sector, own, of, place)
+    # a dof of the low face is also the high face of the sector before, whose matrices act on it, too
+    here, there = own_and_onward(sector, own)
+    behind = (there.T @ K @ wide).tocsr() if there.nnz else None
+    stiffness, mass = (scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M))
+    rows = scipy.sparse.csr_array(here.T @ K @ wide)
+    return Blade(stiffness, mass, rows, whole=False, behind=behind)
+
+
+def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> IntArray:
+    """Return the dofs of a blade without those of the high face, which are the next one's."""
+    if np.isin(own, sector.shared).any():
+        raise input_error(place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out.")
+    left = np.setdiff1d(own, sector.high)
+    if np.setdiff1d(leaders(sector, own), left).size:
+        raise input_error(
+            place,
+            f"{of!r} has dofs of the high cyclic face, which are those of the next blade, and not their partners on the low face",
+            "Take the partners on the low face into the set, or leave the face out.",
+        )
+    return left
+
+
+def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
+    """Return squares (r,) of the circular frequencies and shapes (b, r) of the lowest modes of a blade by itself, rigid ones left out."""
+    b = blade.stiffness.shape[0]
+    every = int(np.count_nonzero(blade.mass.diagonal()))
+    structure = Structure(blade.mass, scipy.sparse.csr_array((b, b)), blade.stiffness, numbered_dofs(b))
+    squares: FloatArray = np.zeros(0)
+    shapes: FloatArray = np.zeros((b, 0))
+    asked = 0
+    while squares.size < number and asked < every:
+        asked = min(asked + number - squares.size, every)  # rigid ones come first
+        found = normal_modes(structure, asked)
+        strained = found.squares > 0.0
+        squares, shapes = found.squares[strained], np.real(found.shapes[:, strained])
+    return squares, shapes
+
+
+def blade_alone_hz(model: Model, of: str, number: int, place: str, beyond: float | None = None) -> FloatArray:
+    """Return the lowest natural frequencies (r,) of a blade by itself in Hz."""
+    squares, _ = blade_alone(blade_of(model, of, place, beyond), number)
+    return np.asarray(np.sqrt(squares) / HZ)
+
+
+def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
+    blade = blade_of(model, one.of, f"mistuning.{name}.of", one.beyond_radius)
+    factors = one.factors
+    if factors.ndim == 2 or one.modes is not None:
+        return _of_modes(name, blade, factors, one.modes)
+    b = blade.stiffness.shape[0]
+    first = model.places.offset(one.of.partition(".")[0])
+    rows = picked(first + np.arange(b), model.places.n) if blade.whole else blade.rows
+    behind = None if blade.whole else blade.behind
+    if b <= FEW_ROWS:
+        # K = V diag(w) Vᵀ; of a blade that is held, [K K_r]ᵀ K⁻¹ [K K_r]
+        values, vectors = np.linalg.eigh(blade.stiffness.toarray())
+        weights = values if blade.whole else 1.0 / values
+        return Deviation(
+            scipy.sparse.csr_array(vectors.T @ rows),
+            factors[:, None] * weights,
+            behind=None if behind is None else scipy.sparse.csr_array(vectors.T @ behind),
+        )
+    kernel = blade.stiffness if blade.whole else factorise(blade.stiffness)
+
+    def of_blade(blocks: Matrix) -> Changes:
+        return {"stiffness": of_alike(blocks, kernel, factors)}
+
+    return Deviation(rows, change=of_blade, behind=behind)
+
+
+def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
+    """Return the deviation that single modes of the blades carry: each has the share of the motion that is its own."""
+    squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
+    if not squares.size:
+        raise input_error(
+            f"mistuning.{name}.of",
+            "has no mode by itself that deforms it, which a deviation could change",
+            "Name more of the blade.",
+        )
+    if factors.ndim == 2 and factors.shape[1] > squares.size:
+        raise input_error(
+            f"mistuning.{name}.deviations",
+            f"is of {factors.shape[1]} modes, and the model's blade has {squares.size}",
+            "Leave the others out.",
+        )
+    each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
+    # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
+    weights = (shapes / np.sqrt(squares)).T
+    behind = None if blade.behind is None else scipy.sparse.csr_array(weights @ blade.behind)
+    return Deviation(scipy.sparse.csr_array(weights @ blade.rows), each, behind=behind)
+
+
+def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
+    """Return what another part in one sector changes, seen by the motions of the tuned wheel."""
+    key = f"mistuning.{name}"
+    old = model.places.part_of(one.part, f"{key}.part")
+    _refuse_unlike(key, old, one.by)
+    spin, rest = model.spin(model.speed), model.steady[one.part]
+    before, after = (damped(one.part, p, at_speed(one.part, p, spin, rest)) for p in (old, one.by))
+    kinds = ("mass", "damping", "stiffness")
+    change = {
+        kind: scipy.sparse.csr_array(getattr(after, kind)) - scipy.sparse.csr_array(getattr(before, kind))
+        for kind in kinds
+    }
+    touched: IntArray = np.unique(stacked(abs(m).tocsr().nonzero()[1] for m in change.values()))
+    rows = picked(model.places.offset(one.part) + touched, model.places.n)
+    small = {kind: m[touched][:, touched] for kind, m in change.items()}
+
+    def of_own(blocks: Matrix) -> Changes:
+        own = strip(blocks, one.sector)
+        return {kind: own.T @ (m @ own) for kind, m in small.items() if m.nnz}
+
+    return Deviation(rows, change=of_own)
+
+
+def _refuse_unlike(key: str, old: Part, new: Part) -> None:
+    if new.sectors != old.sectors:
+        raise input_error(
+            f"{key}.by",
+            f"is one of {new.sectors} sectors, and the part in whose place it stands one of {old.sectors}",
+            f"Give it sectors = {old.sectors}.",
+        )
+    before, after = old.structure, new.structure
+    same = before.n == after.n and before.dofs.component == after.dofs.component
+    if not (same and np.array_equal(before.dofs.node, after.dofs.node)):
+        raise input_error(
+            f"{key}.by",
+            f"has {after.n} dofs, and the part in whose place it stands has {before.n}, or they are numbered otherwise",
+            "Take the same mesh, its nodes moved or of another material.",
+        )

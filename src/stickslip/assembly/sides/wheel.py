@@ -1,0 +1,392 @@
+"""A model that is a sector of a wheel: how its parts meet their neighbours, and its waves reduced."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.coordinates import Coordinates
+from stickslip.assembly.joints.nonmatching_cyclic_faces import unlike_faces
+from stickslip.assembly.joints.pairs import Pairs, Turn
+from stickslip.assembly.joints.ties import MEAN, Ties
+from stickslip.assembly.locations import Places, picked, stacked
+from stickslip.assembly.sides.wave_damping import DampingOfParts
+from stickslip.errors import InputError, input_error
+from stickslip.model.damping import Damping
+from stickslip.model.part import Part
+from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.common_modes import modes_of, on_modes_of_others
+from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+from stickslip.reduction.nodal import nodal_coordinates
+from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.reduction.waves import excited_wave, wave
+
+IN_SPACE = 2  # directions in which a node moves; fewer: coordinates that no turn changes
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """How the parts of a sector meet those of its neighbours.
+
+    Parameters
+    ----------
+    turn
+        Number of sectors and axis.
+    low, high
+        Dofs of all parts: those of `high` follow those of `low`.
+    weights
+        (high, low) CSR as in `CyclicSector`; None: they are partners, in the same order.
+    ties
+        Part -> tie of its static displacement, which all sectors have alike.
+    warnings
+        What the user should know.
+    """
+
+    turn: Turn
+    low: IntArray
+    high: IntArray
+    weights: Matrix | None
+    ties: Mapping[str, Matrix]
+    warnings: tuple[str, ...]
+
+    def sector(self, structure: Structure, at: Coordinates) -> CyclicSector:
+        """Return the sector, given its structure on coordinates that hold all partners or none of a pair."""
+        untied = np.full(max(int(at.ids.max(initial=-1)), *self.low, *self.high, 0) + 1, -1)
+        known = at.stays[at.ids[at.stays] >= 0]
+        untied[at.ids[known]] = np.flatnonzero(at.ids[at.stays] >= 0)
+        low, high = untied[self.low], untied[self.high]
+        weights = self.weights
+        if weights is None:
+            here, torn = low >= 0, np.flatnonzero((low < 0) != (high < 0))
+            low, high = low[here], high[here]
+        else:
+            followed, follow = low >= 0, high >= 0
+            across = (weights[follow][:, ~followed], weights[~follow][:, followed])
+            torn = np.concatenate([np.unique(part.nonzero()[0]) for part in across])
+            low, high, weights = low[followed], high[follow], weights[follow][:, followed]
+        if torn.size:
+            raise input_error(
+                "join",
+                f"{torn.size} dofs of a cyclic face follow a join, and their partners on the other face do not",
+                "Join both faces alike.",
+            )
+        return CyclicSector(structure, self.turn.sectors, low, high, self.turn.axis, weights)
+
+
+def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
+    """Pair the cyclic faces of all parts; None where the model is no sector.
+
+    Raises
+    ------
+    InputError
+        If parts belong to wheels of different sizes, faces do not match, or sets are not there.
+    """
+    counts = {name: part.sectors for name, part in parts.items() if part.sectors > 1}
+    if not counts:
+        return None
+    _refuse_others(parts, counts)
+    tied, ties, warnings, axes = [], {}, [], []
+    for name in counts:
+        part = parts[name]
+        sector = faces_of(name, part)
+        if sector is None:
+            why = "has no cyclic faces; only contacts and joins lead to its neighbours."
+            warnings.append(f"part.{name}: {why}")
+            continue
+        ties[name] = sector.tie
+        axes.append(sector.axis)
+        first = places.offset(name)
+        tied.append((sector.low + first, sector.high + first, sector.weights))
+    axis = axes[0] if axes else parts[next(iter(counts))].axis
+    if any((a is None) != (axis is None) or (a is not None and a != axis) for a in axes):
+        raise input_error("part", "turn about different axes", "Give all parts of a wheel one axis.")
+    turn = Turn(next(iter(counts.values())), axis)
+    return Neighbours(turn, *_one_after_the_other(tied), ties, tuple(warnings))
+
+
+def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
+    """Return the neighbours with what joins tie from sector to sector."""
+    if found is None or not ties.high.size:
+        return found
+    both = (found.low, found.high, found.weights), (ties.low, ties.high, ties.onward)
+    low, high, weights = _one_after_the_other(both)
+    first = np.sort(np.unique(high, return_index=True)[1])  # corners of faces that meet
+    low = low if weights is not None else low[first]
+    weights = None if weights is None else weights[first]
+    return replace(found, low=low, high=high[first], weights=weights)
+
+
+def _one_after_the_other(
+    tied: Sequence[tuple[IntArray, IntArray, Matrix | None]],
+) -> tuple[IntArray, IntArray, Matrix | None]:
+    """Put what is tied together; with weights, each dof of the low faces is there once."""
+    low, high = stacked(one[0] for one in tied), stacked(one[1] for one in tied)
+    if all(one[2] is None for one in tied):
+        return low, high, None
+    weights = scipy.sparse.block_diag(
+        [scipy.sparse.eye_array(one[0].size) if one[2] is None else one[2] for one in tied]
+    )
+    once, place = np.unique(low, return_inverse=True)
+    merged = weights @ picked(place, once.size)
+    return once, high, scipy.sparse.csr_array(merged)
+
+
+def _refuse_others(parts: Mapping[str, Part], counts: Mapping[str, int]) -> None:
+    first = next(iter(counts))
+    for name, count in counts.items():
+        if count != counts[first]:
+            raise input_error(
+                f"part.{name}.sectors",
+                f"is {count}, and the part {first!r} is one of {counts[first]} sectors",
+                "All parts of a wheel have the same number of sectors.",
+            )
+    for name, part in parts.items():
+        if part.sectors == 1 and part.mesh is not None:
+            raise input_error(
+                f"part.{name}.sectors",
+                f"is 1, and the part {first!r} is one of {counts[first]} sectors",
+                f"Give sectors = {counts[first]}: each sector has one of all parts.",
+            )
+
+
+def faces_of(name: str, part: Part) -> CyclicSector | None:
+    """Return the sector that a part is; None where it has no faces."""
+    here = [face in part.structure.sets for face in part.faces]
+    if not any(here) and part.faces == Part.faces:
+        return None
+    try:
+        low, high = (part.structure.dof_set(face) for face in part.faces)
+        if part.cyclic == MEAN:
+            return unlike_faces(part)
+        if part.mesh is None and not _in_space(part.structure, low):
+            return CyclicSector(part.structure, part.sectors, low, high, axis=None)
+        return cyclic_sector(part.structure, part.sectors, low=part.faces[0], high=part.faces[1], axis=part.axis)
+    except InputError as error:
+        raise error.inside(f"part.{name}") from None
+
+
+def _in_space(structure: Structure, members: IntArray) -> bool:
+    nodes, counts = np.unique(structure.dofs.node[members], return_counts=True)
+    return bool(nodes.size and nodes[0] >= 0 and counts.max() >= IN_SPACE)
+
+
+def partners(sector: CyclicSector) -> IntArray:
+    """Return each dof of a sector, those of the high face replaced by their partners on the low one; -1 where it follows several."""
+    place = np.arange(sector.structure.n)
+    high, low, weights = sector.following
+    place[high] = -1
+    single = np.flatnonzero(np.diff(weights.indptr) == 1)
+    place[high[single]] = low[weights.indices[weights.indptr[single]]]
+    return place
+
+
+def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
+    """Return the dofs that some dofs of a sector move with, in rising order: themselves, or those of the low face that they follow."""
+    high, low, weights = sector.following
+    followed = weights[np.isin(high, dofs)].nonzero()[1]
+    return np.union1d(np.setdiff1d(dofs, high), low[followed])
+
+
+def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix]:
+    """Return the (n, b) matrices from dofs that do not follow to what they move in their own sector, and in the one before it."""
+    tie = sector.tie[:, np.searchsorted(sector.independent, dofs)]
+    high = np.zeros(sector.structure.n)
+    high[sector.high] = 1.0
+    own, onward = (scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - high, high))
+    onward.eliminate_zeros()
+    return own, onward
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSector:
+    """The waves of a wheel, reduced, on coordinates that mean the same to its contacts.
+
+    Parameters
+    ----------
+    sector
+        What was reduced.
+    kept
+        (k,) its dofs that the first coordinates of reduced waves are.
+    ways
+        Wave number -> (n0, n) from the coordinates to those of the reduced wave.
+    waves
+        Wave number -> reduced wave and load of steady rotation, as `reduced_wave` made them.
+    wheel
+        The same in these coordinates, without their way back.
+    gaps
+        (3 p, n) CSR.
+    steady
+        (n,) load of steady rotation.
+    fields
+        Wave number -> (n, l) loads of `Model.spread` on its coordinates; empty: there are none.
+    bases
+        Wave number -> way back, as of `SectorWaves`.
+    """
+
+    sector: CyclicSector
+    kept: IntArray
+    ways: Mapping[int, Matrix]
+    waves: Mapping[int, tuple[Structure, Matrix]]
+    wheel: TunedWheel
+    gaps: Matrix
+    steady: FloatArray
+    fields: Mapping[int, Matrix] = field(default_factory=dict)
+    bases: Mapping[int, Matrix] = field(default_factory=dict)
+
+    def expand(self, q: Matrix, wave_number: int) -> Matrix:
+        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave of which there is the way back."""
+        k = wave_number % self.sector.sectors
+        return np.asarray(self.bases[k] @ (self.ways[k] @ q))
+
+    def field(self, index: int, wave_number: int) -> Matrix:
+        """Return the (n,) load on the coordinates of a wave of one that was projected with it."""
+        return np.asarray(self.fields[wave_number % self.sector.sectors][:, index])
+
+    def load(self, force: Matrix, wave_number: int) -> Matrix:
+        """Return the (n,) load on the coordinates of a wave of a load (n_sector,) on kept dofs."""
+        k = wave_number % self.sector.sectors
+        on_wave = self.sector.wave_tie(k).conj().T @ force
+        own = np.zeros(self.ways[k].shape[0], dtype=on_wave.dtype)
+        own[: self.kept.size] = on_wave[np.searchsorted(self.sector.independent, self.kept)]
+        return np.asarray(self.ways[k].conj().T @ own)
+
+    def on_wave(self, operator: Matrix, k: int) -> Matrix:
+        """Return an operator (m, n_sector) on kept dofs as one on the coordinates of the reduced wave as it was made."""
+        moved = scipy.sparse.csr_array(operator @ self.sector.wave_tie(k))
+        own = moved[:, np.searchsorted(self.sector.independent, self.kept)].tocoo()
+        shape = (own.shape[0], self.waves[k][0].n)
+        return scipy.sparse.csr_array((own.data, (own.row, own.col)), shape=shape)
+
+    def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
+        """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
+        here = partners(self.sector)[dofs]
+        behind = dofs[here != dofs]
+        if behind.size and (place == "output.points" or np.any(here < 0)):
+            raise input_error(
+                place,
+                f"{self.sector.structure.dofs.labels[int(behind[0])]} lies on the high cyclic face, which moves as the neighbour's low face",
+                "Take its partner on the low face, or a place beside the faces.",
+            )
+        rows = self.ways[0][np.searchsorted(self.kept, here)]
+        single = np.diff(rows.indptr) == 1
+        if not single.all():
+            name = self.sector.structure.dofs.labels[int(dofs[np.flatnonzero(~single)[0]])]
+            raise input_error(place, f"{name} takes part in a contact", "Take a place beside the contact.")
+        return np.asarray(rows.indices, dtype=np.int64)
+
+
+def reduced_wave(
+    sector: CyclicSector,
+    kept: IntArray,
+    k: int,
+    how: tuple[Reduction | None, Damping | DampingOfParts | None],
+    steady: Matrix,
+    others: Sequence[Matrix] = (),
+) -> tuple[Structure, Matrix]:
+    """Return a wave, its first coordinates the kept dofs, and the load of steady rotation, or several, on it.
+
+    It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are those that its modes at
+    other speeds ask for, see `on_modes_of_others`.
+    """
+    moving = _with_way_back(sector, kept, k, how, others)
+    load = moving.project(steady)
+    return moving, load.toarray() if scipy.sparse.issparse(load) else load
+
+
+def modes_of_wave(sector: CyclicSector, kept: IntArray, k: int, reduction: Reduction) -> Matrix:
+    """Return the modes that a reduction of a wave adds to the static shapes of the kept dofs, on the coordinates of the wave."""
+    place = np.searchsorted(sector.independent, kept)
+    return modes_of(travelling_wave(sector, k), place, reduction)
+
+
+def _with_way_back(
+    sector: CyclicSector,
+    kept: IntArray,
+    k: int,
+    how: tuple[Reduction | None, Damping | DampingOfParts | None],
+    others: Sequence[Matrix],
+) -> Structure:
+    reduction, damping = how
+    place = np.searchsorted(sector.independent, kept)
+    moving = travelling_wave(sector, k)
+    if reduction is not None and others:
+        moving = on_modes_of_others(moving, place, reduction, others)
+    elif reduction is not None:
+        moving = reduction.of(moving, place)
+    else:
+        rest = np.setdiff1d(np.arange(moving.n), place)
+        moving = _in_order(moving, np.concatenate([place, rest]))
+    return moving if damping is None else damping.of_modes(moving)
+
+
+def _in_order(structure: Structure, order: IntArray) -> Structure:
+    into = picked(order, structure.n).T.tocsr()
+    return in_coordinates(structure, into, structure.dofs.take(order), {})
+
+
+def wave_numbers(sectors: int, engine_order: int, harmonics: int) -> list[int]:
+    """Return the wave numbers of all harmonics, in rising order."""
+    return sorted({excited_wave(engine_order, sectors, h) for h in range(harmonics + 1)})
+
+
+def wheel_of(
+    sector: CyclicSector,
+    kept: IntArray,
+    waves: Mapping[int, tuple[Structure, Matrix]],
+    order: tuple[int, int],
+    pairs: Pairs,
+    stay: tuple[IntArray, IntArray],
+) -> ReducedSector:
+    """Put the waves together, in gaps where these do not depend on each other and no coordinate that has to stay is touched.
+
+    Parameters
+    ----------
+    sector, kept
+        What was reduced, and the dofs kept.
+    waves
+        Wave number -> what `reduced_wave` returned.
+    order
+        Engine order and highest harmonic.
+    pairs
+        Contacts, on the dofs of the sector.
+    stay
+        Dofs that have to stay coordinates: outputs, in the phase of this sector, and rigid bodies.
+    """
+    place = np.searchsorted(sector.independent, kept)
+    shown = picked(stay[0], sector.structure.n)
+    following = scipy.sparse.vstack([pairs.following, scipy.sparse.csr_array(shown.shape)])
+    known = scipy.sparse.vstack([pairs.own, shown]), following
+    nodal = nodal_coordinates(sector, place, waves[0][0].n, known)
+    phases = {k: wave(k, sector.sectors).phase for k in waves}
+    written = {k: nodal.of_wave(structure, phases[k]) for k, (structure, _) in waves.items()}
+    ways = {k: scipy.sparse.csr_array(structure.basis) for k, structure in written.items()}
+    gaps = scipy.sparse.csr_array(nodal.operator[: pairs.own.shape[0]])
+    stays = np.isin(kept, partners(sector)[np.concatenate(stay)])
+    fixed = np.zeros(gaps.shape[1])
+    fixed[np.flatnonzero(stays)] = 1.0
+    moved = gaps @ scipy.sparse.diags_array(1.0 - fixed)
+    moved.eliminate_zeros()
+    touched = np.unique(moved.indices)
+    hidden = bool(np.isin(gaps.indices, np.flatnonzero(stays)).any())
+    fewer = np.count_nonzero(np.diff(moved.indptr)) < touched.size
+    if touched.size and (fewer or not hidden) and not nodal.multipliers.size:
+        # the gaps, less what has to stay adds to them, are the same combinations in all waves, and so is what is beside them
+        plain = {k: replace(structure, basis=None) for k, structure in written.items()}
+        try:
+            small = {k: in_relative_coordinates(s, moved, pairs.names) for k, s in plain.items()}
+        except InputError:  # gaps depend on each other: nodes stay
+            small = {}
+        if small:
+            into = scipy.sparse.csr_array(small[0][0].basis)
+            gaps = small[0][1] + gaps @ scipy.sparse.diags_array(fixed) @ into
+            written = {k: structure for k, (structure, _) in small.items()}
+            ways = {k: scipy.sparse.csr_array(way @ into) for k, way in ways.items()}
+    structures = {k: replace(structure, basis=None) for k, structure in written.items()}
+    wheel = TunedWheel(structures, sector.sectors, *order, nodal.multipliers)
+    steady = np.real(ways[0].conj().T @ waves[0][1])
+    return ReducedSector(sector, kept, ways, waves, wheel, scipy.sparse.csr_array(gaps), steady)

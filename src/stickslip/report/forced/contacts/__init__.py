@@ -1,0 +1,1 @@
+"""Figures of the contacts and rigid bodies of a response."""

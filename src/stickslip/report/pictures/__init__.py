@@ -1,0 +1,1 @@
+"""Pictures of the model: its skin, contact patches and mode shapes."""

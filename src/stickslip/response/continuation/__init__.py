@@ -1,0 +1,1 @@
+"""Continuation of periodic motions with adaptive harmonics."""

@@ -1,0 +1,405 @@
+"""Continuation of periodic motions with adaptive harmonics: start, predict, correct, judge, adapt, recover.
+
+A branch is followed by arc length, or from one listed value of the parameter to the next. What is solved at each point is one of a few
+*levels*, the same equation with more and more harmonics (one level alone: harmonics stay as they are). Harmonics change along the branch:
+
+- A point whose judgement is not quiet is solved with the harmonics of the next level. Where both agree it stays. Otherwise the point before it,
+  which was quiet, is solved with more, too, and the branch goes on from there: where both levels agree no other sheet can be met.
+- Such second solutions are *audits* of the first ones. Others are made at every tenth point and beside each maximum, wherever a level
+  is not the last one and something acts on the harmonics left out. An audit that fails throws the branch back to the last one that held, and the branch
+  goes on from there with more harmonics.
+- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the wait for the next one.
+
+A branch that cannot be followed, or that gains no parameter for long, is taken up a little further on; so is one that runs back beside itself
+and tells nothing new, which is forgotten. Values that were not found are looked
+for once more, when their neighbours are known.
+"""
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from time import perf_counter
+
+from stickslip.response.continuation.branch import Curve, Followed, Route
+from stickslip.response.continuation.continuation_steps import (
+    MIN_LEVELS,
+    accepted,
+    again,
+    beside,
+    fresh,
+    levels_left,
+    lost,
+    onward,
+    passed_maximum,
+    retraced,
+    turned_for_nothing,
+    without_more,
+)
+from stickslip.solve.fallbacks import steps_at_most
+
+AUDITED = 10  # points at most from one audit to the next
+CALM = 3  # quiet points with many harmonics before fewer are tried
+LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
+LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
+MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
+LATER = 0.2  # share of the effort at a value for when its neighbours are known, and for its motion in time
+STRETCHES = 3.0  # times the work of one stretch of a branch, for all of them
+LONGEST_CALM = 48  # the same after trials that failed
+MAX_BRANCH_LENGTH = 40  # multiples of the smallest number of points at which any branch ends
+
+
+def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterator[Followed]:
+    """Follow a branch; see the module.
+
+    Parameters
+    ----------
+    curve
+        What is followed.
+    route
+        From where to where.
+    done
+        What an interrupted run has yielded, in its order: none of it is computed again, and the rest comes out as it would have.
+
+    Yields
+    ------
+    Followed
+        What is not in `done`.
+    """
+    yield from _Walk(curve, route, iter(done)).run()
+
+
+@dataclass(slots=True, eq=False)
+class _Stop:
+    """A point of the branch, from what it goes on, and whether more harmonics have confirmed it."""
+
+    point: Followed
+    ahead: Followed
+    audited: bool = False
+    more: Followed | None = None  # its audit, if it was made before the branch needed it
+    begins: bool = False  # whether no branch led here
+
+
+Taken = Generator[Followed, None, Followed]
+
+
+@dataclass(slots=True, eq=False)
+class _Walk:
+    curve: Curve
+    route: Route
+    stored: Iterator[Followed]
+    branch: list[_Stop] = field(default_factory=list)
+    quiet_for: int = 0  # points since harmonics were raised
+    calm: int = CALM  # of them before fewer are tried
+    hold: int = 0  # index up to which fewer are not tried
+    given_up: set[int] = field(default_factory=set)  # indices whose audit failed for good
+    patience: int = 1  # points between attempts to raise what cannot be raised
+    patient_until: int = 0  # index of the next attempt
+    looked: int = 0  # index of the last audit
+    anew_from: int = 0  # index from which solutions without a branch are looked for again
+    taken: int = 0
+    tried: dict[tuple[float, int], float] = field(default_factory=dict)  # effort at a value, level
+    spent: float = 0.0  # work, in the unit of `Curve.cost`
+    forgotten: int = 0  # points that told nothing new, whose work is in that
+    before: int = 0  # points before the present stretch of the branch,
+    spent_before: float = 0.0  # and their work
+
+    def run(self) -> Iterator[Followed]:
+        """Go from the first value to the last."""
+        listed = self.route.listed
+        yield from self._begun(listed[0] if listed else self.route.first)
+        while not self._over():
+            here = self.branch[-1]
+            if not here.ahead.converged or self._idle():
+                yield from self._begun(self.route.onward([s.point.p for s in self.branch]))
+                continue
+            yield from self._cheaper(here)
+            made = yield from self._take(lambda at=here: self._onward(at))  # type: ignore[misc]
+            raised = not made.converged or not self.curve.quiet(made.level, made.judged)
+            trying = raised and (not made.converged or len(self.branch) >= self.patient_until)
+            if trying and (yield from self._raised(made)):
+                self.patience = 1
+                continue
+            if made.converged:
+                anew = (yield from self._anew(made)) if trying else None
+                if trying:  # nothing is near with more harmonics: not every point of such a branch is worth the attempt
+                    self.patience = min(2 * self.patience, MOST_PATIENT)
+                    self.patient_until = len(self.branch) + self.patience
+                yield from self._kept(anew or made)
+            else:
+                yield from self._begun(self.route.onward([s.point.p for s in self.branch]))
+        if not listed and self.branch[-1].point.p != self.route.last:
+            yield from self._begun(self.route.last)
+        yield from self._looked_for()
+
+    # --- one step -----------------------------------------------------------------------------
+
+    def _take(self, make: Callable[[], Followed]) -> Taken:
+        """Return what an interrupted run has stored, else compute and yield it."""
+        self.taken += 1
+        known = next(self.stored, None)
+        if known is None:
+            began = perf_counter()
+            made = without_more(self.curve, self._levels(), make())
+            known = made.taking(perf_counter() - began)
+            yield known
+            known = self.curve.stored(known)
+        steps, place = known.point.solution.iterations, (known.p, known.level)
+        before = 0.0 if known.kind == "found" else self.tried.get(place, 0.0)  # that is in its own
+        self.tried[place] = before + steps / steps_at_most(known.point.x.size)
+        self.spent += steps * self.curve.cost(known.level)
+        return known
+
+    def _onward(self, here: _Stop) -> Followed:
+        """Take a step along the branch; one that only goes back where the branch came from is none."""
+        made = onward(self.curve, here.ahead, len(self.branch), self._target(), self.route.last)
+        before = [] if self.route.listed else [s.point for s in self.branch if s.point.converged]
+        return lost(made) if retraced(self.curve, before, made) else made
+
+    def _kept(self, made: Followed, audit: Followed | None = None, *, begins: bool = False) -> Iterator[Followed]:
+        """Accept a point, and look at it or at the one before more closely where that is due."""
+        silent = made.judged.bound == 0.0
+        self.branch.append(_Stop(made, made, silent or audit is not None, audit, begins))
+        if not made.converged or self.curve.levels == 1:  # alone, it is compared with nothing
+            return
+        if audit is not None or self.curve.quiet(made.level, made.judged):
+            self.quiet_for += 1
+        if self._due():
+            yield from self._audited(len(self.branch) - 1)
+        elif passed_maximum(self.curve, [s.point for s in self.branch[-3:]]):
+            yield from self._audited(len(self.branch) - 2)
+        if self.branch and self.branch[-1].point is made:
+            yield from self._lowered()
+
+    # --- work ---------------------------------------------------------------------------------
+
+    def _levels(self) -> int:
+        """Return how many levels may be used: a stretch has its own work, so that a hard one leaves enough for what comes after it, and all have `STRETCHES` times as much."""
+        points = len(self.branch) + self.forgotten + 1
+        own = levels_left(self.curve, self.route, max(points - self.before, 1), self.spent - self.spent_before)
+        return min(own, levels_left(self.curve, self.route, points, self.spent / STRETCHES))
+
+    def _spent_up(self) -> bool:
+        return self._levels() <= MIN_LEVELS < self.curve.levels
+
+    def _cheaper(self, here: _Stop) -> Iterator[Followed]:
+        """Go on with fewer harmonics where no more are left."""
+        level, index = self._levels() - 1, len(self.branch) - 1
+        if here.ahead.level > level and index >= self.hold:
+            known = here.ahead
+            trial = yield from self._take(lambda: again(self.curve, "trial", known, index, level))
+            if trial.converged:
+                here.ahead = trial
+            else:
+                self.hold = index + CALM
+
+    # --- harmonics ----------------------------------------------------------------------------
+
+    def _raised(self, made: Followed) -> Generator[Followed, None, bool]:
+        """Do what a point needs that is not quiet or was not found; return whether the branch goes on."""
+        level, index = made.level + 1, len(self.branch)
+        if level >= self._levels():
+            return False
+        check = None
+        if made.converged:
+            check = yield from self._take(lambda: again(self.curve, "audit", made, index, level))
+            if check.converged and self.curve.agree(made, check):
+                yield from self._kept(made, check)
+                return True
+        last = index - 1
+        held = yield from self._compared(last, level)
+        if not held:
+            return (yield from self._thrown_back(last, level))
+        if check is None or not check.converged or not self.curve.near(made, check):
+            return True  # the branch with more harmonics leads on from the last point
+        known = check
+        more = yield from self._take(lambda: accepted(self.curve, known, index))
+        if not self.curve.quiet(more.level, more.judged) and (yield from self._raised(more)):
+            return True
+        yield from self._kept(more)
+        return True
+
+    def _compared(self, index: int, level: int) -> Generator[Followed, None, bool]:
+        """Audit a point with the harmonics of a level; return whether it held, and go on from the audit then."""
+        stop = self.branch[index]
+        if stop.ahead.level >= level:
+            return True
+        audit = stop.more
+        if audit is None or audit.level != level:
+            audit = yield from self._take(lambda: again(self.curve, "audit", stop.ahead, index, level))
+            stop.more = audit
+        if audit.converged and (stop.audited or self.curve.agree(stop.point, audit)):
+            stop.audited, stop.ahead = True, audit
+            self.quiet_for = 0
+            return True
+        return False
+
+    def _audited(self, index: int) -> Iterator[Followed]:
+        """Audit a point of the branch; go back where it fails."""
+        stop = self.branch[index]
+        level = stop.point.level + 1
+        if stop.audited or level >= self._levels() or index in self.given_up:
+            return
+        self.looked = index
+        audit = yield from self._take(lambda: again(self.curve, "audit", stop.ahead, index, level))
+        stop.more = audit
+        if audit.converged and self.curve.agree(stop.point, audit):
+            stop.audited = True
+            return
+        back = yield from self._thrown_back(index, level)
+        if not back:
+            self.given_up.add(index)
+
+    def _thrown_back(self, index: int, level: int) -> Generator[Followed, None, bool]:
+        """Go back to the last point before `index` that more harmonics have confirmed; return whether there is one."""
+        if index in self.given_up:
+            return False
+        begin = self._beginning(index)
+        for place in range(index - 1, begin - 1, -1):
+            stop = self.branch[place]
+            if not stop.audited:
+                continue
+            held = yield from self._compared(place, level)
+            if held:
+                del self.branch[place + 1 :]
+                self.quiet_for, self.hold = 0, index + CALM
+                return True
+            break
+        # nothing before it is sure: begin where this stretch of the branch began
+        known = self.branch[begin].ahead
+        if known.level < level and begin not in self.given_up:
+            audit = yield from self._take(lambda: again(self.curve, "audit", known, begin, level))
+            if audit.converged:
+                made = yield from self._take(lambda: accepted(self.curve, audit, begin))
+                del self.branch[begin:]
+                self.branch.append(_Stop(made, made, made.judged.bound == 0.0, begins=True))
+                self.quiet_for, self.hold = 0, index + CALM
+                return True
+        self.given_up |= {begin, index}
+        return False
+
+    def _beginning(self, index: int) -> int:
+        """Return the index at which the stretch of the branch that leads to `index` began."""
+        for place in range(index, 0, -1):
+            if self.branch[place].begins:
+                return place
+        return 0
+
+    def _lowered(self) -> Iterator[Followed]:
+        """Try fewer harmonics after some quiet points."""
+        stop, index = self.branch[-1], len(self.branch) - 1
+        level = stop.ahead.level - 1
+        if level < 0 or self.quiet_for < self.calm or index < self.hold:
+            return
+        trial = yield from self._take(lambda: again(self.curve, "trial", stop.ahead, index, level))
+        if trial.converged and self.curve.agree(trial, stop.point):
+            stop.ahead, stop.audited = trial, True
+        else:
+            self.calm = min(2 * self.calm, LONGEST_CALM)
+        self.quiet_for = 0
+
+    # --- where to look closer -----------------------------------------------------------------
+
+    def _due(self) -> bool:
+        """Whether the last audit is long ago, or this is the first or the last point."""
+        last = len(self.branch) - 1
+        recent = any(stop.audited for stop in self.branch[max(last - AUDITED + 1, 0) :])
+        ends = last == 0 or self.branch[-1].point.p == self.route.last
+        return ends or not (recent or self.looked > last - AUDITED)
+
+    # --- the way ------------------------------------------------------------------------------
+
+    def _target(self) -> float | None:
+        """Return the next listed value; None where the branch is followed by arc length."""
+        listed = self.route.listed
+        return listed[len(self.branch)] if listed else None
+
+    def _over(self) -> bool:
+        if self.route.listed:
+            return len(self.branch) >= len(self.route.listed)
+        reached = self.branch[-1].point.p == self.route.last
+        return reached or self.taken > MAX_BRANCH_LENGTH * self.route.points
+
+    def _idle(self) -> bool:
+        """Whether the branch is left; what ran back beside it is forgotten."""
+        if self.route.listed or not self.route.leaves:
+            return False
+        begin = self._beginning(len(self.branch) - 1)
+        back = turned_for_nothing(self.curve, self.route, [s.point for s in self.branch[begin:]])
+        del self.branch[len(self.branch) - back :]
+        self.forgotten += back
+        return back > 0 or self.route.idle([s.point.p for s in self.branch])
+
+    def _begun(self, p: float) -> Iterator[Followed]:
+        """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
+        index, near = len(self.branch), self._last()
+        self.before, self.spent_before = index + self.forgotten, self.spent
+        here = near[0].level if near and not self._spent_up() else 0
+        made: Followed | None = None
+        for share in LEAPS if near and not self.route.listed else ():
+            ahead = p + (share - 1.0) * self.route.gap
+            if not self.route.before(self.route.farthest([s.point.p for s in self.branch]), ahead):
+                break
+            made = yield from self._fresh(index, here, ahead, near, 0)
+            if made.converged:
+                break
+        if made is None or not made.converged:
+            level = min(here, LADDER)
+            made = yield from self._fresh(index, level, p, near, self._left(p, level, LATER))
+        while made.converged and not self.curve.quiet(made.level, made.judged):
+            more = yield from self._in_place(made)
+            if more is None:
+                break
+            made = more
+        self.quiet_for = 0
+        yield from self._kept(made, begins=True)
+
+    def _in_place(self, made: Followed) -> Generator[Followed, None, Followed | None]:
+        """Give a point that no other leads to the harmonics of the next level; None where that is not found."""
+        index, level = len(self.branch), made.level + 1
+        if level >= self._levels():
+            return None
+        more = yield from self._take(lambda: again(self.curve, "audit", made, index, level))
+        if more.converged:
+            return (yield from self._take(lambda: accepted(self.curve, more, index)))
+        return (yield from self._anew(made))
+
+    def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
+        """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
+        index, level = len(self.branch), made.level + 1
+        if level >= self._levels() or index < self.anew_from or self._spent_up():
+            return None
+        self.anew_from = index + AUDITED
+        effort = self._left(made.p, level, LATER) if level <= LADDER else 0.0
+        found = yield from self._fresh(index, level, made.p, [made], effort)
+        if found.converged:
+            return found
+        return (yield from self._take(lambda: made))
+
+    def _fresh(self, index: int, level: int, p: float, near: Sequence[Followed], effort: float) -> Taken:
+        make = partial(fresh, self.curve, self.route, index, level, p, near, effort)
+        return (yield from self._take(make))
+
+    def _left(self, p: float, level: int, reserved: float = 0.0) -> float:
+        """Return the share of the effort that is left at a value, but for what is `reserved`."""
+        return max(1.0 - reserved - self.tried.get((p, level), 0.0), 0.0)
+
+    def _last(self) -> list[Followed]:
+        """Return the last solution, if there is one."""
+        return [stop.ahead for stop in self.branch if stop.ahead.converged][-1:]
+
+    def _looked_for(self) -> Iterator[Followed]:
+        """Look once more for what was not found, from the neighbours on both sides, the last ones first."""
+        for index in reversed(range(len(self.branch))):
+            if self.branch[index].point.converged:
+                continue
+            sides = [s.point for s in (*self.branch[index + 1 : index + 2], *self.branch[max(index - 1, 0) : index])]
+            near = [p for p in sides if p.converged]
+            missing = self.branch[index].point
+            effort = self._left(missing.p, missing.level)
+            if not near or not effort:
+                continue
+            found = yield from self._take(
+                lambda n=near, m=missing, e=effort: beside(self.curve, n, m, e)  # type: ignore[misc]
+            )
+            if found.converged:
+                self.branch[index] = _Stop(found, found)

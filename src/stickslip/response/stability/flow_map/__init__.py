@@ -1,0 +1,1 @@
+"""The monodromy matrix: disturbances carried over a period."""

@@ -1,0 +1,206 @@
+"""Tangents of contact laws without located transitions, on samples of a period.
+
+Hysteresis turns where a gap does. A step over such a time is taken in parts, the gap there being interpolated between both samples:
+a step that jumps over it would have the slope of one side for both. Friction that depends on the velocity is steep for a moment where
+that passes zero: its tangents are integrated over the steps on both sides of a sample, with as many points as they need.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.contact.addresses import law_address
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.law_steps import steps_along, tangents_at
+from stickslip.response.stability.flow_map.step_integrals import fourier_basis, hat_integrals
+
+MOST_PERIODS = 200
+PLAIN = 2  # periods marched before the first correction of the state
+SETTLED = 1e-12  # change of the state over a period, relative to its size
+KEPT = 1e-10  # singular value below which a direction keeps its memory for ever
+EQUAL = 1e-12  # difference of derivatives that is rounding
+DISPLACED = 1e-9  # of a slider from its first place, relative to the largest gap
+ON_CIRCLE = 1e-6  # distance of a root from the unit circle that counts as none
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTangents:
+    """Derivatives of force and new state by gap, gap velocity, old state and the gap at the sample before.
+
+    Attributes
+    ----------
+    contacts
+        (n,) which contacts.
+    kept
+        (n, s) which states are states of the motion: forces depend on them, and something moves them or lets them decay.
+    jac
+        (samples, n, 3 + s, 9 + s).
+    resting, grazing
+        (n,) number of sliders that rest for the whole period, and of these that do not rest where they began.
+    """
+
+    contacts: IntArray
+    kept: BoolArray
+    jac: FloatArray
+    resting: IntArray
+    grazing: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The gaps of contacts at `times` in [0, 4π), ascending: (2H+1, n, 3) Fourier coefficients in m, and ω in rad/s."""
+
+    times: FloatArray
+    polynomials: FloatArray
+    omega: float
+
+
+def sampled_tangents(laws: Sequence[ContactLaw], contacts: IntArray, path: Path) -> SampledTangents:
+    """March each law along its gaps until its state repeats and return the tangents of the last period.
+
+    Parameters
+    ----------
+    laws, contacts
+        (n,) laws and the contacts they belong to.
+    path
+        Their gaps over one period.
+    """
+    most = max((law.initial_state().size for law in laws), default=0)
+    jac = np.zeros((len(path.times), len(laws), 3 + most, 9 + most))
+    kept = np.zeros((len(laws), most), dtype=bool)
+    resting, grazing = np.zeros((2, len(laws)), dtype=np.int64)
+    for j, law in enumerate(laws):
+        steps = _Steps(law, path, j)
+        size, (own, state) = steps.size, steps.settled()
+        still = _unmoved(own, size)
+        kept[j, :size] = _felt(own, size) & ~still
+        springs = law.stuck_stiffness() != 0.0
+        sliders = still & np.any(own[:, :3, 6 : 6 + size] != 0.0, axis=0)[springs].any(axis=0)
+        resting[j] = np.count_nonzero(sliders)
+        grazing[j] = np.count_nonzero(sliders & steps.displaced(state))
+        jac[:, j, : 3 + size, : 6 + size] = own[:, :, : 6 + size]
+        jac[:, j, : 3 + size, 6 + most :] = own[:, :, 6 + size :]
+    return SampledTangents(contacts, kept, jac, resting, grazing)
+
+
+def _unmoved(jac: FloatArray, size: int) -> BoolArray:
+    """Return which states stay for the whole period, whatever the disturbance."""
+    return np.asarray(np.all(np.abs(jac[:, 3:] - np.eye(size, 9 + size, 6)) <= EQUAL, axis=(0, 2)))
+
+
+def _felt(jac: FloatArray, size: int) -> BoolArray:
+    """Return on which states a force depends, at once or through others."""
+    by_state = np.any(jac[:, :, 6 : 6 + size] != 0.0, axis=0)
+    felt = np.any(by_state[:3], axis=0)
+    for _ in range(size):
+        felt = felt | np.any(by_state[3:][felt], axis=0)
+    return np.asarray(felt)
+
+
+def _turns(polynomial: FloatArray) -> FloatArray:
+    """Return the times in [0, 2π) at which a trigonometric polynomial has an extremum."""
+    h = np.arange(1, (polynomial.size + 1) // 2)
+    slope = 0.5 * h * (1j * polynomial[1::2] + polynomial[2::2])  # of exp(ihτ)
+    if not np.any(slope):
+        return np.zeros(0)
+    roots = np.roots(np.concatenate([slope[::-1], [0.0], slope.conj()]))
+    return np.asarray(np.angle(roots[np.abs(np.abs(roots) - 1.0) < ON_CIRCLE]) % (2 * np.pi))
+
+
+class _Steps:
+    """The steps of one contact over a period: one to each sample, in parts where a tangential gap turns between two samples."""
+
+    def __init__(self, law: ContactLaw, path: Path, j: int) -> None:
+        self.law, self.parameters = law, np.asarray(law.parameters(), dtype=float)
+        self.address = law_address(law.kernel)
+        self.size = law.initial_state().size
+        polynomials = path.polynomials[:, j]
+        before = path.times[-1] - 2 * np.pi
+        turns = np.concatenate([_turns(polynomials[:, d]) for d in range(2)])
+        turns = np.concatenate([turns + 2 * np.pi * k for k in (-1, 0, 1, 2)])
+        turns = turns[(turns > before) & (turns < path.times[-1])]
+        self.path, self.polynomials = path, polynomials
+        self.times = np.unique(np.concatenate([path.times, turns]))
+        self.starts = np.zeros((len(self.times), self.size))  # state at the beginning of each part
+        self.samples = np.searchsorted(self.times, path.times)
+        basis, slope = fourier_basis(self.times, len(polynomials))
+        self.gap = np.ascontiguousarray(basis @ polynomials)
+        self.velocity = np.ascontiguousarray(path.omega * (slope @ polynomials))
+        # where between the two samples each step ends
+        index = np.searchsorted(path.times, self.times)
+        left = np.concatenate([[before], path.times])[index]
+        self.share = (self.times - left) / (path.times[index] - left)
+
+    def settled(self) -> tuple[FloatArray, FloatArray]:
+        """Return the (samples, 3 + s, 9 + s) tangents in the periodic state, and this; NaN where a step gave no numbers."""
+        state = np.array(self.law.initial_state(), dtype=float)
+        if np.any(np.isnan(state)):
+            state = self._period(state, len(self.times) - 1)[0]
+        largest = float(np.max(np.abs(self.gap)))
+        jac: FloatArray = np.zeros((len(self.samples), 3 + self.size, 9 + self.size))
+        for period in range(MOST_PERIODS):
+            new, jac = self._period(state)
+            change = new - state
+            size = max(float(np.max(np.abs(new), initial=0.0)), largest)
+            if np.max(np.abs(change), initial=0.0) <= SETTLED * size:
+                break
+            if not (np.all(np.isfinite(new)) and np.all(np.isfinite(jac))):
+                return np.full_like(jac, np.nan), state
+            state = self._corrected(state, new, jac) if period % 4 == PLAIN else new
+        self._integrate(jac)
+        return jac, state
+
+    def displaced(self, state: FloatArray) -> BoolArray:
+        """Return which states do not have their first value."""
+        away = np.abs(state - np.asarray(self.law.initial_state(), dtype=float))
+        return np.asarray(away > DISPLACED * float(np.max(np.abs(self.gap))))
+
+    def _integrate(self, jac: FloatArray) -> None:
+        """Put means over the steps in place of the tangents at samples: by the velocity, and by the gap where there is no state."""
+        columns = slice(0, 6) if not self.size else slice(3, 6)
+        before = np.concatenate([[self.path.times[-1] - 2 * np.pi], self.times[:-1]])
+        ends = np.column_stack([before, self.times])
+        if self.size and not np.any(self._tangents(self.times, np.arange(len(ends)))[:, :, columns]):
+            return
+        step = np.searchsorted(self.path.times, self.times)
+
+        def tangents(tau: FloatArray, part: IntArray) -> FloatArray:
+            return self._tangents(tau, part)[:, :, columns]
+
+        jac[:, :3, columns] = hat_integrals(tangents, ends, step, self.path.times)
+
+    def _tangents(self, tau: FloatArray, part: IntArray) -> FloatArray:
+        """Return the (k, 3, 6) derivatives of the forces at times within parts of steps."""
+        basis, slope = fourier_basis(tau, len(self.polynomials))
+        gap, velocity = basis @ self.polynomials, self.path.omega * (slope @ self.polynomials)
+        out = np.empty((tau.size, 3, 6))
+        tangents_at(self.address, gap, velocity, self.starts, part, self.parameters, out)
+        return out
+
+    def _corrected(self, state: FloatArray, new: FloatArray, jac: FloatArray) -> FloatArray:
+        """Return the state that Newton's method expects to repeat, without directions that never forget."""
+        kept = np.eye(self.size)
+        for step in jac:
+            kept = step[3:, 6 : 6 + self.size] @ kept
+        correction = np.linalg.pinv(np.eye(self.size) - kept, rcond=KEPT) @ (new - state)
+        return np.asarray(state + correction if np.all(np.isfinite(correction)) else new)
+
+    def _period(self, state: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Take the law through a period; return the state at its end and the tangents of whole steps."""
+        new, s = np.array(state, dtype=float), self.size
+        whole = np.zeros((len(self.samples), 3 + s, 9 + s))
+        steps_along(
+            self.address,
+            first,
+            self.gap,
+            self.velocity,
+            new,
+            self.parameters,
+            self.share,
+            self.samples,
+            self.starts,
+            whole,
+        )
+        return new, whole

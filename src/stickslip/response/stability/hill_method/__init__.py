@@ -1,0 +1,1 @@
+"""Hill's method: Floquet exponents from the harmonic balance itself."""

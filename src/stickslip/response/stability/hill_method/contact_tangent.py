@@ -1,0 +1,166 @@
+"""Contact forces under a disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of the gaps, along a motion with known transitions.
+
+The forces are ``e^{στ} Σ_h F_h e^{ihτ}``, and F follows from G by a matrix that depends on the exponent: a slider that takes hold at τ_0 keeps
+the place that the disturbance had then, while the disturbance itself goes on growing. With the tangent of the periodic motion alone,
+the matrix at σ = 0, exponents elsewhere are wrong.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.slider import PERIOD
+from stickslip.response.stability.flow_map.contact_states import ContactStates
+
+SMALL = 1e-3  # |z L| below which (1 - e^{-zL}) / z is taken from its series
+UNCHANGED_STIFFNESS_SHARE = 1e-12  # of the largest stiffness: what changes less does not change
+
+
+@dataclass(frozen=True, eq=False)
+class Rests:
+    """When sliders of one contact rest.
+
+    Attributes
+    ----------
+    own, normal
+        (q,) which of its ports a slider belongs to, and which one is the normal gap, or its own where that does not matter.
+    by_normal
+        (q,) derivative of the slider's place by the normal gap where it takes hold.
+    stiffness
+        (q,) of the spring that it holds, N/m.
+    start, length
+        (q,) when it takes hold and for how long, rad.
+    """
+
+    own: IntArray
+    normal: IntArray
+    by_normal: FloatArray
+    stiffness: FloatArray
+    start: FloatArray
+    length: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTangent:
+    """One contact over a period as a disturbance sees it, beside springs that stand for its mean.
+
+    Attributes
+    ----------
+    ports
+        (m,) in which it differs from these springs at any time, among the ports of all contacts.
+    times
+        (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same a period later.
+    changes
+        (n_intervals, m, m) stiffness in each interval beyond the springs, N/m, with the sliders at rest where they stick.
+    rests
+        Of its sliders.
+    """
+
+    ports: IntArray
+    times: FloatArray
+    changes: FloatArray
+    rests: Rests
+    known: dict[bytes, ComplexArray] = field(default_factory=dict)
+
+    def matrix(self, sigma: complex, rows: IntArray, columns: IntArray) -> ComplexArray:
+        """Return the (r m, c m) forces in the harmonics `rows` by the disturbance in the harmonics `columns`, harmonic by harmonic."""
+        m = self.ports.size
+        held = self._held(sigma, rows).reshape(rows.size * m, -1)
+        placed = self._placed(columns).reshape(-1, columns.size * m)
+        return np.asarray(self._without_sliders(rows, columns) - held @ placed)
+
+    def _without_sliders(self, rows: IntArray, columns: IntArray) -> ComplexArray:
+        """Return the matrix of springs that change over the period."""
+        key = rows.tobytes() + b"|" + columns.tobytes()
+        if key not in self.known:
+            apart = rows[:, None] - columns
+            order, m = int(np.max(np.abs(apart))), self.ports.size
+            blocks = self._spectrum(order)[apart + order]
+            self.known[key] = blocks.transpose(0, 2, 1, 3).reshape(rows.size * m, columns.size * m)
+        return self.known[key]
+
+    def _spectrum(self, order: int) -> ComplexArray:
+        """Return the (2 order + 1, m, m) Fourier coefficients -order ... order of the stiffness."""
+        j = np.arange(-order, order + 1)[:, None]
+        turns = np.exp(-1j * j * self.times)
+        shares = (turns[:, :-1] - turns[:, 1:]) / (2j * np.pi * np.where(j, j, 1))
+        shares[order] = np.diff(self.times) / PERIOD
+        found = shares @ self.changes.reshape(len(self.changes), -1)
+        return np.asarray(found.reshape(-1, *self.changes.shape[1:]))
+
+    def _held(self, sigma: complex, harmonics: IntArray) -> ComplexArray:
+        """Return the (k, m, q) forces that each slider takes off while it rests where a unit disturbance has put it."""
+        rests, h = self.rests, harmonics[:, None]
+        share = rests.stiffness / PERIOD * _lasting(sigma + 1j * h, rests.length)
+        out = np.zeros((harmonics.size, self.ports.size, rests.own.size), dtype=complex)
+        out[:, rests.own, np.arange(rests.own.size)] = share * np.exp(-1j * h * rests.start)
+        return out
+
+    def _placed(self, harmonics: IntArray) -> ComplexArray:
+        """Return the (q, k, m) places, over ``e^{σ τ_0}``, where sliders take hold by the harmonics of the disturbance."""
+        rests, each = self.rests, np.arange(self.rests.own.size)
+        turns = np.exp(1j * harmonics * rests.start[:, None])
+        out = np.zeros((each.size, harmonics.size, self.ports.size), dtype=complex)
+        out[each, :, rests.own] = turns
+        out[each, :, rests.normal] += rests.by_normal[:, None] * turns
+        return out
+
+
+def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, list[ContactTangent]]:
+    """Return what contacts are to a disturbance, from their states over a period.
+
+    Returns
+    -------
+    springs
+        (3 n_contacts,) stiffness of the springs that stand for their mean, N/m.
+    ports
+        Rows of the gap operator in which some contact differs from them.
+    tangents
+        Of the contacts that do.
+    """
+    lengths = np.diff(contacts.times)
+    mean = np.tensordot(lengths / PERIOD, contacts.stiffness, axes=1)
+    springs = np.diagonal(mean, axis1=1, axis2=2)
+    changes = contacts.stiffness - np.eye(3) * springs[:, None, :]
+    felt = np.abs(changes) > UNCHANGED_STIFFNESS_SHARE * np.max(np.abs(contacts.stiffness), initial=0.0)
+    used = np.any(felt, axis=(0, 3)) | np.any(felt, axis=(0, 2))
+    used.flat[contacts.rows] = True
+    used.flat[contacts.normals[np.any(contacts.by_normal != 0.0, axis=0)]] = True
+    tangents, first = [], 0
+    for c in np.flatnonzero(used.any(axis=1)):
+        own = np.flatnonzero(used[c])
+        ports = np.arange(first, first + own.size)
+        rests = _rests(contacts, int(c), own)
+        own_changes = np.ascontiguousarray(changes[:, c][:, own[:, None], own])
+        tangents.append(ContactTangent(ports, contacts.times, own_changes, rests))
+        first += own.size
+    return springs.reshape(-1).copy(), np.flatnonzero(used), tangents
+
+
+def _rests(contacts: ContactStates, contact: int, own: IntArray) -> Rests:
+    """Return all rests of the sliders of a contact within a period; `own` are its directions that are ports."""
+    lengths, count = np.diff(contacts.times), len(contacts.times) - 1
+    place = np.searchsorted(own, contacts.rows % 3)
+    found = []
+    for i, j in zip(*np.nonzero(contacts.takes_hold), strict=True):
+        if contacts.rows[j] // 3 != contact:
+            continue
+        total, k = lengths[i], (i + 1) % count
+        while contacts.sticks[k, j] and not contacts.takes_hold[k, j]:
+            total, k = total + lengths[k], (k + 1) % count
+        found.append((j, i, total))
+    slider, at = (np.array([row[c] for row in found], dtype=np.int64) for c in range(2))
+    by_normal = contacts.by_normal[at, slider]
+    normal = np.where(by_normal != 0.0, own.size - 1, place[slider])
+    total_length = np.array([row[2] for row in found], dtype=float)
+    return Rests(place[slider], normal, by_normal, contacts.springs[slider], contacts.times[at], total_length)
+
+
+def _lasting(z: ComplexArray, length: FloatArray) -> ComplexArray:
+    """Return ``∫_0^L e^{-zt} dt``."""
+    x = z * length
+    small = np.abs(x) < SMALL
+    series = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
+    away = np.where(small, 1.0, x)
+    return np.asarray(length * np.where(small, series, -np.expm1(-away) / away))

@@ -1,0 +1,1 @@
+"""The compiled time step, and what it is made of."""

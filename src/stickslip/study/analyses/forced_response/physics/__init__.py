@@ -1,0 +1,1 @@
+"""Physical limits of a response, and what the model itself changes in it."""

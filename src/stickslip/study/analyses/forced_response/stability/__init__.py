@@ -1,0 +1,1 @@
+"""Stability of a response: which points are examined, and motions in time beside them."""

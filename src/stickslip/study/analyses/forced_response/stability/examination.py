@@ -1,0 +1,99 @@
+"""Estimated cost of a stability examination, and whether it is begun; all sectors of a wheel count."""
+
+from stickslip.assembly.sides.unreduced import KEPT
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.stability.flow_map.contact_states import is_located
+from stickslip.response.stability.hill_method.hill import MAX_HILL_HARMONICS, MAX_ROWS
+from stickslip.response.stability.hill_method.hill_segment import NODES
+from stickslip.response.system import System
+from stickslip.response.time.sectors import different_sectors
+
+INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of the two blades
+PRODUCTS = 20  # of matrices for each of these
+FLOPS = 2e10  # a second, of such products on one core
+MOST_WORK = 60 * FLOPS  # of one examination
+MOST_WHEEL = 4 * FLOPS  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
+MOST_HILL = 300 * FLOPS  # of one examination by Hill's method, an upper bound: few contacts slip
+MOTIONS = 2.0  # that with more harmonics, and as it was solved
+
+
+def examination_work(system: System) -> float:
+    """Return the operations of one examination, which looks at two motions; of a wheel at those of all its sectors.
+
+    A travelling motion repeats itself in other sectors, so that a share of the period is enough; modes and multipliers of all
+    coordinates are found in any case, and take about as much as one interval.
+    """
+    side, sectors, shares = system.structure, 1, 1
+    if isinstance(side, TunedWheel):
+        sectors, shares = side.sectors, different_sectors(side)[0]
+    rows = 2 * sectors * side.n
+    intervals = max(1.0, INTERVALS * sectors * system.interface.n_contacts / shares)
+    return 2.0 * intervals * PRODUCTS * 2.0 * rows**3
+
+
+def too_long(system: System, *, forced: bool) -> str:
+    """Return why no examination is begun, by the size of what is marched; empty where it is soon done.
+
+    Which waves of a wheel there are makes no difference: harmonics may have led to all of them without making the wheel any smaller.
+
+    Parameters
+    ----------
+    system
+        What vibrates.
+    forced
+        Whether a load drives it.
+    """
+    if not system.structure.reduced:
+        return f"a reduced model is needed, and {KEPT}"
+    side, work = system.structure, examination_work(system)
+    wheel = isinstance(side, TunedWheel)
+    most = MOST_WHEEL if forced and wheel else MOST_WORK
+    if work <= most:
+        return ""
+    would = f"would take about {_lasting(work / FLOPS)} a motion, more than {most / FLOPS:.0f} s"
+    if isinstance(side, TunedWheel):
+        return (
+            f"against every wave all {side.sectors} sectors count, {side.sectors * side.n} coordinates with "
+            f"{side.sectors * system.interface.n_contacts} contacts, which {would}"
+        )
+    return (
+        f"{side.n} coordinates with {system.interface.n_contacts} contacts {would}: each interval between two transitions costs "
+        "the exponential of a matrix of twice as many rows"
+    )
+
+
+def hill_work(system: System) -> float:
+    """Return the most operations that an examination of a wheel by Hill's method takes, one sector at a time, whatever contacts slip."""
+    side = system.structure
+    sectors = side.sectors if isinstance(side, TunedWheel) else 1
+    rows = min(MAX_ROWS, (2 * MAX_HILL_HARMONICS + 1) * 3 * system.interface.n_contacts)
+    each = 8.0 * rows**3 / 3.0 + (2 * MAX_HILL_HARMONICS + 1) * 4.0 * float(side.n) ** 3
+    return MOTIONS * 2.0 * sectors / 2.0 * NODES * each
+
+
+def by_hill(system: System) -> bool:
+    """Whether forced motions are examined by Hill's method: those of a wheel that is too large for its multipliers, and with structural damping."""
+    interface, side = system.interface, system.structure
+    large = isinstance(side, TunedWheel) and bool(too_long(system, forced=True))
+    return (
+        side.reduced
+        and (large or side.of_harmonic(1).loss is not None)
+        and not interface.rigid
+        and all(is_located(law) for law in interface.laws)
+        and hill_work(system) <= MOST_HILL
+    )
+
+
+def examines_every_wave(system: System) -> bool:
+    """Whether the stability of the forced motions of a tuned wheel is examined against every wave."""
+    if not isinstance(system.structure, TunedWheel):
+        return False
+    return not too_long(system, forced=True) or by_hill(system)
+
+
+def _lasting(seconds: float) -> str:
+    """Return a long time as it is read: in seconds, hours or days."""
+    for name, unit in (("days", 86400.0), ("hours", 3600.0)):
+        if seconds > 2 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{seconds:.0f} s"

@@ -1,0 +1,1 @@
+"""Verdicts on a response: rules on its finished dataset."""

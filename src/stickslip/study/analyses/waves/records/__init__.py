@@ -1,0 +1,1 @@
+"""Records of the analyses by waves, and their datasets."""

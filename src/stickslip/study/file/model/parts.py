@@ -1,0 +1,276 @@
+"""The tables [part.NAME]: shapes, lumped masses, rigid bodies, models from files and copies of other parts."""
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from stickslip.assembly.contact import NEXT
+from stickslip.errors import did_you_mean, nearest
+from stickslip.model.axis import Axis
+from stickslip.model.fe.beam import Beam, Bending
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.study.file.model.bodies import Cylinder, FlatCurved, RigidBodyTable, Steps, Triple, Wedge, shape
+from stickslip.study.file.model.material import DampingTable, MaterialTable, ReductionTable
+from stickslip.study.file.model.sets import SetTable
+from stickslip.study.file.quantities import table_of
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
+
+
+class PartTable(Section):
+    """What every part that vibrates by itself may say."""
+
+    material: MaterialTable | None = Field(
+        None, description="the table of its material; left out: the table [material]"
+    )
+    damping: DampingTable | None = Field(None, description="the table of its damping; left out: the table [damping]")
+    reduction: ReductionTable | None = Field(
+        None, description="the table of its reduction; left out: the table [reduction]"
+    )
+
+    def files(self) -> dict[str, str]:
+        """Return the keys that name files, and the names."""
+        return {}
+
+
+PrismBlades = table_of(
+    BladePair,
+    base=PartTable,
+    name="PrismBlades",
+    shape=shape("prism_blades"),
+    nodes_at=(
+        Annotated[list[Name], Field(max_length=20)],
+        Field(
+            default_factory=list,
+            description="surfaces of a flat_curved part whose points become nodes of the mesh, such as damper.flat",
+        ),
+    ),
+)
+Sector = table_of(BladedSector, base=PartTable, name="BladedSector", shape=shape("bladed_sector"))
+BeamTable = table_of(
+    Beam,
+    base=PartTable,
+    name="Beam",
+    without=("material",),
+    shape=shape("beam"),
+    elements=(int, Field(20, ge=1, le=10_000, description="number of equal elements, 1 to 10000")),
+    bending=(Bending, Field("z", description="direction of the deflection: y, z or both")),
+    axial=(bool, Field(False, description="whether it stretches too: true or false")),
+)
+
+
+def _link(given: Any) -> Any:
+    if not (
+        isinstance(given, list)
+        and len(given) == 3
+        and all(isinstance(end, str | int) and not isinstance(end, bool) for end in given[:2])
+        and isinstance(given[2], float | int)
+        and not isinstance(given[2], bool)
+    ):
+        raise custom_error(
+            f"must be [end, end, value], got {shown(given)}",
+            'Ends are "ground", names of masses or their numbers from 1: ["ground", 1, 1e5].',
+        )
+    return [given[0], given[1], float(given[2])]
+
+
+Link = Annotated[list[Any], BeforeValidator(_link)]
+
+
+class Lumped(PartTable):
+    """Masses that move along one direction, springs and dashpots between them, to the ground and to the next sector."""
+
+    shape: Literal["lumped"] = Field(description='shape = "lumped"')
+    masses_kg: list[Positive] = Field(min_length=1, max_length=2000, description="the masses in kg, greater than zero")
+    names: list[Name] | None = Field(
+        None, description="names of the masses, which are sets of the part; left out: m1, m2, ..."
+    )
+    springs_n_per_m: list[Link] = Field(
+        default_factory=list,
+        max_length=100_000,
+        description='springs [end, end, stiffness in N/m]; ends are "ground", names of masses or their numbers from 1, and on a wheel '
+        'those of the next sector, such as "next.m1"',
+    )
+    dashpots_n_s_per_m: list[Link] = Field(
+        default_factory=list,
+        max_length=100_000,
+        description="dashpots [end, end, coefficient in N s/m]; ends as of springs",
+    )
+    sectors: int = Field(
+        1, ge=1, le=1000, description="number of equal sectors that make the wheel; 1 where it stands alone"
+    )
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the masses."""
+        return self.names or [f"m{i + 1}" for i in range(len(self.masses_kg))]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        once(self.labels, "names")
+        if len(self.labels) != len(self.masses_kg):
+            raise custom_error(
+                f"has {len(self.labels)} names for {len(self.masses_kg)} masses",
+                "Name every mass, or leave names out.",
+                "names",
+            )
+        for key in ("springs_n_per_m", "dashpots_n_s_per_m"):
+            for i, link in enumerate(getattr(self, key)):
+                for end in link[:2]:
+                    self._check_end(end, f"{key}[{i}]")
+        return self
+
+    def _check_end(self, end: str | int, key: str) -> None:
+        own = end.removeprefix(NEXT) if isinstance(end, str) and self.sectors > 1 else end
+        if end == "ground" or own in self.labels:
+            return
+        if isinstance(end, int) and 1 <= end <= len(self.masses_kg):
+            return
+        known = [*self.labels, "ground", *(NEXT + m for m in self.labels if self.sectors > 1)]
+        raise custom_error(f"there is no mass {end!r}", did_you_mean(str(end), known), key)
+
+
+class FileModel(PartTable):
+    """One sector, or a whole structure, from the files of a finite-element program."""
+
+    file: FilePath = Field(
+        description="the model's file, relative to the study: a mesh with its node sets (CalculiX or Abaqus .inp, ANSYS .cdb) "
+        "or matrices (.sti, .full, .npz, .mtx and others, see 'bring your model')"
+    )
+    units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s", "foot-slug-s"] = Field(
+        description="the file's unit system: SI, mm-t-s (mm, tonne, s: N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"
+    )
+    plausible: bool = Field(
+        True,
+        description="whether mass and size are checked against what solids have: true, or false where the numbers are right",
+    )
+    sectors: int | None = Field(
+        None,
+        ge=1,
+        le=1000,
+        description="number of equal sectors that make the wheel; left out: that of the deck's cyclic symmetry, else 1 for "
+        "the whole structure",
+    )
+    low_face: Name | None = Field(
+        None,
+        description="name of the node set of the cyclic face at the lower angle; left out: the faces of the deck's cyclic tie",
+    )
+    high_face: Name | None = Field(None, description="name of the node set of the cyclic face at the higher angle")
+    cyclic: Literal["node_to_node", "segment_to_segment", "none"] = Field(
+        "node_to_node",
+        description="how the cyclic faces are tied: node_to_node where their meshes match, or segment_to_segment, in the mean, where "
+        "they do not; then the high face follows the low one; none: the part has no such faces, and only contacts and joins lead "
+        "to its neighbours, as those of a damper between blades",
+    )
+    clamped: list[Name] = Field(
+        default_factory=list,
+        max_length=100,
+        description="names of the node sets of a mesh that are held in all directions, beside what a deck holds itself",
+    )
+    axis_direction: Triple | None = Field(
+        None, description="direction [x, y, z] of the axis of rotation; left out: that of the deck, else the z axis"
+    )
+    axis_origin_m: Triple = Field(
+        [0.0, 0.0, 0.0],
+        description="a point [x, y, z] of the axis in m, whatever the file's units; goes with axis_direction",
+    )
+    sets: dict[Name, SetTable] = Field(
+        default_factory=dict,
+        description="the tables sets.NAME: further node sets, picked by names, in a box or in a cylinder",
+    )
+    quadrature: Literal["exact", "calculix"] = Field(
+        "exact",
+        description="integration of a mesh's matrices: exact, or calculix (the rules of that program, for comparisons)",
+    )
+    mesh: FilePath | None = Field(
+        None,
+        description="beside matrices without coordinates: the mesh file with the nodes and their sets (.inp for CalculiX's .sti)",
+    )
+    mass: FilePath | None = Field(
+        None, description="with matrices in separate files: that of the mass; file is the stiffness"
+    )
+    damping_matrix: FilePath | None = Field(None, description="with matrices in separate files: that of the damping")
+    nodes: FilePath | None = Field(
+        None, description="with matrices in separate files: CSV of node, component, x, y, z of every row"
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if (self.low_face is None) != (self.high_face is None):
+            missing = "low_face" if self.low_face is None else "high_face"
+            raise custom_error("is missing, the other face is given", "Name both faces or neither.", missing)
+        if self.axis_direction is not None and not any(self.axis_direction):
+            raise custom_error("has no length", "The z axis is [0, 0, 1].", "axis_direction")
+        return self
+
+    def files(self) -> dict[str, str]:
+        """Return the keys that name files, and the names."""
+        named = {key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")}
+        return {key: name for key, name in named.items() if name is not None}
+
+    def axis(self) -> Axis | None:
+        """Return the axis of rotation; None where the study names none."""
+        if self.axis_direction is None:
+            return None
+        (a, b, c), (x, y, z) = self.axis_direction, self.axis_origin_m
+        return Axis((a, b, c), (x, y, z))
+
+
+class Copy(Section):
+    """A copy of another part, whose reduction it shares."""
+
+    of: Name = Field(description="name of the part that is copied")
+    placed: Steps = Field(
+        description="the table placed: mirror, axes, turn_deg, axis, move_m; or a list of such tables, one step after the other"
+    )
+
+
+SHAPES: dict[str, type[Section]] = {
+    "prism_blades": PrismBlades,
+    "bladed_sector": Sector,
+    "beam": BeamTable,
+    "lumped": Lumped,
+    "rigid_body": RigidBodyTable,
+    "flat_curved": FlatCurved,
+    "wedge": Wedge,
+    "cylinder": Cylinder,
+}
+KINDS: dict[str, type[Section]] = {**SHAPES, "file": FileModel, "of": Copy}
+
+
+def _kind(given: Any) -> str | None:
+    """Return which kind of part a table is."""
+    if isinstance(given, dict):
+        return next((key for key in ("file", "of") if key in given), given.get("shape"))
+    return next((kind for kind, table in KINDS.items() if type(given) is table), None)
+
+
+def _known_kind(given: Any) -> Any:
+    if not isinstance(given, dict) or _kind(given) in KINDS:
+        return given
+    shapes = ", ".join(SHAPES)
+    if "shape" not in given:
+        elsewhere = {key for table in KINDS.values() for key in table.model_fields}
+        for key in map(str, given):
+            if key not in elsewhere and nearest(key, ["shape", "file"]):
+                remedy = did_you_mean(key, ["shape", "file"])
+                raise custom_error(f"unknown key {key!r}", remedy, key)
+        raise custom_error(
+            "is missing", f'Say what the part is: a shape ({shapes}), file = "...", or of = "...".', "shape"
+        )
+    raise custom_error(
+        f"is not known, got {shown(given['shape'])}", did_you_mean(str(given["shape"]), list(SHAPES)), "shape"
+    )
+
+
+def union_of(kinds: dict[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
+    """Return the type of a table that is one of several kinds, told apart by `which`."""
+    members = tuple(Annotated[table, Tag(kind)] for kind, table in kinds.items())
+    joined: Any = members[0]
+    for member in members[1:]:
+        joined = joined | member
+    return Annotated[joined, Discriminator(which)]
+
+
+AnyPart: Any = Annotated[union_of(KINDS, _kind), BeforeValidator(_known_kind)]
