@@ -9,7 +9,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import Harmonics
-from stickslip.harmonic.linear import DynamicStiffness, Products
+from stickslip.harmonic.linear import DynamicStiffness, LinearSide, Products
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.travelling import condense_side
 from stickslip.reduction.speed_line import SpeedLine
@@ -200,6 +200,13 @@ class TurningProducts:
 
     def _there(self) -> Products:
         return self.linear.beside(self.omega).products(self.omega, self.harmonics)
+
+
+def condensed(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
+    """Prepare the exact condensation of what vibrates at one speed (`condense_side`) or along an engine order (`condense_line`)."""
+    if isinstance(side, SpeedLine):
+        return condense_line(side, retained, load, order)
+    return condense_side(side, retained, load, order)
 
 
 def condense_line(line: SpeedLine, retained: IntArray, load: HarmonicLoad, order: int) -> TurningStiffness:

@@ -15,6 +15,7 @@ from stickslip.harmonic.spectral import Blocks
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
+from stickslip.reduction.tuned import TunedWheel
 
 
 class LinearSide(Protocol):
@@ -44,6 +45,16 @@ class LinearSide(Protocol):
         ...
 
     @property
+    def wheel(self) -> TunedWheel | None:
+        """The tuned wheel whose waves the harmonics are; None for all else."""
+        ...
+
+    @property
+    def speed_follows_frequency(self) -> bool:
+        """Whether the matrices are those of the speed at which an engine order has the frequency."""
+        ...
+
+    @property
     def harmonics(self) -> int | None:
         """Highest temporal harmonic for which there are matrices; None: any."""
         ...
@@ -63,6 +74,11 @@ class LinearSide(Protocol):
     def grounded(self, springs: Matrix) -> Self:
         """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         ...
+
+
+def full_structure(side: LinearSide, analysis: str) -> Structure:
+    """Return the structure that all harmonics vibrate as, reduced or not; see `one_structure`."""
+    return one_structure(side.structure if isinstance(side, Unreduced) else side, analysis)
 
 
 def one_structure(side: LinearSide, analysis: str) -> Structure:

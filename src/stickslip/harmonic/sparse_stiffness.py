@@ -53,6 +53,16 @@ class Unreduced:
         return np.arange(self.n)
 
     @property
+    def wheel(self) -> None:
+        """No tuned wheel (see `LinearSide`)."""
+        return None
+
+    @property
+    def speed_follows_frequency(self) -> bool:
+        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        return False
+
+    @property
     def reduced(self) -> bool:
         """Whether coordinates are condensed: none are (see `LinearSide`)."""
         return False

@@ -88,6 +88,16 @@ class Structure:
         return np.zeros(0, dtype=np.int64)
 
     @property
+    def wheel(self) -> None:
+        """No tuned wheel (see `LinearSide`)."""
+        return None
+
+    @property
+    def speed_follows_frequency(self) -> bool:
+        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        return False
+
+    @property
     def reduced(self) -> bool:
         """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
         return True

@@ -108,6 +108,16 @@ class SpeedLine:
         return self.top.harmonics
 
     @property
+    def wheel(self) -> None:
+        """No tuned wheel (see `LinearSide`)."""
+        return None
+
+    @property
+    def speed_follows_frequency(self) -> bool:
+        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        return True
+
+    @property
     def reduced(self) -> bool:
         """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
         return True

@@ -73,6 +73,16 @@ class TunedWheel:
         )
 
     @property
+    def wheel(self) -> "TunedWheel":
+        """The tuned wheel itself (see `LinearSide`)."""
+        return self
+
+    @property
+    def speed_follows_frequency(self) -> bool:
+        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        return False
+
+    @property
     def reduced(self) -> bool:
         """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
         return True

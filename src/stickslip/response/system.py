@@ -8,16 +8,13 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
-from stickslip.harmonic.engine_order_line import condense_line
+from stickslip.harmonic.engine_order_line import condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import REACH
-from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
+from stickslip.harmonic.linear import DynamicStiffness, LinearSide, full_structure, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
-from stickslip.harmonic.sparse_stiffness import Unreduced
-from stickslip.harmonic.travelling import condense_side
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
-from stickslip.reduction.speed_line import SpeedLine
 
 NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -99,9 +96,7 @@ class System:
         """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`; of a wheel that has them for all waves towards which these are judged."""
         side, retained = self.structure, np.union1d(self.retained, more)
         order = max(order, min(REACH * order, side.harmonics or 0))
-        if isinstance(side, SpeedLine):
-            return condense_line(side, retained, load, order)
-        return condense_side(side, retained, load, order)
+        return condensed(side, retained, load, order)
 
     @property
     def plain_structure(self) -> Structure:
@@ -133,9 +128,7 @@ class System:
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
-        side = self.structure
-        own = side.structure if isinstance(side, Unreduced) else side
-        structure = one_structure(own, "System.stuck_structure")
+        structure = full_structure(self.structure, "System.stuck_structure")
         return with_springs(structure, b, self.springs.stuck_stiffness())
 
 

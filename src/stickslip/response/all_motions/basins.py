@@ -9,8 +9,6 @@ from scipy.special import betaincinv
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.modes import normal_modes
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedProblem
 from stickslip.response.system import System
 from stickslip.response.time.start import TransientStart, rest
@@ -98,7 +96,7 @@ class StartSampler:
 def not_marched(system: System) -> str:
     """Return why a system has no starts in time and no multipliers here; empty where it has."""
     side = system.structure
-    if isinstance(side, TunedWheel | SpeedLine):
+    if side.wheel is not None or side.speed_follows_frequency:
         return "a tuned wheel is searched as a travelling wave, its sectors are not marched in time"
     structure = side.of_harmonic(0)
     if side.feedback_of(1) is not None or structure.is_complex:

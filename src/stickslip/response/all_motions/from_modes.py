@@ -9,8 +9,6 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.modes import normal_modes
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.continuation.homotopies import GrowingLoad, growing_load
 from stickslip.response.forced.problem import ForcedProblem
 
@@ -49,7 +47,8 @@ def mode_starts(
     modes
         Number of lowest modes of either kind.
     """
-    if not known or isinstance(problem.system.structure, TunedWheel | SpeedLine):
+    side = problem.system.structure
+    if not known or side.wheel is not None or side.speed_follows_frequency:
         return []
     free = growing_load(balance, omega)
     base = min((balance.coefficients(x) for x in known), key=_size)

@@ -12,8 +12,6 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.all_motions.basins import (
     ALIKE,
     APERIODIC,
@@ -339,7 +337,8 @@ class _Search:
 
     def _change(self, point: ForcedPoint) -> float:
         """Return what more harmonics would change in a motion, relative to its vibration; NaN for a wheel, whose waves end with its harmonics."""
-        if isinstance(self.problem.system.structure, TunedWheel | SpeedLine):
+        side = self.problem.system.structure
+        if side.wheel is not None or side.speed_follows_frequency:
             return np.nan
         more = corrected(self.problem, point)
         if more is None:

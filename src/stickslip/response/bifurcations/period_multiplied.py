@@ -8,8 +8,6 @@ from stickslip.arrays import ComplexArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.system import System
 from stickslip.response.time.sectors import SectorsInTime, all_sectors
@@ -39,7 +37,7 @@ def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProb
     if periods < 2:
         raise input_error("over_periods: periods", f"must be at least 2, got {periods}", "2 doubles the period.")
     system, sweep = problem.system, problem.sweep
-    if isinstance(system.structure, SpeedLine):
+    if system.structure.speed_follows_frequency:
         raise input_error(
             "over_periods: problem",
             "is that of a speed that changes with the frequency, whose matrices would be those of another speed",
@@ -121,8 +119,8 @@ def every_sector(problem: ForcedProblem) -> EverySector:
     InputError
         If what vibrates is no tuned wheel with every wave; and what `stickslip.response.all_sectors` refuses.
     """
-    wheel = problem.system.structure
-    if not (isinstance(wheel, TunedWheel) and wheel.has_every_wave):
+    wheel = problem.system.structure.wheel
+    if wheel is None or not wheel.has_every_wave:
         raise input_error(
             "every_sector: problem",
             "is not that of a tuned wheel with every wave",

@@ -8,7 +8,6 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.branch_switching import candidates, first_point, open_directions
 from stickslip.response.bifurcations.found import Bifurcation
 from stickslip.response.bifurcations.period_multiplied import every_sector, in_periods, over_periods
@@ -129,7 +128,7 @@ def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: i
     """
     periods = _periods(bifurcation)
     point, group, own = bifurcation.point, None, problem
-    if isinstance(problem.system.structure, TunedWheel):
+    if problem.system.structure.wheel is not None:
         wheel = every_sector(problem)
         own, point, group = wheel.problem, wheel.spread(point), wheel.sector_of
     if periods > 1:

@@ -10,7 +10,6 @@ from stickslip.errors import StickslipError
 from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.fourier import to_complex
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.continuation.starting_solutions import at_rest
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
@@ -183,7 +182,7 @@ def _from_rest(
 def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> float:
     """Return the operations that all marches may take together; none where the structure is not marched."""
     structure = problem.system.structure
-    if isinstance(structure, TunedWheel) or structure.of_harmonic(1).loss is not None:
+    if structure.wheel is not None or structure.of_harmonic(1).loss is not None:
         return 0.0
     return MARCHED * sum(
         (p.iterations + JUDGED) * (NEWTON_FLOPS + FLOPS_AN_UNKNOWN * p.unknowns) for p in solved_points

@@ -16,7 +16,6 @@ from stickslip.harmonic.two_frequency_path import Indices, TorusPath, closed_pat
 from stickslip.harmonic.two_frequency_side import TorusSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import preload
 from stickslip.response.quasi_periodic.motion import TorusMotion
 from stickslip.response.system import NO_DOFS, System
@@ -204,10 +203,11 @@ def torus_side(
     retained = np.union1d(system.retained, more)
     zero = HarmonicLoad(np.zeros(structure.n))
     second = HarmonicLoad(zero.static, second.harmonics)
-    if not isinstance(structure, TunedWheel):
+    wheel = structure.wheel
+    if wheel is None:
         one = condense_side(structure, retained, first, order)
         return TorusSide(one, one.with_load(second), {0: one.with_load(zero)})
-    if waves is None or not structure.has_every_wave:
+    if waves is None or not wheel.has_every_wave:
         raise input_error(
             "quasi_periodic",
             "of a tuned wheel needs the wave numbers of both frequencies and all waves",
@@ -215,11 +215,11 @@ def torus_side(
         )
 
     def travelling(wave: int, load: HarmonicLoad) -> DynamicStiffness:
-        return condense_side(structure.travelling_as(wave), retained, load, order)
+        return condense_side(wheel.travelling_as(wave), retained, load, order)
 
-    still = {k: travelling(k, zero) for k in range(structure.sectors)}
-    own = waves[0] % structure.sectors, waves[1] % structure.sectors
-    return TorusSide(travelling(own[0], first), travelling(own[1], second), still, (own[0], own[1], structure.sectors))
+    still = {k: travelling(k, zero) for k in range(wheel.sectors)}
+    own = waves[0] % wheel.sectors, waves[1] % wheel.sectors
+    return TorusSide(travelling(own[0], first), travelling(own[1], second), still, (own[0], own[1], wheel.sectors))
 
 
 def check_frequencies(omegas: tuple[float, float]) -> None:

@@ -10,7 +10,6 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
 from stickslip.harmonic.peak import driven_by
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.bounds import Bound
 from stickslip.response.system import System
@@ -86,7 +85,7 @@ def confirmed(
     motion = linear.recover(omega, balance.coefficients(found.x))
     resolved = float(np.linalg.norm(motion[driven, dof[0]])) if found.status.converged else np.nan
     same = bool(abs(resolved / bound.amplitude - 1.0) <= ALIKE)
-    if isinstance(system.structure, TunedWheel):
+    if system.structure.wheel is not None:
         return Confirmation(resolved, np.nan, None, 0, same)
     result = integrate(
         one_structure(system.structure, "confirmed"),

@@ -6,7 +6,6 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.response.stability.found import Stability
@@ -56,7 +55,7 @@ def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
         errors[size:] = 0.0
     errors = np.maximum(errors + found.errors, abs(along - 1.0))
     found = replace(found, errors=errors, moduli=None)
-    if not isinstance(problem.system.structure, TunedWheel):
+    if problem.system.structure.wheel is None:
         return CycleStability(found, along, None)
     every = wave_disturbances(problem.system, _gaps(problem, cycle.unknowns), cycle.omega)
     others = sorted(every, key=lambda d: abs(d.multiplier - along))[1:]

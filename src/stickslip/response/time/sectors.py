@@ -112,8 +112,8 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     InputError
         If waves are missing, have matrices that no motion in time has, or a load acts on a wave that turns against another one.
     """
-    wheel, interface = system.structure, system.interface
-    if not isinstance(wheel, TunedWheel):
+    wheel, interface = system.structure.wheel, system.interface
+    if wheel is None:
         raise input_error("all_sectors", "got no tuned wheel", "Integrate its one structure.")
     alike = different_sectors(wheel)
     sectors, common = (wheel.sectors, 1) if every else alike
@@ -193,9 +193,9 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
     gaps
         (H+1, 3 n_contacts) complex coefficients, m.
     """
-    wheel = system.structure
-    if not isinstance(wheel, TunedWheel):
-        return InTime(one_structure(wheel, "stability"), system.interface, to_real(gaps))
+    wheel = system.structure.wheel
+    if wheel is None:
+        return InTime(one_structure(system.structure, "stability"), system.interface, to_real(gaps))
     whole = whole_wheel(system)
     shares, common = different_sectors(wheel)
     ahead = pow(wheel.engine_order // common % shares, -1, shares) if shares > 1 else 0
@@ -210,8 +210,8 @@ def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
 
 def sectors_in_time(system: System) -> int:
     """Return how many sectors a forced motion is marched with: those of a tuned wheel that do different things, with every wave all; else 1."""
-    wheel = system.structure
-    if not isinstance(wheel, TunedWheel):
+    wheel = system.structure.wheel
+    if wheel is None:
         return 1
     return wheel.sectors if wheel.has_every_wave else different_sectors(wheel)[0]
 

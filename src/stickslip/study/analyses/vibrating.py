@@ -13,7 +13,6 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
@@ -85,10 +84,8 @@ def require_flow(model: Assembled, modes: Sequence[StuckMode], most: int, what: 
 
 def as_wave(system: System, wave: int) -> System:
     """Return what vibrates as a wave: a single structure as it is."""
-    side = system.structure
-    if not isinstance(side, TunedWheel):
-        return system
-    return replace(system, structure=side.travelling_as(wave))
+    wheel = system.structure.wheel
+    return system if wheel is None else replace(system, structure=wheel.travelling_as(wave))
 
 
 def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[StuckMode]:

@@ -12,7 +12,6 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.fourier import to_real
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_states
 from stickslip.response.stability.found import Stability
@@ -205,7 +204,7 @@ def _prepared(
 ) -> tuple[Hill | None, ContactStates | None]:
     """Return Hill's problem of a motion and the states of its contacts; None where these are not known."""
     side, interface = system.structure, system.interface
-    if isinstance(side, TunedWheel) and not side.has_every_wave:
+    if side.wheel is not None and not side.wheel.has_every_wave:
         raise input_error(
             "hill_stability",
             "the wheel has not all its waves, each of which a disturbance may be",

@@ -14,7 +14,6 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.nodal import own_motions
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.system import System
 
 RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
@@ -166,15 +165,13 @@ class HillSide:
     @property
     def waves(self) -> int:
         """Number of waves that a disturbance may have."""
-        side = self.system.structure
-        return side.sectors if isinstance(side, TunedWheel) else 1
+        wheel = self.system.structure.wheel
+        return 1 if wheel is None else wheel.sectors
 
     def wave_of(self, wave: int, harmonic: int) -> int:
         """Return the wave number of a harmonic of a disturbance of a wave."""
-        side = self.system.structure
-        if not isinstance(side, TunedWheel):
-            return 0
-        return (wave + harmonic * side.engine_order) % side.sectors
+        wheel = self.system.structure.wheel
+        return 0 if wheel is None else (wave + harmonic * wheel.engine_order) % wheel.sectors
 
     def modes(self, wave: int, harmonic: int) -> HillModes:
         """Return what a harmonic of a disturbance of a wave vibrates as."""
@@ -185,12 +182,13 @@ class HillSide:
 
     def _made(self, number: int) -> HillModes:
         side, gaps = self.system.structure, self.system.interface.gap_operator
-        if not isinstance(side, TunedWheel):
+        wheel = side.wheel
+        if wheel is None:
             structure, force = side.of_harmonic(1), side.feedback_of(1)
             return hill_modes(structure, gaps, self.springs, self.ports, self.omega, force)
-        wave, force = side.waves[number], side.feedback.get(number)
-        if side.multipliers.size:
-            way = own_motions(wave, side.multipliers)
+        wave, force = wheel.waves[number], wheel.feedback.get(number)
+        if wheel.multipliers.size:
+            way = own_motions(wave, wheel.multipliers)
             n = way.shape[1]
             k, c, m = (_dense(a)[:n, :n] for a in (wave.stiffness, wave.damping, wave.mass))
             loss = None if wave.loss is None else _dense(wave.loss)[:n, :n]

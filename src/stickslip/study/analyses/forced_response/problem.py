@@ -20,7 +20,6 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.response.system import System
@@ -295,7 +294,7 @@ def _require_integrable(model: Model) -> None:
 def _require_sectors(model: Model, assembled: Assembled) -> None:
     """Refuse a wheel whose sectors are too many coordinates to be integrated."""
     side = assembled.system.structure
-    if not isinstance(side, TunedWheel):
+    if side.wheel is None:
         if assembled.blades is not None and side.n > MOST_IN_TIME:
             raise input_error(
                 "mistuning",

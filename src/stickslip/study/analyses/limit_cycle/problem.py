@@ -9,7 +9,6 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
@@ -59,7 +58,7 @@ class Question:
     @property
     def waves(self) -> tuple[int, ...]:
         """Wave numbers that are looked at; one of `ONE` for a single structure."""
-        if not isinstance(self.model.system.structure, TunedWheel):
+        if self.model.system.structure.wheel is None:
             return (ONE,)
         if self.asked.wave_numbers is not None:
             return tuple(self.asked.wave_numbers)

@@ -12,7 +12,6 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.in_time import Marched, march_periods, mixed_start, wave_history
 from stickslip.response.system import System
 from stickslip.response.time.sectors import whole_wheel
@@ -130,16 +129,16 @@ def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, 
     """
     side = system.structure
     at = coordinate(system)
-    if not isinstance(side, TunedWheel):
+    if side.wheel is None:
         return side, system.interface, question.model.load, np.array([at])
-    if side.n * side.sectors > MOST_IN_TIME:
+    if side.n * side.wheel.sectors > MOST_IN_TIME:
         raise StickslipError(
-            f"time integration marches all sectors, {side.n * side.sectors} coordinates, more than {MOST_IN_TIME}"
+            f"time integration marches all sectors, {side.n * side.wheel.sectors} coordinates, more than {MOST_IN_TIME}"
         )
     whole = whole_wheel(system)
-    own = whole.structure.n // side.sectors
-    static = np.tile(question.model.load.static[:own], side.sectors)
-    places = at + own * np.arange(side.sectors)
+    own = whole.structure.n // side.wheel.sectors
+    static = np.tile(question.model.load.static[:own], side.wheel.sectors)
+    places = at + own * np.arange(side.wheel.sectors)
     return whole.structure, whole.contacts, HarmonicLoad(static), places
 
 

@@ -8,7 +8,6 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.evaluators import Evaluator
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
@@ -132,7 +131,7 @@ def _required(question: Question, wave: int) -> list[StuckMode]:
 
 
 def _waves(asked: NonlinearModeTable, model: Model, assembled: Assembled) -> tuple[int, ...]:
-    if not isinstance(assembled.system.structure, TunedWheel):
+    if assembled.system.structure.wheel is None:
         return (ONE,)
     if asked.wave_numbers is not None:
         return tuple(asked.wave_numbers)

@@ -13,7 +13,6 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
@@ -96,8 +95,8 @@ class Question:
         """Return the modes that grow with contacts stuck, with their wave numbers (0 for a single structure), the fastest first."""
         side, chosen = self.model.system.structure, self.asked.second_wave
         waves: Sequence[int] = [0]
-        if isinstance(side, TunedWheel):
-            waves = range(side.sectors) if chosen is None else [chosen]
+        if side.wheel is not None:
+            waves = range(side.wheel.sectors) if chosen is None else [chosen]
         found = [(wave, m) for wave in waves for m in modes_of(self.model, MODES, wave)]
         return sorted((m for m in found if m[1].unstable), key=lambda m: m[1].ratio)
 

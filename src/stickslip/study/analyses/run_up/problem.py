@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -82,9 +82,7 @@ class Along:
     @property
     def line(self) -> SpeedLine:
         """What vibrates."""
-        side = self.model.system.structure
-        assert isinstance(side, SpeedLine)
-        return side
+        return cast("SpeedLine", self.model.system.structure)
 
     @property
     def order(self) -> int:

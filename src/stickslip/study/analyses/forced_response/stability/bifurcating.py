@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.errors import StickslipError
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation, Bifurcations
 from stickslip.response.bifurcations.locate import MAX_EXAMINED_MOTIONS, bifurcations
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
@@ -110,7 +109,7 @@ def followed(question: Question, found: Bifurcations) -> list[tuple[Bifurcation,
 def _most_followed(question: Question) -> int:
     """Return from how many bifurcations of a case branches are followed: from none of a wheel that is too large for its multipliers."""
     system = question.model.system
-    return 0 if isinstance(system.structure, TunedWheel) and by_hill(system) else MOST_FOLLOWED
+    return 0 if system.structure.wheel is not None and by_hill(system) else MOST_FOLLOWED
 
 
 def of_bifurcations(

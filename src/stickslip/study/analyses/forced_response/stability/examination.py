@@ -1,7 +1,6 @@
 """Estimated cost of a stability examination, and whether it is begun; all sectors of a wheel count."""
 
 from stickslip.assembly.sides.unreduced import KEPT
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.flow_map.contact_states import is_located
 from stickslip.response.stability.hill_method.hill import MAX_HILL_HARMONICS, MAX_ROWS
 from stickslip.response.stability.hill_method.hill_segment import NODES
@@ -24,8 +23,8 @@ def examination_work(system: System) -> float:
     coordinates are found in any case, and take about as much as one interval.
     """
     side, sectors, shares = system.structure, 1, 1
-    if isinstance(side, TunedWheel):
-        sectors, shares = side.sectors, different_sectors(side)[0]
+    if side.wheel is not None:
+        sectors, shares = side.wheel.sectors, different_sectors(side.wheel)[0]
     rows = 2 * sectors * side.n
     intervals = max(1.0, INTERVALS * sectors * system.interface.n_contacts / shares)
     return 2.0 * intervals * PRODUCTS * 2.0 * rows**3
@@ -46,15 +45,15 @@ def too_long(system: System, *, forced: bool) -> str:
     if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"
     side, work = system.structure, examination_work(system)
-    wheel = isinstance(side, TunedWheel)
-    most = MOST_WHEEL if forced and wheel else MOST_WORK
+    wheel = side.wheel
+    most = MOST_WHEEL if forced and wheel is not None else MOST_WORK
     if work <= most:
         return ""
     would = f"would take about {_lasting(work / FLOPS)} a motion, more than {most / FLOPS:.0f} s"
-    if isinstance(side, TunedWheel):
+    if wheel is not None:
         return (
-            f"against every wave all {side.sectors} sectors count, {side.sectors * side.n} coordinates with "
-            f"{side.sectors * system.interface.n_contacts} contacts, which {would}"
+            f"against every wave all {wheel.sectors} sectors count, {wheel.sectors * side.n} coordinates with "
+            f"{wheel.sectors * system.interface.n_contacts} contacts, which {would}"
         )
     return (
         f"{side.n} coordinates with {system.interface.n_contacts} contacts {would}: each interval between two transitions costs "
@@ -65,7 +64,7 @@ def too_long(system: System, *, forced: bool) -> str:
 def hill_work(system: System) -> float:
     """Return the most operations that an examination of a wheel by Hill's method takes, one sector at a time, whatever contacts slip."""
     side = system.structure
-    sectors = side.sectors if isinstance(side, TunedWheel) else 1
+    sectors = 1 if side.wheel is None else side.wheel.sectors
     rows = min(MAX_ROWS, (2 * MAX_HILL_HARMONICS + 1) * 3 * system.interface.n_contacts)
     each = 8.0 * rows**3 / 3.0 + (2 * MAX_HILL_HARMONICS + 1) * 4.0 * float(side.n) ** 3
     return MOTIONS * 2.0 * sectors / 2.0 * NODES * each
@@ -74,7 +73,7 @@ def hill_work(system: System) -> float:
 def by_hill(system: System) -> bool:
     """Whether forced motions are examined by Hill's method: those of a wheel that is too large for its multipliers, and with structural damping."""
     interface, side = system.interface, system.structure
-    large = isinstance(side, TunedWheel) and bool(too_long(system, forced=True))
+    large = side.wheel is not None and bool(too_long(system, forced=True))
     return (
         side.reduced
         and (large or side.of_harmonic(1).loss is not None)
@@ -86,7 +85,7 @@ def by_hill(system: System) -> bool:
 
 def examines_every_wave(system: System) -> bool:
     """Whether the stability of the forced motions of a tuned wheel is examined against every wave."""
-    if not isinstance(system.structure, TunedWheel):
+    if system.structure.wheel is None:
         return False
     return not too_long(system, forced=True) or by_hill(system)
 

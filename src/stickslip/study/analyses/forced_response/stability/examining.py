@@ -10,7 +10,6 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.model.structure import Structure
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability.course import Course, course_of
 from stickslip.response.stability.cycle import has_transitions
 from stickslip.response.stability.found import changes
@@ -299,7 +298,7 @@ def _allowed(question: Question, response: Response) -> float:
     """Return the operations that examinations of a case may take: without limit where matrices are small, else as many as its solutions took."""
     system = question.model.system
     side = system.structure
-    sectors = side.sectors if isinstance(side, TunedWheel) else 1
+    sectors = 1 if side.wheel is None else side.wheel.sectors
     rows = max(2 * sectors * side.n, *(p.unknowns for p in response.solved))
     if not by_hill(system) and rows <= ALWAYS_ROWS:
         return np.inf

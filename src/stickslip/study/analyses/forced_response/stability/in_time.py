@@ -9,7 +9,6 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.system import System
@@ -235,9 +234,10 @@ def integrated(
     system = problem.system
     motion = problem.low.linear.recover(point.omega, point.coefficients)
     structure, contacts = system.structure, system.interface
-    if isinstance(structure, TunedWheel):
+    wheel = system.structure.wheel
+    if wheel is not None:
         # with every wave any sector may do something else: what leaves the tuned motion then does so here too
-        whole = all_sectors(system, load, every=structure.has_every_wave)
+        whole = all_sectors(system, load, every=wheel.has_every_wave)
         motion, structure, contacts = whole.spread(motion), whole.structure, whole.contacts
         load = whole.load
     return integrate(

@@ -8,7 +8,6 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.quasi_periodic.in_time import KEPT, MAX_PERIODS, MIN_PERIODS, PEAKS, Course, course, statistics
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
@@ -156,8 +155,9 @@ def _marched(question: Question, response: Response, omega: float, work: float, 
     if near is not None:
         own = near.point
         motion = question.problem.low.linear.recover(own.omega, own.coefficients)
-    if isinstance(structure, TunedWheel):
-        whole = all_sectors(system, load, every=structure.has_every_wave)
+    wheel = system.structure.wheel
+    if wheel is not None:
+        whole = all_sectors(system, load, every=wheel.has_every_wave)
         motion = None if motion is None else whole.spread(motion)
         structure, contacts, load = whole.structure, whole.contacts, whole.load
     start = rest(structure.n, contacts.laws)

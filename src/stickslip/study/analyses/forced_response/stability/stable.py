@@ -8,7 +8,6 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray
 from stickslip.errors import InputError, StickslipError
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import Stability, hill_stability, settled_stability
@@ -190,8 +189,8 @@ def _by_hill(question: Question, accepted: Accepted, keep: Keep) -> Examined:
     """Return what Hill's method says of a point of a wheel, against every wave."""
     hill = hill_stability(question.problem, accepted.point, keep)
     found, said = hill.stability, hill.reason
-    wheel = isinstance(question.model.system.structure, TunedWheel)
-    if wheel and hill.disturbance is not None and found.verdict != "stable":
+    wheel = question.model.system.structure.wheel
+    if wheel is not None and hill.disturbance is not None and found.verdict != "stable":
         said += _named(question, hill.disturbance)
     return _seen(question, accepted, found, said)
 
@@ -211,8 +210,7 @@ def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -
 
 def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
     """Return which wave of a wheel the multiplier that decides belongs to; empty where disturbances die."""
-    wheel = question.model.system.structure
-    if not isinstance(wheel, TunedWheel) or found.verdict == "stable":
+    if question.model.system.structure.wheel is None or found.verdict == "stable":
         return ""
     wave = growing_wave(point_disturbances(question.problem, accepted.point), found.multiplier)
     return "" if wave is None else _named(question, wave)
@@ -220,8 +218,8 @@ def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
 
 def _named(question: Question, wave: WaveDisturbance) -> str:
     """Return which wave a disturbance is."""
-    wheel = question.model.system.structure
-    diameters = wave.nodal_diameter(wheel.sectors) if isinstance(wheel, TunedWheel) else 0
+    wheel = question.model.system.structure.wheel
+    diameters = 0 if wheel is None else wave.nodal_diameter(wheel.sectors)
     return f", in wave {wave.wave} ({diameters} nodal diameters) near {wave.omega / HZ:.5g} Hz"
 
 
@@ -259,8 +257,8 @@ def why_not(question: Question) -> str:
     system = question.model.system
     if not by_hill(system):
         return unexaminable(question)
-    wheel = system.structure
-    return ONE_SECTOR if isinstance(wheel, TunedWheel) and not wheel.has_every_wave else ""
+    wheel = system.structure.wheel
+    return ONE_SECTOR if wheel is not None and not wheel.has_every_wave else ""
 
 
 def unexaminable(question: Question) -> str:
@@ -268,8 +266,8 @@ def unexaminable(question: Question) -> str:
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
-    why, wheel = too_long(system, forced=True), system.structure
-    if not why and isinstance(wheel, TunedWheel) and not wheel.has_every_wave:
+    why, wheel = too_long(system, forced=True), system.structure.wheel
+    if not why and wheel is not None and not wheel.has_every_wave:
         return ONE_SECTOR
     return why
 
@@ -283,8 +281,7 @@ def cost_line(question: Question) -> str:
         return f"stability: not examined, {why}"
     if by_hill(question.model.system):
         system = question.model.system
-        wheel = isinstance(system.structure, TunedWheel)
-        waves = " against every wave, one sector at a time" if wheel else ""
+        waves = "" if system.structure.wheel is None else " against every wave, one sector at a time"
         most = max(1.0, hill_work(system) / FLOPS)
         return f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s"
     points = {
