@@ -66,6 +66,29 @@ def _linked(_app, page, source):
         source[0] = re.sub(r"^\| `ss\.([\w.]+)`", r"| {py:obj}`ss.\1 <stickslip.\1>`", source[0], flags=re.M)
 
 
+def _attributes_apart(_app, _what, _name, _obj, _options, lines):
+    """Give attributes that share a description an entry each: of "a, b" napoleon takes "a" for a type."""
+    inside, out, shared, told = False, [], [], []
+    for i, line in enumerate([*lines, ""]):
+        if i + 1 < len(lines) and set(lines[i + 1]) == {"-"}:
+            inside = line == "Attributes"
+        indented = line.startswith(" ") or not line
+        if shared and not indented:
+            out += [row for name in shared[1:] for row in (name, *told)]
+            shared = []
+        if inside and re.fullmatch(r"\w+(, \w+)+", line):
+            shared, told = line.split(", "), []
+            out.append(shared[0])
+            continue
+        out.append(line)
+        if shared:
+            told.append(line)
+    if shared:
+        out += [row for name in shared[1:] for row in (name, *told)]
+    lines[:] = out
+
+
 def setup(app):
     """Connect what this page of settings adds."""
     app.connect("source-read", _linked)
+    app.connect("autodoc-process-docstring", _attributes_apart, priority=100)  # before napoleon
