@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.product import harmonic_means
@@ -12,10 +11,12 @@ from stickslip.harmonic.factors import solved, with_contacts
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.judging import HIGHEST, SAMPLES_A_HARMONIC, judging_set_of
 from stickslip.harmonic.matrix_products import products
+from stickslip.harmonic.sparse_product import SparseProduct
 
 MOST_RINGING = 4  # harmonics, those with the largest gaps
 FAINTEST_GAP = 1e-4  # of the vibration of the gaps, below which nothing is made of it
 MOST_ROWS = 400  # of a structure, above which its matrices are not solved with for each harmonic
+MOST_ROWS_TOGETHER = 100  # of matrices that are solved with in one call: 60 harmonics of them take 10 MB
 
 
 def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
@@ -71,17 +72,15 @@ def _gaps_of_each(
     parts = np.zeros((2 * count, low.linear.n))
     rows.add_forces(np.concatenate([own.real, own.imag]), parts)
     pushed = parts[:count] + 1j * parts[count:]
-    matrices = [side.block(h) for h in harmonics]
-    if not any(map(scipy.sparse.issparse, matrices)):
-        shared = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
-        together = _solved_together(np.array(matrices) + shared, pushed)
+    if low.linear.n <= MOST_ROWS_TOGETHER and not isinstance(side, SparseProduct):
+        contacts = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
+        moved = _solved_together(np.array([side.block(h) for h in harmonics]) + contacts, pushed)
     else:
-        together = np.array(
-            [_solved(with_contacts(m, stiffness, rows), f) for m, f in zip(matrices, pushed, strict=True)]
-        )
-    gaps = rows.gaps(np.concatenate([together.real, together.imag]))
+        each = zip(harmonics, pushed, strict=True)
+        moved = np.array([_solved(with_contacts(side.block(h), stiffness, rows), f) for h, f in each])
+    gaps = rows.gaps(np.concatenate([moved.real, moved.imag]))
     sizes = np.hypot(gaps[:count], gaps[count:]).max(axis=1, initial=0.0)
-    sizes[np.any(np.isinf(together), axis=1)] = np.inf
+    sizes[np.any(np.isinf(moved), axis=1)] = np.inf
     return np.asarray(sizes)
 
 

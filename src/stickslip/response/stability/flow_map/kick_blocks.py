@@ -1,4 +1,4 @@
-"""Many samples of kicked motion at once: between them nothing changes but what contacts push.
+"""Blocks of samples of a disturbed motion: contact forces act as kicks at the samples, one matrix propagates the whole block.
 
 Over a block of samples the gaps follow from the states at its beginning and from the forces of the samples before, by small matrices; the
 large ones are multiplied once a block. Rounding apart the result is that of one sample after the other.
@@ -20,24 +20,24 @@ MAX_SAMPLES = 32  # in a block; 8 to 64 cost the same within a tenth, one contac
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """What a number of samples between which the same happens does to states (N, k).
+    """Propagation of states (N, k) over a number of equally spaced samples.
 
     Attributes
     ----------
     gaps
         (samples, m, N) those of the sampled contacts while no force acts.
-    answers
-        (samples, m, m) gaps one, two and more samples after a force.
+    gap_response
+        (samples, m, m) response of the gaps one, two and more samples after a unit force.
     step
         (N, N) of all samples.
-    pushed
-        (N, samples m) what forces at the samples have done after the last.
+    force_effect
+        (N, samples m) effect of forces at the samples on the states after the last.
     """
 
     gaps: FloatArray
-    answers: FloatArray
+    gap_response: FloatArray
     step: FloatArray
-    pushed: FloatArray
+    force_effect: FloatArray
 
 
 def blocks(step: FloatArray, gaps: FloatArray, push: FloatArray, count: int) -> list[Block]:
@@ -55,15 +55,17 @@ def blocks(step: FloatArray, gaps: FloatArray, push: FloatArray, count: int) -> 
         Samples.
     """
     most = min(count, int(np.clip(len(step) // max(len(gaps), 1), 1, MAX_SAMPLES)))
-    rows, pushed = [gaps], [step @ push]
+    rows, force_effect = [gaps], [step @ push]
     for _ in range(most - 1):
         rows.append(rows[-1] @ step)
-        pushed.append(step @ pushed[-1])
-    answers = np.array([gaps @ p for p in pushed])
+        force_effect.append(step @ force_effect[-1])
+    gap_response = np.array([gaps @ p for p in force_effect])
 
     def of(samples: int) -> Block:
         powered = np.linalg.matrix_power(step, samples)
-        return Block(np.array(rows[:samples]), answers[:samples], powered, np.hstack(pushed[samples - 1 :: -1]))
+        return Block(
+            np.array(rows[:samples]), gap_response[:samples], powered, np.hstack(force_effect[samples - 1 :: -1])
+        )
 
     whole, rest = divmod(count, most)
     return [of(most)] * whole + [of(rest)] * (rest > 0)
@@ -78,12 +80,12 @@ def _add(factor, row, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _add_effects(answers, forces, i, gaps):  # type: ignore[no-untyped-def]
+def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
     """Add what forces at the samples before the i-th have done to its gaps."""
     for j in range(i):
         for a in range(gaps.shape[0]):
             for b in range(gaps.shape[0]):
-                _add(answers[i - j - 1, a, b], forces[j, b], gaps[a])
+                _add(gap_response[i - j - 1, a, b], forces[j, b], gaps[a])
 
 
 @inner
@@ -100,7 +102,7 @@ def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[n
             _add(jac[3 + d, b], known[b], states[d])
 
 
-def _run(contacts, shares, answers, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
+def _run(contacts, shares, gap_response, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
     """Kick by the contacts at each sample of a block.
 
     `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and the gaps before, factors (n,) of the forces, and
@@ -110,7 +112,7 @@ def _run(contacts, shares, answers, gaps, states, before, known, forces):  # typ
     jac, weights, springs = contacts
     kept = states.shape[1]
     for i in range(gaps.shape[0]):
-        _add_effects(answers, forces, i, gaps[i])
+        _add_effects(gap_response, forces, i, gaps[i])
         for p in range(states.shape[0]):
             own = slice(3 * p, 3 * p + 3)
             known[:3] = gaps[i, own]

@@ -73,8 +73,8 @@ class _Kicks:
             samples = len(block.gaps)
             now, forces = block.gaps @ states, np.zeros((samples, rows, columns))
             contacts = self.alone[first : first + samples], self.factors, springs
-            run()(contacts, shares[:samples], block.answers, now, self.states, self.before, known, forces)
-            states = block.step @ states + block.pushed @ forces.reshape(-1, columns)
+            run()(contacts, shares[:samples], block.gap_response, now, self.states, self.before, known, forces)
+            states = block.step @ states + block.force_effect @ forces.reshape(-1, columns)
             first, shares = first + samples, shares[samples:]
         return states
 
