@@ -228,7 +228,7 @@ def laws() -> str:
 
 def variables_of_response() -> str:
     """Return the variables of a forced response, as the code that writes them lists them."""
-    from stickslip.study.analyses.forced_response.records.quantities import QUANTITIES
+    from stickslip.analyses.forced_response.records.quantities import QUANTITIES
 
     rows = [
         f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |" for name, q in QUANTITIES.items()
@@ -238,7 +238,7 @@ def variables_of_response() -> str:
 
 def variables_of_cycles() -> str:
     """Return the variables of limit cycles."""
-    from stickslip.study.analyses.limit_cycle.dataset import ABOUT
+    from stickslip.analyses.limit_cycle.dataset import ABOUT
 
     rows = [
         f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
@@ -249,7 +249,7 @@ def variables_of_cycles() -> str:
 
 def variables_of_tractions() -> str:
     """Return the variables of bounds over residual tractions."""
-    from stickslip.study.analyses.residual_tractions.dataset import ABOUT
+    from stickslip.analyses.residual_tractions.dataset import ABOUT
 
     rows = [
         f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
@@ -260,7 +260,7 @@ def variables_of_tractions() -> str:
 
 def variables_of_models() -> str:
     """Return what the linear analyses say of the model."""
-    from stickslip.study.analyses.waves.records.about import NUMBERS
+    from stickslip.analyses.waves.records.about import NUMBERS
 
     rows = [
         f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"

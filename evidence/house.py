@@ -20,7 +20,7 @@ SOURCE = ROOT / "src" / "stickslip"
 # implementations of `LinearSide`
 SIDES = frozenset({"TunedWheel", "SpeedLine", "Unreduced", "Structure"})
 BELOW_SIDES = ("model", "reduction", "harmonic")  # which make and know them
-SHELL = ("study/analyses/", "report/sections/", "report/forced/")
+SHELL = ("analyses/",)
 SMALL_MODULE = 60  # lines of code
 
 
@@ -147,7 +147,7 @@ def largest_folder() -> tuple[int, str]:
     """Return the number of modules of the fullest folder of assembly, study, report and response, and its name."""
     folders = Counter(str(path.parent.relative_to(SOURCE)) for path in modules() if path.name != "__init__.py")
     name, count = max(
-        ((n, c) for n, c in folders.items() if n.startswith(("assembly", "study", "report", "response"))),
+        ((n, c) for n, c in folders.items() if n.startswith(("assembly", "study", "analyses", "report", "response"))),
         key=lambda f: f[1],
     )
     return count, name

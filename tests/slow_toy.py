@@ -7,7 +7,7 @@ from typing import Any
 
 from toy_analysis import Term, Toy
 
-from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analysis import Notes
 
 SECONDS = float(os.environ.get("SLOW_TOY_SECONDS", "0.8"))  # of a record
 

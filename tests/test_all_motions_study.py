@@ -5,11 +5,11 @@ import pytest
 import xarray as xr
 from study_texts import DETACHED, study_of
 
+from stickslip.analyses.all_motions.analysis import ALL_MOTIONS
+from stickslip.analyses.all_motions.page import Motions, basin_table, branch_table, branches
+from stickslip.analyses.all_motions.verdicts import case_verdicts
 from stickslip.api.study import Study
 from stickslip.errors import InputError
-from stickslip.report.sections.all_motions import Motions, basin_table, branch_table, branches
-from stickslip.study.analyses.all_motions.analysis import ALL_MOTIONS
-from stickslip.study.analyses.all_motions.verdicts import case_verdicts
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 from stickslip.study.store.netcdf import one_case

@@ -9,13 +9,13 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.analyses.forced_response.records.points import collect
+from stickslip.analyses.forced_response.stability import bifurcating
+from stickslip.analyses.forced_response.stability.bifurcating import limits, located
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.records.points import collect
-from stickslip.study.analyses.forced_response.stability import bifurcating
-from stickslip.study.analyses.forced_response.stability.bifurcating import limits, located
 from stickslip.study.models.study import read_study
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "impacting_mass" / "study.toml"

@@ -21,12 +21,12 @@ import xarray as xr
 from toy_analysis import ToyStudy
 
 from stickslip.errors import InputError
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.verdict import of_tree
+from stickslip.study.questions import ANALYSES
 from stickslip.study.run import run_study
 from stickslip.study.store import workers
 from stickslip.study.store.attempts import reached
 from stickslip.study.store.workers import LOOPBACK
+from stickslip.study.verdict import of_tree
 
 if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):
     pytest.skip("the extra cluster is not installed", allow_module_level=True)
@@ -46,7 +46,7 @@ LIMIT = 300.0  # seconds of a run, after which it is ended and the test has fail
 RUN = """
 import sys
 from pathlib import Path
-from stickslip.study.analyses import ANALYSES
+from stickslip.study.questions import ANALYSES
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
 from toy_analysis import ToyStudy

@@ -10,9 +10,9 @@ from synthetic_result import KEY, synthetic_result, tree_of
 from typer.testing import CliRunner
 
 import stickslip as ss
+from stickslip.analyses.compared.side_by_side import cards
 from stickslip.api.comparison import Comparison
 from stickslip.cli import app
-from stickslip.report.compared.side_by_side import cards
 from stickslip.report.quantities import column
 
 STUDY = 'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'

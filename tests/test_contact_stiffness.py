@@ -8,6 +8,8 @@ import xarray as xr
 from scipy.optimize import minimize_scalar
 
 import stickslip as ss
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.physics_rules import contact_stiffness, told_of_model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
@@ -21,8 +23,6 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.physics.contact_stiffness import stiffer, stiffness_slope
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
-from stickslip.study.analyses.forced_response.verdicts.curve import Curve
-from stickslip.study.analyses.forced_response.verdicts.physics_rules import contact_stiffness, told_of_model
 from tests.newton_bounds import FINE, unknowns_bound
 
 STEP = 1e-3

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.api.study import Study
 from stickslip.assembly.forces import engine_order
 from stickslip.errors import InputError
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
 
 SECTORS = 6
 # disk, blade and tip of a sector; shrouds rub and hit their neighbours, the root rubs in its slot

@@ -8,6 +8,7 @@ import scipy.signal
 from test_run_up import LUMPED
 
 import stickslip as ss
+from stickslip.analyses.run_up.fast import neglected
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
@@ -17,7 +18,6 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.rotating.envelope import SweepInTime, envelope
 from stickslip.response.system import System
-from stickslip.study.analyses.run_up.fast import neglected
 from stickslip.units import RPM
 
 

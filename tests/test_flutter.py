@@ -13,6 +13,8 @@ import scipy.linalg
 from test_assembly_wheel import SECTORS, sector_model, shrouded_sector
 
 import stickslip as ss
+from stickslip.analyses.page import report_html
+from stickslip.analyses.waves.flutter import _others as others
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import flow_around
 from stickslip.assembly.fluid.aero_forces import largest_displacements, phases
@@ -22,9 +24,7 @@ from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction import InfluenceCoefficients
-from stickslip.report.page import report_html
 from stickslip.response.rotating.flutter import flutter_of_wave
-from stickslip.study.analyses.waves.flutter import _others as others
 from stickslip.study.models.study import read_study
 
 N = fluid.BLADES

@@ -13,6 +13,23 @@ from pydantic import ValidationError
 from small_v2 import write_four_masses
 from synthetic_result import tree_of
 
+from stickslip.analyses.forced_response import analysis as analysis_module
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.analyses.forced_response.estimate import estimate, retained_of
+from stickslip.analyses.forced_response.page.not_periodic import statistics_in_time
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.physics.known import (
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+    off_engine_order,
+)
+from stickslip.analyses.forced_response.problem import Question, question_of
+from stickslip.analyses.forced_response.sweeps import sweep_of
+from stickslip.analyses.forced_response.table import ForcedResponse
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.rules import twice_the_harmonics
+from stickslip.analyses.page import plots
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.load import Load
@@ -26,29 +43,12 @@ from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.report.forced.not_periodic import statistics_in_time
-from stickslip.report.page import plots
-from stickslip.report.response import Response
 from stickslip.response.forced.response import ForcedPoint, Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Status
-from stickslip.study.analyses.analysis import Case, Solved
-from stickslip.study.analyses.forced_response import analysis as analysis_module
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.estimate import estimate, retained_of
-from stickslip.study.analyses.forced_response.physics.known import (
-    mixed_places,
-    no_resonance,
-    nothing_pressed,
-    off_engine_order,
-)
-from stickslip.study.analyses.forced_response.problem import Question, question_of
-from stickslip.study.analyses.forced_response.section import ForcedResponse
-from stickslip.study.analyses.forced_response.sweeps import sweep_of
-from stickslip.study.analyses.forced_response.verdicts.curve import Curve
-from stickslip.study.analyses.forced_response.verdicts.rules import twice_the_harmonics
+from stickslip.study.analysis import Case, Solved
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import case_variables
@@ -323,7 +323,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert 0 < np.count_nonzero(own > 0.01) < own.size
     doubted = ["are predicted to change it by" in text for text in data.verdict_reason.values.tolist()]
     np.testing.assert_array_equal(doubted, own > 0.01)
-    monkeypatch.setattr("stickslip.study.analyses.forced_response.records.points.own_error", lambda *_: float("nan"))
+    monkeypatch.setattr("stickslip.analyses.forced_response.records.points.own_error", lambda *_: float("nan"))
     data = dataset(solved(asked))
     assert np.all(data.verdict.values >= 1)
     assert data.verdict_reason[0].item().startswith("its harmonics were not examined")
@@ -455,7 +455,7 @@ def test_load_without_an_equilibrium_leaves_a_case_without_a_solution(monkeypatc
         raise SingularError("static equilibrium: coordinate x is held by nothing")
         yield
 
-    monkeypatch.setattr("stickslip.study.analyses.forced_response.analysis.forced_response", fails)
+    monkeypatch.setattr("stickslip.analyses.forced_response.analysis.forced_response", fails)
     asked = lifted()
     with JobJournal(Path(":memory:"), ForcedPoint) as journal:
         with pytest.raises(SingularError, match="held by nothing"):

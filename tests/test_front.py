@@ -13,13 +13,13 @@ from small_v2 import write_four_masses, write_two_blades
 from synthetic_result import KEY, provenance, synthetic_result, tree_of
 from synthetic_wheel import campbell_result, modes_result, safe_result
 
+from stickslip.analyses.forced_response.summary import _millimetres
 from stickslip.api.model import Model
 from stickslip.api.printed import aligned
 from stickslip.api.result import Result
 from stickslip.api.screen import LOG, Screen, by_default, on_screen
 from stickslip.api.study import Study
 from stickslip.errors import InputError
-from stickslip.study.analyses.forced_response.summary import _millimetres
 from stickslip.study.file.keys import REQUIRED, table_keys
 from stickslip.study.store.progress import advance, at_work, sum_up
 

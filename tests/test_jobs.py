@@ -20,7 +20,7 @@ from toy_analysis import ToyStudy
 
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
-from stickslip.study.analyses import ANALYSES
+from stickslip.study.questions import ANALYSES
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
 from stickslip.study.store import folder as keep_folder

@@ -14,7 +14,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.model.checksum import with_checksum
 from stickslip.solve.status import Status
-from stickslip.study.analyses.analysis import Pieces
+from stickslip.study.analysis import Pieces
 from stickslip.study.store.archive import decode, decode_record, encode, encode_record
 from stickslip.study.store.journal import JobJournal, read_note, read_sealed
 

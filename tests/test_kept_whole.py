@@ -6,9 +6,9 @@ import xarray as xr
 from test_root_joint import COARSE, CONTACT, FINE, blocks
 from typer.testing import CliRunner
 
+from stickslip.analyses.forced_response.estimate import estimate
 from stickslip.cli import app
 from stickslip.response.forced.sweep import Sweep
-from stickslip.study.analyses.forced_response.estimate import estimate
 from stickslip.study.models.study import read_study
 
 MODEL = (

@@ -11,6 +11,8 @@ from transient_models import load_of, structure_of
 
 import stickslip as ss
 from evidence.models.many_contacts import two_plates
+from stickslip.analyses.forced_response.stability.not_periodic import without_periodic
+from stickslip.analyses.forced_response.verdicts.rules import unsolved
 from stickslip.errors import InputError
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.from_time import found_in_time, marched_of
@@ -18,8 +20,6 @@ from stickslip.response.forced.response import Sweep, forced_problem, forced_res
 from stickslip.response.time.repeating import Repetition, repetition
 from stickslip.response.time.stepping.step_choice import ROUGH
 from stickslip.solve.status import Rung, Status
-from stickslip.study.analyses.forced_response.stability.not_periodic import without_periodic
-from stickslip.study.analyses.forced_response.verdicts.rules import unsolved
 
 OMEGA = 2.0 * np.pi * 1067.0
 

@@ -11,13 +11,13 @@ from small_v2 import EXAMPLES, changed
 from study_texts import JENKINS, answered, study_of
 
 import stickslip as ss
+from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
+from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
+from stickslip.analyses.limit_cycle.solve import _without
+from stickslip.analyses.limit_cycle.time import compete
+from stickslip.analyses.limit_cycle.verdicts import case_verdicts
+from stickslip.analyses.page import plots
 from stickslip.errors import InputError
-from stickslip.report.page import plots
-from stickslip.report.sections.limit_cycle import Cycles, cycle_table
-from stickslip.study.analyses.limit_cycle.analysis import LIMIT_CYCLE
-from stickslip.study.analyses.limit_cycle.solve import _without
-from stickslip.study.analyses.limit_cycle.time import compete
-from stickslip.study.analyses.limit_cycle.verdicts import case_verdicts
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.netcdf import one_case
 

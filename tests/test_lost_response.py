@@ -8,11 +8,11 @@ import pytest
 from small_v2 import write_four_masses
 from typer.testing import CliRunner
 
+from stickslip.analyses.forced_response import analysis
 from stickslip.api.result import Result
 from stickslip.cli import app
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.study.analyses.forced_response import analysis
 
 FEW = {
     "forced_response.points": "4",

@@ -10,12 +10,12 @@ from synthetic_result import synthetic_result
 from typer.testing import CliRunner
 
 import stickslip as ss
+from stickslip.analyses.forced_response.measured_variables import with_measured
+from stickslip.analyses.forced_response.page.curves import optimisation
+from stickslip.analyses.forced_response.page.response import Response
 from stickslip.cli import app
 from stickslip.errors import InputError
-from stickslip.report.forced.curves import optimisation
-from stickslip.report.response import Response
 from stickslip.study.file.study import read_file
-from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import measured_peaks
 
 KEY = "load.shaker.force_n"

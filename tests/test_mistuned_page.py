@@ -5,12 +5,12 @@ import pytest
 import xarray as xr
 from synthetic_result import synthetic_result
 
+from stickslip.analyses.forced_response.page.curves import frequency_response
+from stickslip.analyses.forced_response.page.head import cards
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.page.wheel import blades
+from stickslip.analyses.forced_response.verdicts.curve import Curve, peak_output
 from stickslip.assembly.sides.mistuned import listed, of_all
-from stickslip.report.forced.curves import frequency_response
-from stickslip.report.forced.head import cards
-from stickslip.report.forced.wheel import blades
-from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.verdicts.curve import Curve, peak_output
 
 BLADES = [f"tip[{n}].x" for n in range(3)]
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from evidence.validation.case_b12_mistuning import DEVIATIONS, MISTUNED, TUNED
+from stickslip.analyses.forced_response.records.bounds import localisation, whitehead
 from stickslip.api.study import Study
 from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.mistuned import mistuned_wheel
-from stickslip.study.analyses.forced_response.records.bounds import localisation, whitehead
 
 ROOT = Path(__file__).parents[1]
 TURN = 2 * np.pi

@@ -10,6 +10,8 @@ import scipy.sparse
 from cyclic_models import wedge
 
 import stickslip as ss
+from stickslip.analyses.waves.records.results import WaveModes
+from stickslip.analyses.waves.stages import flange_doubts, unreached
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -19,8 +21,6 @@ from stickslip.reduction.coupled_stages import Flange, constraints, multistage, 
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
-from stickslip.study.analyses.waves.records.results import WaveModes
-from stickslip.study.analyses.waves.stages import flange_doubts, unreached
 from stickslip.study.store.netcdf import one_case
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_stages"

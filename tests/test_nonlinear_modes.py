@@ -13,6 +13,9 @@ from study_texts import JENKINS, answered, study_of
 from evidence.judges.free_decay import free_decay
 from evidence.models.lumped import griffin, small_chain
 from evidence.validation import case_nonlinear_modes
+from stickslip.analyses.nonlinear_mode.records import ModeRecord
+from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts
+from stickslip.analyses.page import plots
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.iwan import Iwan
@@ -23,7 +26,6 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.vector_forces import known_by_vectors
 from stickslip.model.matrices import lumped
-from stickslip.report.page import plots
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
@@ -31,8 +33,6 @@ from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.static_contact_state import holding, opening
 from stickslip.response.system import System
-from stickslip.study.analyses.nonlinear_mode.records import ModeRecord
-from stickslip.study.analyses.nonlinear_mode.verdicts import case_verdicts
 from stickslip.study.check import check_study
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.netcdf import one_case

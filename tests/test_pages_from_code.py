@@ -8,8 +8,8 @@ from types import ModuleType
 
 import pytest
 
-from stickslip.study.analyses import ANALYSES
 from stickslip.study.file.tables import json_schema
+from stickslip.study.questions import ANALYSES
 
 DOCS = Path(__file__).parents[1] / "docs"
 NO_TABLES = {"schema_version", "title", "vary"}  # at the top of the file

@@ -12,13 +12,13 @@ from small_v2 import SECTOR
 from test_assembly_wheel import ORDER, SECTORS, H, sector_model, shrouded_sector
 
 import stickslip as ss
+from stickslip.analyses.forced_response.records.pressures import pressure_lines
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.fluid.pressure import PressureField, put_on
 from stickslip.assembly.locations import Places
 from stickslip.contact.surface import nodal_surface
 from stickslip.model.fe.solid import Material
 from stickslip.reduction.waves import wave
-from stickslip.study.analyses.forced_response.records.pressures import pressure_lines
 from stickslip.study.models.pressure import read_pressure
 
 WIDE, HIGH = 0.05, 0.03

@@ -10,14 +10,14 @@ from study_texts import answered, study_of
 from test_limit_cycle_study import SHROUDS, flow
 
 import stickslip as ss
+from stickslip.analyses.page import plots
+from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
+from stickslip.analyses.quasi_periodic.solve import at_frequency
 from stickslip.errors import InputError
-from stickslip.report.page import plots
 from stickslip.response.quasi_periodic import find
 from stickslip.response.self_excited.in_time import march_periods, wave_history
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import start_from_harmonics
-from stickslip.study.analyses.quasi_periodic.analysis import QUASI_PERIODIC
-from stickslip.study.analyses.quasi_periodic.solve import at_frequency
 
 TWO_TONES = (EXAMPLES / "two_tones" / "study.toml").read_text(encoding="utf-8")
 

@@ -16,6 +16,27 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from stickslip.analyses.all_motions.dataset import dataset as of_motions
+from stickslip.analyses.all_motions.dataset import noted
+from stickslip.analyses.forced_response.measured_variables import with_measured
+from stickslip.analyses.limit_cycle.dataset import dataset as of_cycles
+from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis
+from stickslip.analyses.modal_synthesis.records import SynthesisLevel
+from stickslip.analyses.nonlinear_mode.dataset import dataset as of_modes
+from stickslip.analyses.nonlinear_mode.records import END, ModeRecord
+from stickslip.analyses.quasi_periodic.dataset import dataset as of_two_frequencies
+from stickslip.analyses.quasi_periodic.records import TwoFrequencies
+from stickslip.analyses.residual_tractions.dataset import dataset as of_tractions
+from stickslip.analyses.residual_tractions.records import TractionRecord
+from stickslip.analyses.resonance.dataset import dataset as of_resonances
+from stickslip.analyses.run_up import values
+from stickslip.analyses.run_up.fast import name_of
+from stickslip.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
+from stickslip.analyses.run_up.values import dataset as of_run_up
+from stickslip.analyses.waves.of_wheel import variables as of_wheel
+from stickslip.analyses.waves.records.about import STATIC, skin_note, told
+from stickslip.analyses.waves.records.about import _static as static_numbers
 from stickslip.reduction.waves import wave
 from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC, Basins, share_interval
 from stickslip.response.all_motions.found import AllMotions, AtFrequency, MotionAt, MotionBranch
@@ -23,27 +44,6 @@ from stickslip.response.bifurcations.side_branch import CLOSES
 from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.solve.status import Status
-from stickslip.study.analyses.all_motions.dataset import dataset as of_motions
-from stickslip.study.analyses.all_motions.dataset import noted
-from stickslip.study.analyses.limit_cycle.dataset import dataset as of_cycles
-from stickslip.study.analyses.limit_cycle.records import CycleBranch
-from stickslip.study.analyses.modal_synthesis.dataset import dataset as of_synthesis
-from stickslip.study.analyses.modal_synthesis.records import SynthesisLevel
-from stickslip.study.analyses.nonlinear_mode.dataset import dataset as of_modes
-from stickslip.study.analyses.nonlinear_mode.records import END, ModeRecord
-from stickslip.study.analyses.quasi_periodic.dataset import dataset as of_two_frequencies
-from stickslip.study.analyses.quasi_periodic.records import TwoFrequencies
-from stickslip.study.analyses.residual_tractions.dataset import dataset as of_tractions
-from stickslip.study.analyses.residual_tractions.records import TractionRecord
-from stickslip.study.analyses.resonance.dataset import dataset as of_resonances
-from stickslip.study.analyses.run_up import values
-from stickslip.study.analyses.run_up.fast import name_of
-from stickslip.study.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
-from stickslip.study.analyses.run_up.values import dataset as of_run_up
-from stickslip.study.analyses.waves.of_wheel import variables as of_wheel
-from stickslip.study.analyses.waves.records.about import STATIC, skin_note, told
-from stickslip.study.analyses.waves.records.about import _static as static_numbers
-from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
 from stickslip.units import DEG, HZ, RPM
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from stickslip.analyses.waves.reference import read_reference
 from stickslip.errors import InputError
-from stickslip.study.analyses.waves.reference import read_reference
 
 HEAD = "case,nodal_diameter,mode,frequency_hz"
 

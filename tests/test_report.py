@@ -14,25 +14,25 @@ from browser import CHROMIUM, Browser
 from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
+from stickslip.analyses.forced_response.page.chapter import stability
+from stickslip.analyses.forced_response.page.choice import choice, flagged_ranges
+from stickslip.analyses.forced_response.page.contacts.bodies import body_motion, rigid_bodies
+from stickslip.analyses.forced_response.page.curves import frequency_response, optimisation
+from stickslip.analyses.forced_response.page.errors import errors
+from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
+from stickslip.analyses.forced_response.page.head import cards
+from stickslip.analyses.forced_response.page.response import NEEDED, Response
+from stickslip.analyses.forced_response.page.tables import peaks
+from stickslip.analyses.inputs import Varied, as_run, told
+from stickslip.analyses.page import plots, report_file, report_html
+from stickslip.analyses.pictures.skin import edges, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
 from stickslip.report.content import Table
-from stickslip.report.forced.choice import choice, flagged_ranges
-from stickslip.report.forced.contacts.bodies import body_motion, rigid_bodies
-from stickslip.report.forced.curves import frequency_response, optimisation
-from stickslip.report.forced.errors import errors
-from stickslip.report.forced.harmonics import kept_harmonics
-from stickslip.report.forced.head import cards
-from stickslip.report.forced.tables import peaks
-from stickslip.report.inputs import Varied, as_run, told
-from stickslip.report.page import plots, report_file, report_html
-from stickslip.report.pictures.skin import edges, skin_picture
-from stickslip.report.pictures.tiles import patches, triangulated
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
-from stickslip.report.response import NEEDED, Response
-from stickslip.report.sections.forced_response import stability
-from stickslip.study.analyses.verdict import Verdict, to_json
+from stickslip.report.tiles import patches, triangulated
+from stickslip.study.verdict import Verdict, to_json
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: the page is not opened")
 FIGURES = (
@@ -629,7 +629,7 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
 def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     from plotly import graph_objects as go
 
-    from stickslip.report import page as module
+    from stickslip.analyses import page as module
     from stickslip.report.content import Words
     from stickslip.report.node import Node
     from stickslip.report.plot import Plot

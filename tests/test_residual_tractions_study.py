@@ -8,11 +8,11 @@ import pytest
 from small_v2 import EXAMPLES, changed
 
 import stickslip as ss
+from stickslip.analyses.page import plots
+from stickslip.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
-from stickslip.report.page import plots
-from stickslip.study.analyses.analysis import Case
-from stickslip.study.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
+from stickslip.study.analysis import Case
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 from stickslip.study.store.journal import JobJournal

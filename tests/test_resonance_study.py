@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from study_texts import DETACHED, JENKINS, answered, study_of
 
+from stickslip.analyses.resonance.analysis import RESONANCE
+from stickslip.analyses.resonance.page import Peaks, amplitudes, peak_table
+from stickslip.analyses.resonance.verdicts import case_verdicts
 from stickslip.api.study import Study
 from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import InputError
-from stickslip.report.sections.resonance import Peaks, amplitudes, peak_table
-from stickslip.study.analyses.resonance.analysis import RESONANCE
-from stickslip.study.analyses.resonance.verdicts import case_verdicts
 from stickslip.study.store.netcdf import one_case
 
 B3 = (

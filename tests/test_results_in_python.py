@@ -8,8 +8,8 @@ import xarray as xr
 from synthetic_result import KEY, synthetic_result, tree_of
 
 import stickslip as ss
-from stickslip.study.analyses.analysis import named
-from stickslip.study.analyses.forced_response.records.quantities import flags
+from stickslip.analyses.forced_response.records.quantities import flags
+from stickslip.study.analysis import named
 
 
 def test_a_response_is_a_row_a_point_and_output() -> None:

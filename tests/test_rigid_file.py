@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
-from stickslip.study.analyses.verdict import stored
 from stickslip.study.models.study import read_study
+from stickslip.study.verdict import stored
 
 RIGID = 'law = "rigid_coulomb"\nfriction_coefficient = 0.5\npreload_n = 4.0\n'
 MORE = {

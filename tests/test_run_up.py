@@ -10,15 +10,15 @@ from newton_bounds import allowed, answer_at
 from test_assembly_wheel import H, sector_model, shrouded_sector
 
 import stickslip as ss
+from stickslip.analyses.run_up.analysis import RUN_UP as RUN_UP_ANALYSIS
+from stickslip.analyses.run_up.problem import question_of
+from stickslip.analyses.run_up.verdicts import verdicts_of
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import InputError
 from stickslip.reduction.choice import Reduction
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
-from stickslip.study.analyses.analysis import Case
-from stickslip.study.analyses.run_up.analysis import RUN_UP as RUN_UP_ANALYSIS
-from stickslip.study.analyses.run_up.problem import question_of
-from stickslip.study.analyses.run_up.verdicts import verdicts_of
+from stickslip.study.analysis import Case
 from stickslip.study.file.study import read_file
 
 ORDER = 42  # wave 2 of five, at 2000 to 2300 Hz where the shrouds are pressed

@@ -6,23 +6,24 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from toy_analysis import Toy, ToyStudy
+from toy_analysis import TOY, ToyStudy
 
 from stickslip.errors import InputError
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import Solved
-from stickslip.study.analyses.verdict import Verdict, conclusion, of_tree
+from stickslip.study.analysis import Solved
+from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer, run_study
 from stickslip.study.shard import Shard
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import LOG, Interrupted
 from stickslip.study.store.worker_process import Limits
 from stickslip.study.store.workers import executor
+from stickslip.study.verdict import Verdict, conclusion, of_tree
 
 HERE = Path(__file__).parent
 
@@ -112,7 +113,7 @@ def test_workers_give_the_same_bits_and_their_lines_come_back(
 
 
 def test_model_of_python_gets_the_same_answer(tmp_path: Path, whole: ToyStudy) -> None:
-    made = answer(Toy(), study(tmp_path).cases())
+    made = answer(TOY, study(tmp_path).cases())
     same(made.tree, result(whole))
     assert made.verdicts == (Verdict("doubtful", "factor = 2.5", None, "large"),)
     assert list(tmp_path.iterdir()) == []
@@ -136,8 +137,8 @@ import sys
 sys.path.insert(0, {here!r})
 from collections.abc import Sequence
 from pathlib import Path
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import Solved
+from stickslip.study.questions import ANALYSES
+from stickslip.study.analysis import Solved
 from stickslip.study.run import run_study
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
@@ -262,18 +263,17 @@ def test_the_work_of_judging_grows_with_the_number_of_cases(
 ) -> None:
     """A case is judged when its job ends, all are put together at the end: three times as many cases are three times the work."""
     entered: list[int] = []
-    dataset, verdicts = Toy.dataset, Toy.verdicts
 
-    def counted(self: Toy, solved: Sequence[Solved]) -> xr.Dataset:
+    def counted(solved: Sequence[Solved]) -> xr.Dataset:
         entered.append(len(solved))
-        return dataset(self, solved)
+        return TOY.dataset(solved)
 
-    def counted_again(self: Toy, data: xr.Dataset) -> tuple[Verdict, ...]:
+    def counted_again(data: xr.Dataset) -> tuple[Verdict, ...]:
         entered.append(data.sizes["case"])
-        return verdicts(self, data)
+        return TOY.verdicts(data)
 
-    monkeypatch.setattr(Toy, "dataset", counted)
-    monkeypatch.setattr(Toy, "verdicts", counted_again)
+    monkeypatch.setattr("toy_analysis.COUNTED", replace(TOY, dataset=counted, verdicts=counted_again), raising=False)
+    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:COUNTED")
     # what is not complete is written by the clock: here never
     monkeypatch.setattr("stickslip.study.run._now_and_then", lambda _: lambda _: None)
     work = {}

@@ -11,12 +11,12 @@ from test_reduced_wheel import TILTED, shrouded
 import stickslip as ss
 from evidence.models.lumped_disks import RING_HOLD, TIP, friction_ring
 from evidence.validation.case_b9_friction_ring import RETENTION, damped_wheel
+from stickslip.analyses.forced_response.stability.in_time import integrated
 from stickslip.errors import InputError
 from stickslip.response.time.sectors import SectorsInTime, all_sectors
 from stickslip.response.time.shooting import ShootingResult, shoot
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping
-from stickslip.study.analyses.forced_response.stability.in_time import integrated
 
 
 def ring(order: int) -> tuple[ss.System, ss.HarmonicLoad]:

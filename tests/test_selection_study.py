@@ -12,18 +12,18 @@ import pytest
 import xarray as xr
 from small_v2 import write_four_masses, write_two_blades
 
+from stickslip.analyses.forced_response import analysis
+from stickslip.analyses.forced_response.page.choice import choice
+from stickslip.analyses.forced_response.page.errors import errors
+from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.physics.retention import NO_SHIFT
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.report.forced.choice import choice
-from stickslip.report.forced.errors import errors
-from stickslip.report.forced.harmonics import kept_harmonics
-from stickslip.report.response import Response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.study.analyses.forced_response import analysis
-from stickslip.study.analyses.forced_response.physics.retention import NO_SHIFT
 from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study

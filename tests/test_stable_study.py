@@ -13,6 +13,32 @@ from small_v2 import write_four_masses, write_shrouded_sector
 from test_forced_analysis import dataset, lifted, question, rubbing, solved
 from typer.testing import CliRunner
 
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.analyses.forced_response.problem import ALONE, Question
+from stickslip.analyses.forced_response.records.points import Response, collect
+from stickslip.analyses.forced_response.stability import examination, stable, with_stability
+from stickslip.analyses.forced_response.stability.comparison import Check
+from stickslip.analyses.forced_response.stability.examining import (
+    CARRIED,
+    examined_points,
+    largest,
+    neighbours_of,
+    with_stable_peak,
+)
+from stickslip.analyses.forced_response.stability.in_time import (
+    MOST_TOLD,
+    check_in_time,
+    seconds_in_time,
+    shows_after,
+)
+from stickslip.analyses.forced_response.stability.stable import (
+    Examined,
+    cost_line,
+    examine,
+    to_integrate,
+    with_motion,
+)
+from stickslip.analyses.forced_response.verdicts.stable_rules import fewer
 from stickslip.cli import app
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
@@ -25,32 +51,6 @@ from stickslip.response.stability.settled import Settled
 from stickslip.response.system import System
 from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.problem import ALONE, Question
-from stickslip.study.analyses.forced_response.records.points import Response, collect
-from stickslip.study.analyses.forced_response.stability import examination, stable, with_stability
-from stickslip.study.analyses.forced_response.stability.comparison import Check
-from stickslip.study.analyses.forced_response.stability.examining import (
-    CARRIED,
-    examined_points,
-    largest,
-    neighbours_of,
-    with_stable_peak,
-)
-from stickslip.study.analyses.forced_response.stability.in_time import (
-    MOST_TOLD,
-    check_in_time,
-    seconds_in_time,
-    shows_after,
-)
-from stickslip.study.analyses.forced_response.stability.stable import (
-    Examined,
-    cost_line,
-    examine,
-    to_integrate,
-    with_motion,
-)
-from stickslip.study.analyses.forced_response.verdicts.stable_rules import fewer
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ
 
@@ -232,7 +232,7 @@ def test_a_verdict_is_carried_along_only_between_like_points_far_from_the_circle
 def test_what_the_work_does_not_reach_is_not_examined_but_for_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = rubbed()
     response = response_of(asked)
-    monkeypatch.setattr("stickslip.study.analyses.forced_response.stability.examining.ALWAYS_ROWS", 0)
+    monkeypatch.setattr("stickslip.analyses.forced_response.stability.examining.ALWAYS_ROWS", 0)
     poor = replace(response, solved=tuple(replace(p, iterations=0) for p in response.solved))
     found = looked_at(asked, poor)
     assert response.peak in found

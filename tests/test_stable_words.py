@@ -5,12 +5,12 @@ import plotly.graph_objects as go
 import pytest
 import xarray as xr
 
-from stickslip.report.sections.residual_tractions import SECTION, Tractions, band, resonances
+from stickslip.analyses.forced_response.stability.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
+from stickslip.analyses.residual_tractions.page import SECTION, Tractions, band, resonances
 from stickslip.response.bifurcations.found import Bifurcations
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.time.floquet import Floquet
-from stickslip.study.analyses.forced_response.stability.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
 
 
 def points(words: str) -> list[Point]:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from stickslip.api.study import Study
 from stickslip.cli import app
 from stickslip.model.mesh.blade_pair import BladePair
-from stickslip.study.analyses import ANALYSES
+from stickslip.study.questions import ANALYSES
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from test_flutter_wheel import forced
 
+from stickslip.analyses.forced_response.stability import with_stability
+from stickslip.analyses.forced_response.stability.bifurcating import Remembered
+from stickslip.analyses.forced_response.stability.stable import Examined, as_note
+from stickslip.analyses.forced_response.stability.with_stability import Looked
 from stickslip.response.stability import hill_stability
 from stickslip.response.stability.hill_method.hill_segment import NODES, Segment
-from stickslip.study.analyses import analysis
-from stickslip.study.analyses.forced_response.stability import with_stability
-from stickslip.study.analyses.forced_response.stability.bifurcating import Remembered
-from stickslip.study.analyses.forced_response.stability.stable import Examined, as_note
-from stickslip.study.analyses.forced_response.stability.with_stability import Looked
+from stickslip.study import analysis
 from stickslip.study.store.archive import decode, encode
 from stickslip.units import HZ
 

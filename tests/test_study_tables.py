@@ -21,8 +21,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import named
+from stickslip.study.analysis import named
 from stickslip.study.file.example import Kind, example_text
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.contacts import ContactTable, keys_of
@@ -32,6 +31,7 @@ from stickslip.study.file.tables import json_schema, study_tables
 from stickslip.study.models.cost import memory_gb, waves_gb
 from stickslip.study.models.parts import damper_of
 from stickslip.study.models.study import read_study
+from stickslip.study.questions import ANALYSES
 
 
 def refused(path: Path) -> str:

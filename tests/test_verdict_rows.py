@@ -8,20 +8,20 @@ import pytest
 import xarray as xr
 from verdict_rows import INF, NAN, above, case_of, check
 
+from stickslip.analyses.all_motions import verdicts as motions
+from stickslip.analyses.forced_response.verdicts.jumps import jumps
+from stickslip.analyses.limit_cycle import verdicts as cycles
+from stickslip.analyses.modal_synthesis import verdicts as synthesis
+from stickslip.analyses.modal_synthesis.percents import percent
+from stickslip.analyses.modal_synthesis.solve import judged
+from stickslip.analyses.nonlinear_mode import verdicts as backbones
+from stickslip.analyses.quasi_periodic import verdicts as two_frequencies
+from stickslip.analyses.residual_tractions import verdicts as tractions
+from stickslip.analyses.resonance import verdicts as resonances
+from stickslip.analyses.run_up import verdicts as running
+from stickslip.analyses.waves import doubts as waves
+from stickslip.analyses.waves.flutter import _doubts, _unstable, _unstable_wheel
 from stickslip.response.nonlinear_modes.single_mode_validity import Isolation
-from stickslip.study.analyses.all_motions import verdicts as motions
-from stickslip.study.analyses.forced_response.verdicts.jumps import jumps
-from stickslip.study.analyses.limit_cycle import verdicts as cycles
-from stickslip.study.analyses.modal_synthesis import verdicts as synthesis
-from stickslip.study.analyses.modal_synthesis.percents import percent
-from stickslip.study.analyses.modal_synthesis.solve import judged
-from stickslip.study.analyses.nonlinear_mode import verdicts as backbones
-from stickslip.study.analyses.quasi_periodic import verdicts as two_frequencies
-from stickslip.study.analyses.residual_tractions import verdicts as tractions
-from stickslip.study.analyses.resonance import verdicts as resonances
-from stickslip.study.analyses.run_up import verdicts as running
-from stickslip.study.analyses.waves import doubts as waves
-from stickslip.study.analyses.waves.flutter import _doubts, _unstable, _unstable_wheel
 from stickslip.units import HZ, RPM
 
 Row = tuple[dict[str, Any], list[tuple[str, ...]]]

@@ -13,10 +13,10 @@ from small_v2 import write_four_masses
 from test_cli import done
 
 import stickslip as ss
+from stickslip.analyses.forced_response.verdicts.cases import said_once, verdicts, with_levels
+from stickslip.analyses.forced_response.verdicts.curve import Curve, branch_length
 from stickslip.report.frame import concluded
-from stickslip.study.analyses.forced_response.verdicts.cases import said_once, verdicts, with_levels
-from stickslip.study.analyses.forced_response.verdicts.curve import Curve, branch_length
-from stickslip.study.analyses.verdict import (
+from stickslip.study.verdict import (
     LEVELS,
     POINT_LEVELS,
     Verdict,

@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Response, collect
+from stickslip.analyses.forced_response.stability import in_time, with_stability
+from stickslip.analyses.forced_response.stability.comparison import STEPS, Check
+from stickslip.analyses.forced_response.stability.in_time import check_in_time, chosen, refined
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.problem import Question
-from stickslip.study.analyses.forced_response.records.points import Response, collect
-from stickslip.study.analyses.forced_response.stability import in_time, with_stability
-from stickslip.study.analyses.forced_response.stability.comparison import STEPS, Check
-from stickslip.study.analyses.forced_response.stability.in_time import check_in_time, chosen, refined
 from stickslip.study.models.study import read_study
 from stickslip.study.store.journal import JobJournal
 

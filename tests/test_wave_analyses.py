@@ -12,6 +12,8 @@ from cyclic_models import unlike_wedge
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
+from stickslip.analyses.waves.records.numbers import Wheel
+from stickslip.analyses.waves.solve import Question, solve_wave
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.model.fe.prestress import strain_and_rotation
@@ -24,14 +26,12 @@ from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
-from stickslip.study.analyses.analysis import named
-from stickslip.study.analyses.verdict import stored
-from stickslip.study.analyses.waves.records.numbers import Wheel
-from stickslip.study.analyses.waves.solve import Question, solve_wave
+from stickslip.study.analysis import named
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
 from stickslip.study.run import answer, run_study
 from stickslip.study.store.netcdf import one_case
+from stickslip.study.verdict import stored
 from stickslip.units import RPM
 
 STEEL = """
@@ -133,7 +133,7 @@ def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
 def test_basis_that_is_too_small_is_told(joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # two modes and none to spare, over a range in which the shapes change
     monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE", 0)
-    monkeypatch.setattr("stickslip.study.analyses.waves.doubts.BASIS_ERROR", 1e-9)
+    monkeypatch.setattr("stickslip.analyses.waves.doubts.BASIS_ERROR", 1e-9)
     outcome = done(study(tmp_path, {"campbell.engine_orders": "[2]"}), "campbell")
     said = "wave number 2: frequencies between the speeds of the basis are off"
     assert any(v.why.startswith(said) for v in outcome.verdicts)

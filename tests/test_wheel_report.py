@@ -11,11 +11,11 @@ from synthetic_result import provenance, tree_of, write_result
 from synthetic_wheel import SECTORS, campbell_result, modes_result, safe_result, skin, variable
 from test_report import marks, needs_browser, open_page, page_text
 
-from stickslip.report.page import plots, report_file, report_html
-from stickslip.report.pictures.coarse_skin import coarse_skin
-from stickslip.report.sections.campbell import campbell_diagram
-from stickslip.report.sections.safe import interference, safe_diagram, zigzag
-from stickslip.report.waves import Waves
+from stickslip.analyses.page import plots, report_file, report_html
+from stickslip.analyses.waves.page.campbell import campbell_diagram
+from stickslip.analyses.waves.page.coarse_skin import coarse_skin
+from stickslip.analyses.waves.page.safe import interference, safe_diagram, zigzag
+from stickslip.analyses.waves.page.waves import Waves
 
 TITLE = "A <flat> ring & nothing else"
 

@@ -8,12 +8,12 @@ import pytest
 from synthetic_result import synthetic_result
 
 import stickslip as ss
-from stickslip.report.forced.curves import optimisation
-from stickslip.report.forced.working import where_friction_works
-from stickslip.report.response import Response
-from stickslip.study.analyses.forced_response.verdicts.curve import Curve
-from stickslip.study.analyses.forced_response.verdicts.rules import not_periodic
-from stickslip.study.analyses.forced_response.verdicts.working_range import (
+from stickslip.analyses.forced_response.page.curves import optimisation
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.page.working import where_friction_works
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.rules import not_periodic
+from stickslip.analyses.forced_response.verdicts.working_range import (
     REGIMES,
     ContactsAtPeak,
     CurvePeak,
@@ -24,7 +24,7 @@ from stickslip.study.analyses.forced_response.verdicts.working_range import (
     working_range,
     working_ranges,
 )
-from stickslip.study.analyses.forced_response.verdicts.working_words import range_lines, range_sentences
+from stickslip.analyses.forced_response.verdicts.working_words import range_lines, range_sentences
 
 MASS, SPRING, DASHPOT, STIFFNESS, LIMIT = 1.0, 4e4, 4.0, 2e4, 2.0  # kg, N/m, N s/m, N/m, N
 KEY = "load.shaker.force_n"

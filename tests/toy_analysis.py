@@ -14,10 +14,10 @@ import numpy as np
 import xarray as xr
 
 from stickslip.errors import SingularError, input_error
-from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.analysis import Analysis, Case, Notes, Solved, TextTable
 from stickslip.study.store.netcdf import stacked, variable
 from stickslip.study.store.progress import LOG, advance
+from stickslip.study.verdict import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,52 +29,49 @@ class Term:
     process: int
 
 
-class Toy:
-    """Powers of a matrix times a vector: the same bits wherever they are computed."""
+def key(case: Case) -> str:
+    return json.dumps({"terms": case.settings.toy.terms})
 
-    name = "toy"
-    table = SimpleNamespace
-    record = Term
-    linear = False
-    checks = ("twice",)
 
-    def key(self, case: Case) -> str:
-        return json.dumps({"terms": case.settings.toy.terms})
+def inputs(case: Case, model: Any) -> dict[str, Any]:
+    toy = case.settings.toy
+    if toy.terms < 1:
+        raise input_error("toy.terms", f"must be above zero, got {toy.terms}", "Give more.")
+    kept = case.store(f"matrix {model.factor}", lambda: {"matrix": matrix(model.factor)})
+    return {"factor": model.factor, "toy": toy, "checks": case.checks, **kept}
 
-    def inputs(self, case: Case, model: Any) -> dict[str, Any]:
-        toy = case.settings.toy
-        if toy.terms < 1:
-            raise input_error("toy.terms", f"must be above zero, got {toy.terms}", "Give more.")
-        kept = case.store(f"matrix {model.factor}", lambda: {"matrix": matrix(model.factor)})
-        return {"factor": model.factor, "toy": toy, "checks": case.checks, **kept}
 
-    def solve(self, inputs: Any, done: Sequence[Term], notes: Notes) -> Iterator[Term]:
-        toy, x = inputs["toy"], done[-1].value if done else np.ones(40)
-        notes.put("model", {"factor": inputs["factor"]})
-        for i in range(len(done), toy.terms):
-            if i == toy.stop_at:
-                stop(toy.how)
-            x = inputs["matrix"] @ x
-            advance((i + 1) / toy.terms, f"term {i}")
-            yield Term(i, x, os.getpid())
-        if "twice" in inputs["checks"] and notes.get("twice") is None:
-            LOG.info("checked twice")
-            notes.put("twice", {"off": 0.0})
+def solve(inputs: Any, done: Sequence[Term], notes: Notes) -> Iterator[Term]:
+    toy, x = inputs["toy"], done[-1].value if done else np.ones(40)
+    notes.put("model", {"factor": inputs["factor"]})
+    for i in range(len(done), toy.terms):
+        if i == toy.stop_at:
+            stop(toy.how)
+        x = inputs["matrix"] @ x
+        advance((i + 1) / toy.terms, f"term {i}")
+        yield Term(i, x, os.getpid())
+    if "twice" in inputs["checks"] and notes.get("twice") is None:
+        LOG.info("checked twice")
+        notes.put("twice", {"off": 0.0})
 
-    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        return xr.Dataset(stacked([_of_case(s) for s in solved])).assign(
-            case_label=("case", [s.case.label for s in solved])
-        )
 
-    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
-        large = data.case_label.values[data.factor.values > 2]
-        return tuple(Verdict("doubtful", str(label), None, "large") for label in large)
+def dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    return xr.Dataset(stacked([_of_case(s) for s in solved])).assign(
+        case_label=("case", [s.case.label for s in solved])
+    )
 
-    def check(self, case: Case, model: Any) -> tuple[str, ...]:
-        return (f"toy: {case.settings.toy.terms} terms",)
 
-    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
-        return (TextTable("Toy", ("sum",), ((f"{float(data.value.sum()):.3g}",),)),)
+def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
+    large = data.case_label.values[data.factor.values > 2]
+    return tuple(Verdict("doubtful", str(label), None, "large") for label in large)
+
+
+def check(case: Case, model: Any) -> tuple[str, ...]:
+    return (f"toy: {case.settings.toy.terms} terms",)
+
+
+def summary(data: xr.Dataset) -> tuple[TextTable, ...]:
+    return (TextTable("Toy", ("sum",), ((f"{float(data.value.sum()):.3g}",),)),)
 
 
 def _of_case(solved: Solved) -> dict[str, xr.Variable]:
@@ -95,7 +92,20 @@ def stop(how: str) -> None:
     raise SingularError("no equilibrium")
 
 
-TOY = Toy()
+# powers of a matrix times a vector: the same bits wherever they are computed
+TOY = Analysis(
+    name="toy",
+    table=SimpleNamespace,
+    record=Term,
+    key=key,
+    inputs=inputs,
+    solve=solve,
+    dataset=dataset,
+    check=check,
+    summary=summary,
+    checks=("twice",),
+    verdicts=verdicts,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.verdict import Verdict
 
 Case = dict[str, xr.Variable]
 NAN, INF = np.nan, np.inf

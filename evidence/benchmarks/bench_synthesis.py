@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from evidence.models.two_blades import two_blades
+from stickslip.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
@@ -25,7 +26,6 @@ from stickslip.response.nonlinear_modes.single_mode_validity import (
 from stickslip.response.nonlinear_modes.synthesis import synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
-from stickslip.study.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 
 COARSER = 2.0
 RATIOS = np.geomspace(250.0, 20.0, 20)  # pull over excitation

@@ -7,20 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
+from stickslip.analyses.forced_response.problem import Question, question_of
+from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.arrays import IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.study.analyses.analysis import Case, Job, Solved
-from stickslip.study.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.study.analyses.forced_response.problem import Question, question_of
-from stickslip.study.analyses.forced_response.records.points import Response, collect
-from stickslip.study.analyses.verdict import LEVELS, Level
+from stickslip.study.analysis import Case, Job, Solved
 from stickslip.study.jobs import solve_job
 from stickslip.study.models.study import read_study
 from stickslip.study.store.journal import JobJournal
+from stickslip.study.verdict import LEVELS, Level
 
 STUDY = Path(__file__).with_suffix(".toml")
 SHIPPED = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"

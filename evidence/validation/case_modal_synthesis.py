@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from evidence.validation.compare import Record, bound, record
+from stickslip.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
@@ -27,7 +28,6 @@ from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.system import System
-from stickslip.study.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
 
 CASE = "Nonlinear modal synthesis"
 SOURCE = "peaks tracked with the same harmonics"

@@ -13,11 +13,11 @@ import numpy as np
 
 from evidence.models.two_blades import COARSER, two_blades
 from evidence.validation.compare import Record, record
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Accepted, Response
+from stickslip.analyses.forced_response.stability.in_time import integrated, listed, refined
 from stickslip.response.forced.problem import ForcedPoint
-from stickslip.study.analyses.forced_response.problem import Question
-from stickslip.study.analyses.forced_response.records.points import Accepted, Response
-from stickslip.study.analyses.forced_response.stability.in_time import integrated, listed, refined
-from stickslip.study.analyses.verdict import Level
+from stickslip.study.verdict import Level
 from stickslip.units import HZ
 
 CASE = "Two blades and a damper"

@@ -105,7 +105,7 @@ def run(
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
-        from stickslip.study.analyses.verdict import in_lines, stored
+        from stickslip.study.verdict import in_lines, stored
 
         for table in (t for tables in result.summaries.values() for t in tables):
             if verbose or not table.detail:
@@ -153,7 +153,7 @@ def report(
 ) -> None:
     """Write the HTML report of a result."""
     with _errors_as_text():
-        from stickslip.report.page import report_file
+        from stickslip.analyses.page import report_file
 
         typer.echo(f"{report_file(result)} written")
 

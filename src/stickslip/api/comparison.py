@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force, read_curve
+from stickslip.analyses.compared.side_by_side import comparison_html, contents, peak_rows, unit_of
 from stickslip.api.result import Result
 from stickslip.api.study import Study
 from stickslip.api.table import Table
 from stickslip.errors import did_you_mean, input_error
-from stickslip.report.compared.designs import Design, MeasuredCurve, differences, per_force, read_curve
-from stickslip.report.compared.side_by_side import comparison_html, contents, peak_rows, unit_of
 from stickslip.report.frame import write_page
 from stickslip.report.plot import Plot
 from stickslip.report.result import RESULT

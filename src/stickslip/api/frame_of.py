@@ -5,7 +5,7 @@ import pandas as pd
 import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
-from stickslip.study.analyses.varied import varied_values
+from stickslip.study.varied import varied_values
 
 # what the rows of a table are of, the first that an analysis has, that with most dimensions
 _CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")

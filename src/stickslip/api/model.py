@@ -21,12 +21,12 @@ from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import one_loaded_blas_thread
 from stickslip.model.part import Part
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import Case, named
+from stickslip.study.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
 from stickslip.study.file.suffixes import nearest_key
 from stickslip.study.file.tables import Tables
+from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer
 from stickslip.units import RPM
 

@@ -11,18 +11,18 @@ import pandas as pd
 import plotly.graph_objects as go
 import xarray as xr
 
+from stickslip.analyses.page import plots, write_report
 from stickslip.api.export import Format, Wanted, export_result
 from stickslip.api.frame_of import dataframe
 from stickslip.api.screen import by_default
 from stickslip.api.table import Table
 from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
-from stickslip.report.page import plots, write_report
 from stickslip.report.result import RESULT, open_result
-from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
+from stickslip.study.analysis import TextTable
 from stickslip.study.outcome import Outcome
 from stickslip.study.store.netcdf import write_tree
+from stickslip.study.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
 
 
 @dataclass(frozen=True, eq=False)

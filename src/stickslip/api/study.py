@@ -9,11 +9,11 @@ from os.path import realpath
 from pathlib import Path
 from typing import Any
 
+from stickslip.analyses.forced_response.problem import HARMONICS, IN_TIME
 from stickslip.api.model import Model
 from stickslip.api.result import Result
 from stickslip.api.screen import by_default
 from stickslip.model.blas_threads import one_loaded_blas_thread
-from stickslip.study.analyses.forced_response.problem import HARMONICS, IN_TIME
 from stickslip.study.check import check_study
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study

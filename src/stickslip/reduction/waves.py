@@ -14,6 +14,7 @@ from stickslip.arrays import ComplexArray, Matrix
 from stickslip.errors import input_error
 
 Kind = Literal["standing", "backward", "forward"]
+NO_WAVE = -1  # stored as the wave number of a single structure
 
 
 @dataclass(frozen=True)

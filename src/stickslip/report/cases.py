@@ -7,7 +7,7 @@ import xarray as xr
 
 from stickslip.report.plot import ramp
 from stickslip.report.quantities import number
-from stickslip.study.analyses.varied import as_number, first_varied_number, varied_values
+from stickslip.study.varied import as_number, first_varied_number, varied_values
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from plotly.offline import get_plotlyjs
 from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
-from stickslip.study.analyses.verdict import Verdict, likewise, of_kinds, worst_first
 from stickslip.study.store.atomic_write import write_whole
+from stickslip.study.verdict import Verdict, likewise, of_kinds, worst_first
 
 _CONFIG = {
     "responsive": True,

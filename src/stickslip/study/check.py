@@ -7,10 +7,10 @@ import numpy as np
 from stickslip.assembly.forces import first_nodes
 from stickslip.assembly.joints.unconstrained_bodies import unheld
 from stickslip.assembly.model import Model
-from stickslip.study.analyses.verdict import together
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
 from stickslip.study.store.progress import LOG
+from stickslip.study.verdict import together
 
 WARNING = "WARNING: "
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import SingularError, StickslipError
-from stickslip.study.analyses.analysis import Analysis, Job
+from stickslip.study.analysis import Analysis, Job
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
 from stickslip.study.store.attempts import (
     begin,

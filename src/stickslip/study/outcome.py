@@ -7,17 +7,15 @@ from typing import Any
 
 import xarray as xr
 
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
-from stickslip.study.analyses.forced_response.verdicts.working_range import with_regimes
-from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
-from stickslip.study.measured_variables import with_measured
+from stickslip.study.analysis import Analysis, Case, Solved, TextTable
 from stickslip.study.models.measured import MeasuredPeaks
+from stickslip.study.questions import ANALYSES
 from stickslip.study.store.journal import read_note, read_sealed
 from stickslip.study.store.netcdf import variable
 from stickslip.study.store.progress import tell
 from stickslip.study.store.provenance import Provenance
 from stickslip.study.store.watch import ASIDE
+from stickslip.study.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
 
 # notes that the runner itself puts down
 UNSOLVED, CHECKED = "no solution", "checks"
@@ -126,8 +124,7 @@ class Book:
         if not solved:
             return
         node, found = _judged(asked, solved)
-        if asked.name == "forced_response":
-            node = with_regimes(with_measured(node, self.measured))
+        node = asked.completed(node, self.measured)
         unsolved = sum(UNSOLVED in s.notes for s in solved)
         failed = max(int(node.attrs.get("failed", 0)), unsolved)
         own = {ATTRIBUTE: to_json(found), "failed": failed}

@@ -8,7 +8,7 @@ import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
-from stickslip.study.analyses.vibrating import ONE
+from stickslip.reduction.waves import NO_WAVE
 from stickslip.study.store.netcdf import one_case
 from stickslip.units import HZ, millimetres
 
@@ -249,7 +249,7 @@ def _free(one: xr.Dataset, own: xr.Dataset, name: str, told: str, label: str, at
         outputs,
         reported[: most + 1],
         orders=(most,),
-        wave_number=None if wave == ONE else wave,
+        wave_number=None if wave == NO_WAVE else wave,
         free=True,
         rate=rate,
         decays=decays,
@@ -280,7 +280,7 @@ def _of_case(label: str) -> str:
 
 
 def _of_wave(wave: int) -> str:
-    return "" if wave == ONE else f"wave {wave}, "
+    return "" if wave == NO_WAVE else f"wave {wave}, "
 
 
 WRITTEN = (FORCED, MODE, CYCLE)

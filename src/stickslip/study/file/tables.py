@@ -9,7 +9,6 @@ from pydantic import Field, create_model
 
 from stickslip.contact.evaluators import Evaluator
 from stickslip.response.forced.choices import Rescue
-from stickslip.study.analyses import ANALYSES, TABLES
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.aero import AeroTable
 from stickslip.study.file.model.contacts import ContactTable, JoinTable
@@ -18,6 +17,7 @@ from stickslip.study.file.model.material import DampingTable, MaterialTable, Stu
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import AnyPart, Copy
 from stickslip.study.file.section import FilePath, Name, Section
+from stickslip.study.questions import ANALYSES, TABLES
 
 
 class Measured(Section):

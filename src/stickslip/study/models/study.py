@@ -10,7 +10,7 @@ from typing import Any
 
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
-from stickslip.study.analyses.analysis import Case
+from stickslip.study.analysis import Case
 from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import refuse_varied, with_values

@@ -1,0 +1,83 @@
+"""Motions that a sweep does not meet, and which one most starts end on: the analysis ``all_motions``."""
+
+from collections.abc import Iterator, Sequence
+
+from stickslip.analyses.all_motions.dataset import dataset, noted
+from stickslip.analyses.all_motions.problem import Question, question_of
+from stickslip.analyses.all_motions.table import AllMotionsTable
+from stickslip.analyses.all_motions.verdicts import tables
+from stickslip.assembly.model import Model
+from stickslip.response.all_motions.estimate import PERIODS_OF_A_START, search_seconds
+from stickslip.response.all_motions.found import Stage, gathered
+from stickslip.response.all_motions.search import search_stages
+from stickslip.study.analysis import Analysis, Case, Notes, of_tables
+from stickslip.study.store.progress import LOG, advance
+from stickslip.units import HZ
+
+MODEL, FOUND = "model", "found"  # notes
+
+
+def _inputs(case: Case, model: Model) -> Question:
+    """Return what is searched; refuse what cannot be."""
+    question = question_of(case, model)
+    LOG.info(f"all_motions: {_said(question)}")
+    return question
+
+
+def _solve(inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[Stage]:
+    """Yield the stages that are not done."""
+    if notes.get(FOUND) is not None:
+        return
+    notes.put(MODEL, dict(inputs.facts) | {"output": inputs.model.output_labels[0]})
+    problem, stages = inputs.problem, list(done)
+    most = 3 * len(inputs.search.places)
+    for stage in search_stages(problem, inputs.search, done):
+        stages.append(stage)
+        over = sum(s.kind != "branch" for s in stages)
+        advance(0.95 * min(over / most, 1.0), _told(stage, inputs))
+        yield stage
+    notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.solves))
+
+
+def _check(case: Case, model: Model) -> tuple[str, ...]:
+    """Say what is searched, and for how long."""
+    question = question_of(case, model)
+    seconds = search_seconds(question.problem, question.search)
+    return (
+        f"all_motions: {_said(question)}",
+        f"all_motions: about {seconds:.2g} s for these, where a start settles in {PERIODS_OF_A_START} periods; branches that are found take more",
+    )
+
+
+def _said(question: Question) -> str:
+    search = question.search
+    return (
+        f"{len(search.places)} frequencies searched by deflation and {search.starts} starts in time each, "
+        f"{search.solves} solves at most; {search.harmonics} harmonics"
+    )
+
+
+def _told(stage: Stage, inputs: Question) -> str:
+    if stage.kind == "branch":
+        how = {"sweep": "the sweep", "deflation": "a branch found by deflation", "time": "a branch found in time"}
+        return f"{how[stage.origin]}: {stage.omega.size} points; {stage.end}"
+    hertz = inputs.search.places[stage.place] / HZ
+    told = {
+        "searched": f"{stage.tries} deflated solves",
+        "starts": f"{stage.tries} starts in time",
+        "motions": f"{stage.omega.size} motions",
+    }
+    return f"{hertz:.6g} Hz: {told[stage.kind]}{', ' * bool(stage.end)}{stage.end}"
+
+
+ALL_MOTIONS = Analysis(
+    name="all_motions",
+    table=AllMotionsTable,
+    record=Stage,
+    key=of_tables("all_motions", "solver"),
+    inputs=_inputs,
+    solve=_solve,
+    dataset=dataset,
+    check=_check,
+    summary=tables,
+)

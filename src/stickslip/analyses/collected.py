@@ -1,0 +1,76 @@
+"""Records of the jobs of an analysis put together: arrays, cases side by side, verdicts."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.waves.records.about import told
+from stickslip.arrays import FloatArray
+from stickslip.study.analysis import Solved
+from stickslip.study.store.netcdf import alike, one_case, stacked, variable
+from stickslip.study.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
+
+Variables = dict[str, xr.Variable]
+About = Mapping[str, tuple[str, str, str]]  # dimensions, unit and words of each variable
+
+
+def of_cases(
+    solved: Sequence[Solved],
+    of_case: Callable[[Solved], Variables],
+    verdicts: Callable[[str, Variables], Iterable[Verdict]],
+    lost: Callable[[Variables], int] = lambda _: 0,
+) -> xr.Dataset:
+    """Return the node of all cases.
+
+    Parameters
+    ----------
+    solved
+        What the jobs found.
+    of_case
+        Returns the variables of a case.
+    verdicts
+        Returns what is to be thought of a case, by its label and its variables.
+    lost
+        Returns how many of its points have no solution.
+    """
+    cases = [of_case(one) for one in solved]
+    labels = [one.case.label for one in solved]
+    found = [v for label, own in zip(labels, cases, strict=True) for v in verdicts(label, own)]
+    failed = sum(lost(own) for own in cases)
+    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def described(about: About, values: Mapping[str, Any], model: Mapping[str, Any]) -> Variables:
+    """Return the values that are not empty as variables, beside what is known of the model."""
+    known = {name: value for name, value in values.items() if np.size(value) > 0}
+    return told(model) | {name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()}
+
+
+def each(records: Sequence[object], name: str) -> Any:
+    """Return the array of an attribute of all records."""
+    return np.array([getattr(one, name) for one in records])
+
+
+def rows(records: Sequence[object], name: str, missing: float = np.nan) -> FloatArray:
+    """Return an attribute of all records, arrays of different lengths, as rows that are filled up."""
+    every = [getattr(one, name) for one in records]
+    out = np.full((len(every), max((own.size for own in every), default=0)), missing)
+    for row, own in zip(out, every, strict=True):
+        row[: own.size] = own
+    return out
+
+
+def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:
+    """Yield each different case once, with the head of its tables: the labels of all that are alike, nothing where all are."""
+    groups = alike(data)
+    for group in groups:
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        yield one_case(data, group[0]), f"{'; '.join(labels)}: " if labels else ""
+
+
+def number(value: float, digits: int = 5) -> str:
+    """Return a number for a table, with a dash for none."""
+    return f"{value:.{digits}g}" if np.isfinite(value) else "-"

@@ -1,0 +1,127 @@
+"""Compared designs beside forced responses: nonlinear modes, flutter margins, limit cycles."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.analyses.compared.designs import Design
+from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
+from stickslip.analyses.nonlinear_mode.page import Modes
+from stickslip.analyses.nonlinear_mode.page import table as mode_table
+from stickslip.analyses.waves.page.flutter import margins
+from stickslip.analyses.waves.page.waves import Waves
+from stickslip.report.content import Table, Words
+from stickslip.report.node import Node
+from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.quantities import NONE, scale_for
+from stickslip.report.result import analysis
+from stickslip.report.section import Content
+
+View = TypeVar("View", bound=Node)
+_DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
+
+
+def told_by(
+    designs: Sequence[Design], name: str, kind: type[View], needed: Sequence[str]
+) -> list[tuple[Design, str, View]]:
+    """Return every case of the designs that have an analysis: design, label, view."""
+    found = []
+    for design in designs:
+        if name in design.tree.children:
+            data = analysis(design.tree, name)
+            for k in range(data.sizes.get("case", 1)):
+                view = kind(data.isel(case=k) if "case" in data.dims else data)
+                if view.has(*needed):
+                    found.append((design, view.text("case_label"), view))
+    return found
+
+
+def stacked(views: Sequence[tuple[Design, str, View]], table: Callable[[View], Table | Words]) -> list[Content]:
+    """Return the rows of each case's table below each other, with the design and the case before them, and what is told in words where it has none."""
+    head: Sequence[str] = ()
+    rows, words = [], []
+    for design, label, view in views:
+        own, said = table(view), f"**{design.name}**{f' ({label})' * bool(label)}: "
+        if isinstance(own, Table):
+            head = own.head
+            rows += [[design.name, label or NONE, *row] for row in own.rows]
+            words += [said + item for item in own.items]
+        else:
+            words += [said + item for item in own.told]
+    found: list[Content] = [Table(["design", "case", *head], rows)] if rows else []
+    return [*found, Words(items=words)] if words else found
+
+
+def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
+    """Return frequency and damping of the nonlinear modes over the amplitude, and a table."""
+    needed = ("mode", "frequency_hz", "damping_ratio", "amplitude", "status")
+    views = told_by(designs, "nonlinear_mode", Modes, needed)
+    if not views:
+        return []
+    every = np.concatenate([v.floats("amplitude").ravel() for _, _, v in views])
+    scale = scale_for(np.array([np.nanmedian(every)]), "m")
+    figure = make_subplots(1, 2, horizontal_spacing=0.12)
+    for k, (design, label, view) in enumerate(views):
+        before = sum(own is design for own, _, _ in views[:k])
+        for i, mode in enumerate(view.names):
+            name = ", ".join(word for word in (design.name, label, mode) if word)
+            dash = _DASHES[(before + i) % len(_DASHES)]
+            amplitude, hz, ratio = view.along(i, "amplitude", "frequency_hz", "damping_ratio")
+            for panel, y in enumerate((hz, 100.0 * ratio), 1):
+                figure.add_scatter(
+                    x=scale.factor * amplitude,
+                    y=y,
+                    mode="lines",
+                    name=name,
+                    legendgroup=name,
+                    showlegend=panel == 1,
+                    line={"color": design.colour, "width": 1.8, "dash": dash},
+                    hovertemplate=f"%{{y:.6g}} at %{{x:.4g}} {scale.unit}<extra>{name}</extra>",
+                    row=1,
+                    col=panel,
+                )
+    styled(figure, 420)
+    outputs = " or ".join(dict.fromkeys(v.text("output") for _, _, v in views))
+    figure.update_xaxes(type="log", title_text=f"amplitude of {outputs} ({scale.unit})")
+    figure.update_yaxes(title_text="frequency (Hz)", col=1)
+    figure.update_yaxes(title_text="damping ratio (%)", col=2)
+    caption = "Frequency and damping ratio of the modes over their amplitude."
+    plot = Plot("compared_nonlinear_modes", "Nonlinear modes over each other", caption, figure)
+    return [plot, *stacked(views, mode_table)]
+
+
+def flutter(designs: Sequence[Design]) -> list[Content]:
+    """Return the damping in the flow over the phase angle, and the margins of all waves."""
+    views = told_by(designs, "flutter", Waves, ("phase_angle_deg", "damping", "frequency_hz"))
+    if not views:
+        return []
+    figure = go.Figure()
+    for k, (design, label, view) in enumerate(views):
+        before = sum(own is design for own, _, _ in views[:k])
+        angle = view.floats("phase_angle_deg")
+        order = np.argsort(angle, kind="stable")
+        for m, own in enumerate(100.0 * view.floats("damping").T):
+            name = ", ".join(word for word in (design.name, label, f"mode {m + 1}") if word)
+            figure.add_scatter(
+                x=angle[order],
+                y=own[order],
+                mode="lines+markers",
+                name=name,
+                line={"color": design.colour, "width": 1.4, "dash": _DASHES[(before + m) % len(_DASHES)]},
+                hovertemplate=f"%{{y:.4g}} % at %{{x:.0f}}°<extra>{name}</extra>",
+            )
+    figure.add_hline(y=0.0, line={"color": INK, "width": 1})
+    styled(figure, 440)
+    figure.update_xaxes(title_text="inter-blade phase angle (degrees)", dtick=45)
+    figure.update_yaxes(title_text="damping ratio (%)")
+    caption = "Damping in the flow with that of the structure, at the waves that the wheels have."
+    plot = Plot("compared_flutter", "Flutter margins over each other", caption, figure)
+    return [plot, *stacked(views, margins)]
+
+
+def limit_cycles(designs: Sequence[Design]) -> list[Content]:
+    """Return the limit cycles of all designs in one table."""
+    return stacked(told_by(designs, "limit_cycle", Cycles, ("linear_damping_ratio",)), cycle_table)

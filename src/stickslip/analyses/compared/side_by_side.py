@@ -1,0 +1,417 @@
+"""The page that holds designs against each other: peaks, responses, optimisation curves, inputs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
+from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.arrays import FloatArray
+from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.content import Table, Words, chooser
+from stickslip.report.frame import Chapter, Placing, page_html
+from stickslip.report.plot import INK, MUTED, Plot, log_ticks, styled
+from stickslip.report.quantities import (
+    NONE,
+    Scale,
+    column,
+    counted,
+    fixed,
+    joined,
+    number,
+    percent,
+    quantity,
+    scale_for,
+)
+from stickslip.report.section import Card, Content
+from stickslip.study.verdict import conclusion
+
+_BEST = "best of each"
+_DASHES = ("dash", "dot", "dashdot", "longdash")
+_MOST_INPUTS = 400  # characters of a value that a cell shows
+
+
+def amplitudes(design: Response, *, divided: bool) -> FloatArray:
+    """Return (point,) amplitudes in m, or per newton; NaN where a point did not converge."""
+    whole = design.at_outputs(design.values("amplitude", "point", "output"))
+    force = np.array([c.excitation for c in design.cases])[design.point_case]
+    return np.where(design.converged, whole / force if divided else whole, np.nan)
+
+
+def unit_of(designs: Sequence[Design], *, divided: bool) -> str:
+    """Return the unit of `amplitudes`."""
+    length = next((d.response.length for d in designs if d.response), "m")
+    return f"{length}/N" if divided else length
+
+
+def over_first(value: float, first: float) -> float:
+    """Return how far a value is from the first one in percent; NaN where that is zero."""
+    return 100.0 * (value / first - 1.0) if first else float("nan")
+
+
+def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
+    """Return what the reader chooses between: the best case of each design, then each case that any of them has; nothing where each has one case."""
+    labels = dict.fromkeys(
+        c.label for d in designs if d.response and len(d.response.cases) > 1 for c in d.response.cases
+    )
+    names = [_BEST, *labels] if labels else []
+    return tuple(ShownCase(i, name, name, float("nan"), float("nan"), MUTED) for i, name in enumerate(names))
+
+
+def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | None:
+    cases = design.response.cases if design.response else ()
+    if choice.index == 0:
+        return design.best(divided=divided)
+    return cases[0] if len(cases) == 1 else design.case(choice.label)
+
+
+def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool) -> ShownCase | None:
+    """Return the choice that the page opens on: a case that all designs have, that of the first one's smallest peak if it is one; else the best of each.
+
+    The best cases of two designs may be those of different loads, which say nothing of the designs.
+    """
+    told = [d for d in designs if d.response is not None]
+    common = [c for c in offered[1:] if all(_case(d, c, divided=divided) for d in told)]
+    best = told[0].best(divided=divided) if told else None
+    of_first = [c for c in common if best is not None and c.label == best.label]
+    return next(iter([*of_first, *common, *offered]), None)
+
+
+def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plot | None:
+    """Draw the responses of all designs over each other, a case at a time."""
+    told = [d for d in designs if d.response is not None]
+    if not told:
+        return None
+    divided, figure, offered = per_force(designs, curves), go.Figure(), choices(designs)
+    unit = unit_of(designs, divided=divided)
+    every = [amplitudes(d.response, divided=divided) for d in told if d.response]
+    scale = scale_for(np.concatenate([*every, *(c.amplitude for c in curves)]), unit)
+    for design, own in zip(told, every, strict=True):
+        response = design.response
+        if response is None:
+            continue
+        pairs: list[tuple[int | None, ShownCase | None]]
+        pairs = [(choice.index, _case(design, choice, divided=divided)) for choice in offered]
+        if not offered or len(response.cases) == 1:
+            pairs = [(None, response.cases[0])]
+        for k, case in pairs:
+            if case is not None:
+                figure.add_trace(_line(design, response, case, own * scale.factor, scale).update(meta=k))
+    for k, curve in enumerate(curves):
+        figure.add_scatter(
+            x=curve.hz,
+            y=scale.factor * curve.amplitude,
+            mode="lines+markers",
+            name=curve.name,
+            line={"color": INK, "width": 1.2, "dash": _DASHES[k % len(_DASHES)]},
+            marker={"size": 4, "color": INK},
+            hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra>{curve.name}</extra>",
+        )
+    styled(figure, 540)
+    drawn = np.concatenate([np.asarray(t.y, dtype=float) for t in figure.data])
+    over = " / force" if divided else ""
+    figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))
+    figure.update_xaxes(title_text="frequency (Hz)")
+    caption = f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones."
+    captions = {c.index: _shown(told, c, divided=divided) for c in offered}
+    first = opening(designs, offered, divided=divided)
+    chosen = first.index if first else -1
+    return Plot("compared_responses", "Responses over each other", caption, figure, captions, chosen)
+
+
+def _outputs(designs: Sequence[Design]) -> str:
+    """Name the outputs whose amplitudes are compared: once where they are called alike."""
+    names = {d.name: d.response.output_name for d in designs if d.response}
+    if len({*names.values()}) == 1:
+        return next(iter(names.values()))
+    return joined([f"{output} ({name})" for name, output in names.items()])
+
+
+def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> str:
+    """Say which case of each design is drawn, and which have none."""
+    own = [(d, _case(d, choice, divided=divided)) for d in designs]
+    there = [f"{d.name}: {c.label or 'its only case'}" for d, c in own if c is not None]
+    without = [d.name for d, c in own if c is None]
+    lacks = f" Without this case: {', '.join(without)}." if without else ""
+    return f"Drawn: {'; '.join(there)}.{lacks}"
+
+
+def _line(design: Design, response: Response, case: ShownCase, y: FloatArray, scale: Scale) -> go.Scatter:
+    at = response.points(case)
+    symbols = np.array(["circle", "circle-open", "x"])[response.levels[at]]
+    return go.Scatter(
+        x=response.hz[at],
+        y=y[at],
+        mode="lines+markers",
+        name=design.name,
+        line={"color": design.colour, "width": 1.8},
+        marker={"symbol": symbols.tolist(), "size": 5, "color": design.colour, "line": {"width": 1}},
+        hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz{f'<br>{case.label}' * bool(case.label)}<extra>{design.name}</extra>",
+    )
+
+
+def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
+    """Draw the optimisation curves of all designs over each other, where two of them vary the same number."""
+    numbered = [(d, d.response, first_number(d.response.data)[0]) for d in designs if d.response]
+    keys = [key for _, _, key in numbered]
+    key = max(keys, key=keys.count, default="")
+    told = [(d, r) for d, r, own in numbered if own == key and len(r.peaked) > 1]
+    if not key or len(told) < 2:
+        return None
+    figure, heights = make_subplots(1, 2, horizontal_spacing=0.12), []
+    curves = []
+    for design, response in told:
+        cases = sorted(response.peaked, key=lambda c: c.value)
+        peak = np.array([_peak(response, c, divided=divided) for c in cases])
+        heights.append(peak)
+        curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))
+    unit_drawn = unit_of(designs, divided=divided)
+    scale = scale_for(np.concatenate(heights), unit_drawn)
+    for design, values, peak, hz in curves:
+        for panel, (y, unit) in enumerate(((scale.factor * peak, scale.unit), (hz, "Hz")), 1):
+            figure.add_scatter(
+                x=values,
+                y=y,
+                mode="lines+markers",
+                name=design.name,
+                showlegend=panel == 1,
+                legendgroup=design.name,
+                line={"color": design.colour, "width": 1.8},
+                hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{design.name}</extra>",
+                row=1,
+                col=panel,
+            )
+    styled(figure, 400)
+    every = [value for _, own, _, _ in curves for value in own]
+    wide = min(every) > 0 and max(every) > 5 * min(every)
+    figure.update_xaxes(title_text=key, type="log" if wide else "linear")
+    drawn = scale.factor * np.concatenate(heights)
+    over = " / force" if divided else ""
+    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
+    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
+    lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])
+    caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
+    return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
+
+
+def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
+    at = response.peak(case)
+    return float(amplitudes(response, divided=divided)[at]) if at >= 0 else float("nan")
+
+
+@dataclass(frozen=True)
+class PeakRow:
+    """The peak of a case of a design, in Hz and SI units, and how far it is from that of the first design: NaN where that has no such case."""
+
+    case: str
+    design: str
+    hz: float
+    height: float
+    level: str
+    off_percent: float
+    shift_hz: float
+
+
+def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
+    """Return a row for each case of each design, case by case in the order of the first that has it."""
+    told = [(d, d.response) for d in designs if d.response is not None]
+    labels = dict.fromkeys(c.label for _, r in told for c in r.cases)
+    found = []
+    for label in labels:
+        for design, response in told:
+            case, (first, of_first) = design.case(label), told[0]
+            if case is None:
+                continue
+            height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
+            like, off, shift = first.held_against(case, design), float("nan"), float("nan")
+            if design is not first and like is not None:
+                off = over_first(height, _peak(of_first, like, divided=divided))
+                shift = hz - of_first.peak_hz(like)
+            found.append(PeakRow(label, design.name, hz, height, response.level(case), off, shift))
+    return found
+
+
+def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
+    """Return a row for each case of each design: its peak, and how far it is from that of the first design."""
+    found = peak_rows(designs, divided=divided)
+    if not found:
+        return None
+    unit, cells = column(np.array([p.height for p in found]), unit_of(designs, divided=divided))
+    head = ["case", "design", f"peak ({unit})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]
+    return Table(
+        head,
+        [
+            [
+                p.case or NONE,
+                p.design,
+                cell,
+                fixed(p.hz, 3),
+                p.level or NONE,
+                fixed(p.off_percent, 2),
+                fixed(p.shift_hz, 3),
+            ]
+            for p, cell in zip(found, cells, strict=True)
+        ],
+    )
+
+
+def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Table | None:
+    """Return how far each case of each design is from each curve that was read: at the peak, and along it."""
+    if not curves:
+        return None
+    divided, rows = per_force(designs, curves), []
+    for curve in curves:
+        top = int(np.argmax(curve.amplitude))
+        every = [(d, d.response, c) for d in designs if d.response for c in d.response.cases]
+        for design, response, case in every:
+            height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
+            off = percent(over_first(height, float(curve.amplitude[top])), 3)
+            rows.append(
+                [
+                    curve.name,
+                    design.name,
+                    case.label or NONE,
+                    off,
+                    fixed(hz - float(curve.hz[top]), 3),
+                    _along(response, case, curve, divided=divided),
+                ]
+            )
+    head = ["curve", "design", "case", "peak off by", "frequency off by (Hz)", "largest difference along it"]
+    told = "Along a curve: the difference of the amplitudes over the curve's peak, where frequencies of both overlap, with straight lines between the points of the design."
+    return Table(head, rows, "Against other curves", (told,))
+
+
+def _along(response: Response, case: ShownCase, curve: MeasuredCurve, *, divided: bool) -> str:
+    at = response.points(case)
+    own = amplitudes(response, divided=divided)[at]
+    hz = response.hz[at]
+    if np.any(np.diff(hz) < 0):
+        return "the response folds"
+    known = np.isfinite(own)
+    if np.count_nonzero(known) < 2:
+        return NONE
+    inside = (curve.hz >= hz[known][0]) & (curve.hz <= hz[known][-1])
+    if not np.any(inside):
+        return "no common frequency"
+    off = np.interp(curve.hz[inside], hz[known], own[known]) - curve.amplitude[inside]
+    worst = int(np.argmax(np.abs(off)))
+    return f"{percent(100 * float(off[worst]) / float(curve.amplitude.max()), 3)} at {number(float(curve.hz[inside][worst]), 5)} Hz"
+
+
+def frequencies(designs: Sequence[Design]) -> Table | None:
+    """Return the natural frequencies of the designs that have them, wave by wave, against the first."""
+    told = [(d, d.modes) for d in designs if d.modes is not None]
+    if len(told) < 2:
+        return None
+    known = [
+        {(w, m): float(f) for w, row in zip(v.waves, v.floats("frequency_hz"), strict=True) for m, f in enumerate(row)}
+        for _, v in told
+    ]
+    rows = []
+    for wave, mode in known[0]:
+        if all((wave, mode) in each for each in known):
+            own = [each[wave, mode] for each in known]
+            rows.append(
+                [
+                    f"{wave}, mode {mode + 1}",
+                    *(number(f, 7) for f in own),
+                    *(percent(over_first(f, own[0]), 3) for f in own[1:]),
+                ]
+            )
+    head = ["", *(f"{d.name} (Hz)" for d, _ in told), *(f"{d.name} off by" for d, _ in told[1:])]
+    several = any(d.tree["modes"].sizes.get("case", 1) > 1 for d, _ in told)
+    said = ("Of the first case of each design.",) if several else ()
+    return Table(head, rows, "Natural frequencies", said) if rows else None
+
+
+def inputs(designs: Sequence[Design]) -> Table | Words:
+    """Return what differs between the study files."""
+    rows, title = differences(designs), "What differs between the study files"
+    without = [d.name for d in designs if not d.inputs]
+    told = [f"Made without a study file, inputs not known: {', '.join(without)}."] if without else []
+    if not rows:
+        return Words([*told, "Nothing differs that the results know of."])
+    cells = [[c if len(c) <= _MOST_INPUTS else f"{c[:_MOST_INPUTS]} …" for c in row] for row in rows]
+    return Table(["key", *(d.name for d in designs)], cells, "", [title + ".", *told], numeric=False)
+
+
+def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
+    """Return the numbers of the head: the best case of each design, then each design at the case that the page opens on, where all have it."""
+    offered = choices(designs)
+    shown = opening(designs, offered, divided=divided)
+    best = [(d, d.best(divided=divided)) for d in designs]
+    unit = unit_of(designs, divided=divided)
+    found = _held(best, "best peak of {}" if offered else "peak of {}", unit, divided=divided)
+    if shown is None or shown.index == 0:
+        return found
+    alike = [(d, _case(d, shown, divided=divided)) for d in designs]
+    if [c and c.label for _, c in alike] == [c and c.label for _, c in best]:
+        return found
+    return [*found, *_held(alike, f"peak of {{}} at {shown.label}", unit, divided=divided)]
+
+
+def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool) -> list[Card]:
+    """Return a card for each design at a case of it, held against the first one."""
+    found: list[Card] = []
+    first, against = float("nan"), ""
+    for design, case in pairs:
+        response = design.response
+        if case is None or response is None:
+            continue
+        height = _peak(response, case, divided=divided)
+        note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
+        if not found:
+            first, against = height, label.format(design.name)
+        else:
+            off = over_first(height, first)
+            note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {against}"
+        found.append(Card(quantity(height, unit), label.format(design.name), note))
+    return found
+
+
+def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list[tuple[str, str, list[Content]]]:
+    """Return the chapters of a comparison: key, title, and what they show.
+
+    Raises
+    ------
+    InputError
+        If curves cannot be compared with what the designs have.
+    """
+    divided, offered = per_force(designs, curves), choices(designs)
+    first = opening(designs, offered, divided=divided)
+    verdicts = Words(items=[f"**{d.name}**: {conclusion(d.tree)}" for d in designs])
+    each: list[tuple[str, str, list[Content | None]]] = [
+        ("verdicts", "Verdicts", [verdicts]),
+        (
+            "responses",
+            "Forced response",
+            [
+                chooser("case", offered, first.index if first else -1),
+                responses(designs, curves),
+                against_curves(designs, curves),
+            ],
+        ),
+        ("optimisation", "Optimisation curves", [optimisation(designs, divided=divided)]),
+        ("peaks", "Peaks", [peaks(designs, divided=divided)]),
+        ("modes", "Modes", [frequencies(designs)]),
+        ("nonlinear_modes", "Nonlinear modes", [*nonlinear_modes(designs)]),
+        ("flutter", "Flutter", [*flutter(designs)]),
+        ("limit_cycles", "Limit cycles", [*limit_cycles(designs)]),
+        ("inputs", "Inputs", [inputs(designs)]),
+    ]
+    kept = [(key, title, [c for c in own if c is not None]) for key, title, own in each]
+    return [chapter for chapter in kept if chapter[2]]
+
+
+def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] = ()) -> str:
+    """Return the page of a comparison; `InputError` if curves cannot be compared with the designs."""
+    placing = Placing()
+    chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
+    names = [d.name for d in designs]
+    made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")
+    head = cards(designs, divided=per_force(designs, curves))
+    return page_html(f"{joined(names)} compared", made, chapters, cards=head)

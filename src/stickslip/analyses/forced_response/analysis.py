@@ -1,0 +1,345 @@
+"""The steady vibration under harmonic loads, friction and all: branches, peaks, and how far its harmonics are to be trusted."""
+
+from collections.abc import Iterator, Sequence
+from time import perf_counter
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.estimate import estimate
+from stickslip.analyses.forced_response.measured_variables import with_measured
+from stickslip.analyses.forced_response.more_harmonics import check_harmonics
+from stickslip.analyses.forced_response.physics.kinematics import motion_at_peak
+from stickslip.analyses.forced_response.physics.known import (
+    doubts_of_model,
+    inside,
+    known,
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+    off_engine_order,
+)
+from stickslip.analyses.forced_response.physics.limits import (
+    PHYSICS,
+    beforehand,
+    driven_line,
+    of_physics,
+    physics_of,
+)
+from stickslip.analyses.forced_response.physics.model_change import model_changes, stiffness_changes
+from stickslip.analyses.forced_response.physics.retention import peak_shift
+from stickslip.analyses.forced_response.problem import (
+    HARMONICS,
+    IN_TIME,
+    STABLE,
+    Question,
+    question_of,
+    with_comparisons,
+)
+from stickslip.analyses.forced_response.records.blades import of_blades
+from stickslip.analyses.forced_response.records.dataset import put_together
+from stickslip.analyses.forced_response.records.points import Response, lost_point
+from stickslip.analyses.forced_response.records.pressures import pressure_lines
+from stickslip.analyses.forced_response.records.values import (
+    Values,
+    of_checks,
+    of_doubt,
+    of_examined,
+    of_model,
+    of_response,
+)
+from stickslip.analyses.forced_response.stability.bifurcating import (
+    bifurcations_line,
+    followed,
+    located,
+    of_bifurcations,
+)
+from stickslip.analyses.forced_response.stability.comparison import Check
+from stickslip.analyses.forced_response.stability.elsewhere import motions_elsewhere
+from stickslip.analyses.forced_response.stability.examining import neighbours_of
+from stickslip.analyses.forced_response.stability.in_time import FLOPS, chosen
+from stickslip.analyses.forced_response.stability.not_periodic import (
+    in_time_instead,
+    of_answers,
+    without_periodic,
+)
+from stickslip.analyses.forced_response.stability.stable import Examined, cost_line, with_motion
+from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
+from stickslip.analyses.forced_response.stability.with_stability import integrated, with_stability
+from stickslip.analyses.forced_response.summary import tables
+from stickslip.analyses.forced_response.table import ForcedResponse
+from stickslip.analyses.forced_response.verdicts.cases import verdicts
+from stickslip.analyses.forced_response.verdicts.working_range import with_regimes
+from stickslip.assembly.model import Model
+from stickslip.assembly.sides.unreduced import unreduced_line
+from stickslip.errors import SingularError
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.harmonic_set import named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.from_time import marched_of
+from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
+from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
+from stickslip.study.models.measured import MeasuredPeaks
+from stickslip.study.store.progress import LOG, advance, sum_up
+from stickslip.study.verdict import Verdict, to_json
+from stickslip.units import HZ, millimetres
+
+NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
+COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
+BLADES = "blades"  # of a wheel whose sectors differ
+BIFURCATIONS = "bifurcations"
+NOT_PERIODIC = "not_periodic"
+NOTES = (
+    "model",
+    "response",
+    BLADES,
+    STABLE,
+    BIFURCATIONS,
+    IN_TIME,
+    NOT_PERIODIC,
+    HARMONICS,
+    PHYSICS,
+)  # what makes up the dataset
+
+
+def _inputs(case: Case, model: Model) -> Question:
+    """Return the assembled model and the sweep; refuse what cannot be computed."""
+    for line in _of_pressures(case, model):
+        LOG.info(line)
+    return with_comparisons(question_of(case, model), case, model)
+
+
+def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
+    """Yield the points that are not done; put down what the dataset needs, and the checks asked for."""
+    points = list(done)
+    failure: Exception | None = None
+    try:
+        for point in _points(inputs, done, notes):
+            points.append(point)
+            yield point
+    except NO_SOLUTION as error:
+        failure = error  # what was found before counts
+        if not points:
+            points.append(lost_point(inputs.problem, error))
+            yield points[-1]
+    response, examined = yield from with_stability(inputs, points, notes)
+    _put_down(inputs, response, examined, notes)
+    if inputs.model.blades is not None and notes.get(BLADES) is None:
+        notes.put(BLADES, of_blades(inputs, response))
+    if failure is not None and response.top is None:
+        raise failure  # nothing to judge
+    told = _judge(inputs, response, examined, notes)
+    if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
+        notes.put(BIFURCATIONS, _bifurcations(inputs, response, told, notes))
+    if HARMONICS in inputs.checks:
+        _check_harmonics(inputs, response, notes)
+    if notes.get(PHYSICS) is None:
+        notes.put(PHYSICS, _of_physics(inputs, response))
+    if failure is not None:
+        raise failure
+
+
+def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    """Return the responses of all cases."""
+    cases = [_values(s) for s in solved]
+    labels = [s.case.label for s in solved]
+    return put_together(cases, labels)
+
+
+def _check(case: Case, model: Model) -> tuple[str, ...]:
+    """Return the estimated cost, where resonances are to be expected, and how harmonics will be chosen."""
+    question = question_of(case, model)
+    chooser, passages = question.chooser, case.settings.harmonics.passages
+    labels = question.model.error_labels
+    doubted = [text for text in doubts_of_model(question) if text not in model.warnings]
+    physics = physics_of(question)
+    known = [] if physics is None else list(beforehand(physics))
+    driven = [] if physics is None else driven_line(physics)
+    notes = [v for v in known if not v.rank]
+    doubts = [
+        *no_resonance(question),
+        *nothing_pressed(question),
+        *mixed_places(labels),
+        *(v for v in known if v.rank),
+    ]
+    return (
+        *_of_pressures(case, model),
+        str(estimate(model, question.sweep)),
+        *unreduced_line(question.model),
+        *question.orders_lines,
+        *(f"harmonics: {line}" for line in chooser.lines(passages)),
+        cost_line(question),
+        *bifurcations_line(question),
+        *inside(question),
+        *driven,
+        *(f"note: {v.why}. {v.remedy}" for v in (*off_engine_order(question), *notes)),
+        *(f"WARNING: {text}" for text in (*doubted, *(f"{v.why}. {v.remedy}" for v in doubts))),
+    )
+
+
+def _verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
+    """Return what is to be thought of each case and its points."""
+    return verdicts(data, [str(x) for x in data["case_label"].values])
+
+
+def _completed(data: xr.Dataset, measured: MeasuredPeaks | None) -> xr.Dataset:
+    """Return the dataset with the measured peaks, and with what friction does at the peak of each case."""
+    return with_regimes(with_measured(data, measured))
+
+
+def _of_pressures(case: Case, model: Model) -> tuple[str, ...]:
+    """Return what is told of pressure fields; a model without a study has no table of its loads."""
+    given = getattr(case.settings, "load", {})
+    return pressure_lines(model, {name: table.modal_forces for name, table in given.items()})
+
+
+def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
+    """Yield the points that are not done."""
+    if notes.get("finished") is not None:
+        return
+    _compile(question)
+    model = question.model
+    lines = (*unreduced_line(model), *model.frequencies.lines()) if question.first else ()
+    for line in lines:
+        LOG.info(line)
+    for point in forced_response(model.system, model.load, question.sweep, done=done):
+        yield point
+        advance(*progress(point, question.sweep))
+
+
+def _of_physics(question: Question, response: Response) -> Values:
+    """Return what the job knows of the physics of its case, and how far the model decides its peak."""
+    return (
+        of_physics(question, response)
+        | motion_at_peak(question, response)
+        | model_changes(question, response)
+        | stiffness_changes(question, response)
+        | motions_elsewhere(question, response)
+    )
+
+
+def _put_down(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
+    """Put down all that the dataset needs, once."""
+    if notes.get("response") is not None:
+        return
+    shift = peak_shift(question, response)
+    notes.put("model", of_model(question, response.output))
+    told = {"known_verdicts": to_json(known(question, response, shift))}
+    notes.put("response", of_response(question, response, shift) | told)
+    size = f"peak {millimetres(response.peak_amplitude)} at {response.peak_hz:.3f} Hz"
+    peak = f"{size}, {peak_word(response, examined)}, {len(response.accepted)} points"
+    if response.top is None:
+        peak = f"no peak, {len(response.accepted)} points"
+    lost = f"{response.failed} not converged"
+    line = question.said(f"{peak}, {lost}, {response.newton_steps} Newton steps")
+    sum_up(f"{peak}, {lost}" if response.failed else peak, line)
+
+
+def _judge(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
+    """Integrate in time what was asked for, and return what is known of the stability then."""
+    chosen_points = chosen(question, response) if IN_TIME in question.checks else []
+    checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
+    told = [with_motion(one, checks.get(one.omega)) for one in examined]
+    for accepted in response.accepted:
+        known = notes.get(f"{IN_TIME}.{accepted.point.omega!r}")
+        if known:
+            checks.setdefault(accepted.point.omega, Check(**known))
+    if checks:
+        notes.put(IN_TIME, of_checks([checks[omega] for omega in sorted(checks)]))
+    attained = [omega for omega, check in checks.items() if check.motion == "attained"]
+    told = neighbours_of(question, response, told, attained)
+    for line in stability_log([p for p in map(point_of, told) if p.basis == "examined"]):
+        LOG.info(f"stability: {question.said(line)}")
+    notes.put(STABLE, of_examined(told, len(response.accepted)))
+    if question.not_periodic_s > 0.0:
+        _answer_in_time(question, response, told, notes)
+    return told
+
+
+def _answer_in_time(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
+    """March where no periodic motion stands for the response, once."""
+    if notes.get(NOT_PERIODIC) is not None:
+        return
+    answers = [
+        in_time_instead(question, response, omega, why, question.not_periodic_s * FLOPS, multiplier)
+        for omega, why, multiplier in without_periodic(question, response, examined)
+    ]
+    for one in answers:
+        LOG.info(f"not periodic: {question.said(one.sentence)}")
+    if answers:
+        notes.put(NOT_PERIODIC, of_answers(answers))
+
+
+def _bifurcations(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> Values:
+    """Locate the bifurcations of the response, and follow what leaves there."""
+    found = located(question, response, notes)
+    for line in found.sentences:
+        LOG.info(f"bifurcations: {question.said(line)}")
+    sides = followed(question, found)
+    for begin, side in sides:
+        LOG.info(f"from {begin.omega / HZ:.6g} Hz: {question.said(side.sentence)}")
+    return of_bifurcations(question, response, found, sides, examined)
+
+
+def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:
+    doubt = check_harmonics(question, response)
+    LOG.info(f"more harmonics: {question.said(doubt.sentence)}")
+    notes.put(HARMONICS, of_doubt(doubt))
+
+
+def _compile(question: Question) -> None:
+    """Evaluate contacts and strategy once, or the first case would count their compilation as work; of a large problem the work is more than that."""
+    problem, system, omega = question.problem, question.model.system, question.sweep.ends[0]
+    if isinstance(problem.low, HarmonicBalance) and problem.low.large:
+        return
+    start = perf_counter()
+    try:
+        x = bonded_start(problem.low, omega, system)
+        problem.low.linearise(x, omega)
+        if always_kept(problem.strategy) is None:
+            problem.strategy.judge(problem.step(problem.low, x, omega))
+    except NO_SOLUTION:
+        return  # the response says what is wrong
+    seconds = perf_counter() - start
+    if seconds > COMPILED:
+        LOG.info(f"compiled the contact laws in {seconds:.0f} s, once an installation")
+
+
+def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
+    """Return how much of a case is done, and a line that says so."""
+    first, last = sweep.ends
+    along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
+    shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
+    if sweep.single:  # repeats come in between
+        shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
+    shares["check"] = shares["peak"]
+    begin, width = shares.get(point.stage, (0.0, 0.95))
+    state = "" if point.converged else f", {point.status.advice}"
+    marched = marched_of(point)
+    state += "" if marched is None else f", {marched}"
+    return (
+        begin + width * along,
+        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",
+    )
+
+
+def _values(solved: Solved) -> Values:
+    """Return all that a job put down under the names of variables."""
+    return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
+
+
+FORCED_RESPONSE = Analysis(
+    name="forced_response",
+    table=ForcedResponse,
+    record=ForcedPoint,
+    key=of_tables("forced_response", "harmonics", "solver"),
+    inputs=_inputs,
+    solve=_solve,
+    dataset=_dataset,
+    check=_check,
+    summary=tables,
+    checks=(IN_TIME, HARMONICS),
+    verdicts=_verdicts,
+    completed=_completed,
+)

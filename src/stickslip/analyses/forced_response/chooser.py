@@ -1,0 +1,249 @@
+"""The harmonic selection of a response, in words and as attributes of its dataset."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyses.forced_response.records.points import Response
+from stickslip.arrays import BoolArray
+from stickslip.assembly.sides.mistuned import listed
+from stickslip.harmonic.harmonic_set import Harmonics, named
+from stickslip.harmonic.selection.strategy import Strategy, always_kept
+from stickslip.harmonic.strategies import STRATEGIES
+from stickslip.response.forced.choices import RUNGS
+from stickslip.response.forced.response import ForcedPoint, Sweep
+from stickslip.units import HZ
+
+NAMED = 4  # sets of harmonics that a sentence names
+
+
+def error_text(error: float) -> str:
+    """Return a predicted error (a fraction) as text: a linear prediction beyond the motion itself has no digits worth telling."""
+    return "over 100 %" if error > 1.0 else f"{100 * error:.2g} %"
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """How the harmonics of a response are chosen.
+
+    Parameters
+    ----------
+    name
+        Of the selection.
+    single
+        Whether each frequency is settled before the next one.
+    low, high
+        Harmonics of the first passage and of the reference.
+    threshold
+        Indicator above which more harmonics are asked for; NaN where nothing is decided.
+    is_error
+        Whether the indicator is the predicted error of the solution, a fraction.
+    over
+        Labels of the dofs over which an error is taken.
+    harmonics
+        Harmonics of which it is taken.
+    first
+        Harmonics with which the first passage is made.
+    auto
+        Whether harmonics are raised along the branch, up to the highest of `high`.
+    """
+
+    name: str
+    single: bool
+    low: Harmonics
+    high: Harmonics
+    threshold: float
+    is_error: bool
+    over: tuple[str, ...]
+    harmonics: tuple[int, ...]
+    first: Harmonics
+    auto: bool = False
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything is chosen: not with the same harmonics everywhere."""
+        return bool(np.isfinite(self.threshold))
+
+    @property
+    def indicator(self) -> str:
+        """What the indicator is called."""
+        return "predicted error" if self.is_error else "indicator"
+
+    @property
+    def limit(self) -> str:
+        """The threshold as text, in percent where it is one of an error."""
+        return f"{100 * self.threshold:g} %" if self.is_error else f"{self.threshold:g}"
+
+    def shown(self, indicator: float) -> str:
+        """Return a value of the indicator as text."""
+        if self.is_error:
+            return error_text(indicator)
+        return "beyond all bounds" if np.isinf(indicator) else f"{indicator:.3g}"
+
+    def attributes(self) -> dict[str, Any]:
+        """Return it as attributes of a netCDF file: texts, numbers, lists of numbers."""
+        own: dict[str, Any] = {
+            "selection": self.name,
+            "passages": "auto" if self.auto else "single" if self.single else "double",
+            "low_order": self.low[-1],
+            "high_order": self.high[-1],
+            "low_harmonics": list(self.low),
+            "high_harmonics": list(self.high),
+            "selection_threshold": self.threshold,
+            "indicator_name": self.indicator,
+            "error_over": listed(self.over),
+        }
+        # the name that results have had from the beginning
+        return own | ({"alert_threshold_percent": 100 * self.threshold} if self.is_error else {})
+
+    def lines(self, passages_asked: str) -> list[str]:
+        """Say what will be done, a line a thought.
+
+        Parameters
+        ----------
+        passages_asked
+            What the study says under ``passages``.
+        """
+        if not self.decides:
+            return [f"harmonics {named(self.first)} at every frequency ({self.name})"]
+        if self.auto:
+            of = ", ".join(map(str, self.harmonics))
+            most = f"up to {self.high[-1]}" + ("" if self.high[-1] >= RUNGS[-1] else ", which the study's [limits] set")
+            return [
+                (
+                    f"raised along the branch from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below "
+                    f"{self.limit}; audits at every tenth point and at the peak"
+                ),
+                f"its error is that of harmonic {of} over {listed(self.over)}",
+            ]
+        how = (
+            "single passage: each frequency is settled before the next one"
+            if self.single
+            else "double passage: the response with few harmonics first, then what needs more"
+        )
+        said = [
+            (
+                f"{self.name} chooses between harmonics {named(self.low)} and {named(self.high)}, "
+                f"{self.indicator} above {self.limit}; {how}"
+            )
+        ]
+        if self.is_error:
+            of = ", ".join(map(str, self.harmonics))
+            said.append(f"its error is that of harmonic {of} over {listed(self.over)}")
+        elif passages_asked == "double":
+            said.append(
+                f"{self.name} foretells the harmonics of the next frequency or raises them step by step, which needs a single "
+                'passage: passages = "double" and alert_threshold_percent are not used'
+            )
+        return said
+
+    def sentence(self, response: Response) -> str:
+        """Say at which frequencies of a case more harmonics were asked for, and why.
+
+        An alert was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
+        """
+        if not self.is_error or self.auto:
+            return f"{_kept(response)}{_audited(response)}."
+        passage = [p for p in response.solved if p.stage == "low"]
+        said = np.array([p.predicted_error for p in passage])
+        if np.all(np.isnan(said)):
+            return f"{self.name} was not asked."
+        worst, over = int(np.nanargmax(said)), said > self.threshold
+        if not np.any(over):
+            return (
+                f"no frequency needs more harmonics; the largest predicted error is {self.shown(said[worst])}, "
+                f"below the threshold of {self.limit}."
+            )
+        return (
+            f"{int(over.sum())} of {len(over)} points repeated with {_more(response, self)} harmonics, at "
+            f"{_listed(passage, over)} Hz, because leaving the higher harmonics out was predicted to change the response by "
+            f"more than {self.limit} (largest: {self.shown(said[worst])} at {passage[worst].omega / HZ:.2f} Hz)."
+        )
+
+
+def _audited(response: Response) -> str:
+    """Say on what the points rest: solved again, exact, or predicted."""
+    every = [a for a in response.accepted if a.point.converged]
+    again = [a.audit_error for a in every if not np.isnan(a.audit_error)]
+    rest = [a for a in every if np.isnan(a.audit_error)]
+    exact = sum(a.exact for a in rest)
+    alone = [a.own_error for a in rest if not a.exact and not np.isnan(a.own_error)]
+    told = []
+    if again:
+        told.append(
+            f"audits: {_points(len(again))} solved again with more harmonics, which changed the motion by at most "
+            f"{error_text(max(again))}"
+        )
+    if exact:
+        told.append(f"{_points(exact)} exact, as no force acts on the harmonics left out")
+    if alone:
+        told.append(f"{_points(len(alone))} judged by prediction alone, of at most {error_text(max(alone))}")
+    return "".join(f"; {text}" for text in told)
+
+
+def _points(n: int) -> str:
+    return f"{n} point{'s' * (n != 1)}"
+
+
+def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Chooser:
+    """Return how the harmonics of a sweep are chosen.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    over
+        Labels of the dofs over which an error is taken.
+    driven
+        Harmonics that the excitation drives: the error is taken of these where the sweep names none.
+    """
+    strategy = sweep.strategy
+    decides = always_kept(strategy) is None
+    return Chooser(
+        name=_name(strategy),
+        single=sweep.single,
+        low=sweep.low_harmonics,
+        high=sweep.high_harmonics,
+        threshold=float(strategy.threshold) if decides else float("nan"),
+        is_error=decides and strategy.verifies,
+        over=tuple(over),
+        harmonics=tuple(sweep.error_harmonics or driven),
+        first=sweep.first_harmonics,
+        auto=sweep.auto,
+    )
+
+
+def _name(strategy: Strategy) -> str:
+    """Return what a study file calls a strategy, of one of your own its class."""
+    own = type(strategy).__name__
+    return next((name for name, (_, known) in STRATEGIES.items() if known == own), own)
+
+
+def _more(response: Response, chooser: Chooser) -> str:
+    """Return the harmonics of the repeats as text."""
+    asked = {tuple(p.asked.tolist()) for p in response.solved if p.asked.size} or {chooser.high}
+    return named(chooser.high) if asked == {chooser.high} else "more"
+
+
+def _kept(response: Response) -> str:
+    """Say which harmonics were kept how often, the most frequent ones first."""
+    counts = Counter(named(a.point.harmonics) for a in response.accepted)
+    each = [f"H = {own} at {n}" for own, n in counts.most_common(NAMED)]
+    rest = sum(counts.values()) - sum(n for _, n in counts.most_common(NAMED))
+    also = f" and others at {rest}" if rest else ""
+    return f"harmonics kept: {'; '.join(each)}{also} of {len(response.accepted)} points"
+
+
+def _listed(points: Sequence[ForcedPoint], over: BoolArray) -> str:
+    """Return the ranges of neighbouring frequencies above the threshold as text."""
+    found: list[tuple[float, float]] = []
+    inside = False
+    for i in np.argsort([p.omega for p in points]):
+        hz = points[i].omega / HZ
+        if over[i]:
+            found = [*found[:-1], (found[-1][0], hz)] if inside else [*found, (hz, hz)]
+        inside = bool(over[i])
+    return ", ".join(f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}" for lo, hi in found)

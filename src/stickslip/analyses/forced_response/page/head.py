@@ -1,0 +1,167 @@
+"""The head of the page: four numbers of the forced response, and the doubts."""
+
+import numpy as np
+
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.report.cases import ShownCase
+from stickslip.report.quantities import NONE, amplitude, counted, number, percent, predicted, quantity, scale_for
+from stickslip.report.section import Card
+from stickslip.study.verdict import LEVELS, POINT_LEVELS
+
+
+def _peak_card(response: Response) -> Card:
+    cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
+    if not cases:
+        return Card(NONE, "peak", "no case has its peak yet")
+    within = [c for c in cases if response.resonates(c)]
+    peaks = np.array([response.peak_response(c) for c in within or cases])
+    least = min((response.trust(c) for c in within or cases), default=0)
+    counts = np.array([response.trust(c) == least for c in within or cases])
+    best = int(np.argmin(np.where(counts, peaks, np.inf)))
+    scale = scale_for(peaks[best : best + 1], response.unit)
+    size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
+    no_resonance = "the largest amplitude stands at the end of the sweep: no resonance"
+    if len(cases) == 1:
+        more = _whole(response, cases[0]) if response.per_force else ""
+        at = f"{response.peak_is(cases[0])}, at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
+        return Card(size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}")
+    if not within:
+        return Card(size, cases[best].label, f"in every case {no_resonance}")
+    left_out = len(cases) - len(within)
+    blade = response.blade_at_peak(within[best])
+    kind = counted(int(counts.sum()), "case")
+    if not counts.all():
+        kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
+    note = f"{response.peak_is(within[best])}, {response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz{_whole(response, within[best]) if response.per_force else ''}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    if within[best] in (response.cases[0], response.cases[-1]):
+        note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
+    lower = int(np.argmin(peaks))
+    if peaks[lower] < peaks[best]:
+        note += f"; {number(float(peaks[lower]) * scale.factor)} {scale.unit} is {response.level(within[lower])}{within[lower].where}"
+    if left_out:
+        note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
+    return Card(size, f"smallest peak of {kind}", note)
+
+
+def _whole(response: Response, case: ShownCase) -> str:
+    """Return the peak itself of a case whose response is over the force, as the terminal tells it."""
+    return f", {amplitude(response.peak_response(case) * case.excitation, response.length)}"
+
+
+def _shift_card(response: Response) -> Card | None:
+    within = [c for c in response.peaked if response.resonates(c)]
+    if len(within) < 2:
+        return None
+    first, last = within[0], within[-1]
+    a, b = response.peak_hz(first), response.peak_hz(last)
+    blades = [response.blade_at_peak(c) for c in (first, last)]
+    note = f"from {number(a, 5)} Hz{blades[0]}{first.where} to {number(b, 5)} Hz{blades[1]}{last.where}"
+    label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
+    return Card(f"{number(b - a)} Hz", label, note)
+
+
+def _damping_card(response: Response) -> Card | None:
+    """Return quality factor and equivalent damping ratio of the case that is shown first, and the range of all."""
+    ratios = {c: response.number_of("peak_damping", c) for c in response.peaked}
+    known = {c: z for c, z in ratios.items() if z > 0 and response.resonates(c)}
+    shown = next((c for c in known if c.index == response.chosen), None)
+    if shown is None:
+        return None
+    note = f"equivalent damping ratio {percent(100 * known[shown])}{shown.where}"
+    if response.level(shown):
+        note += f", {response.level(shown)}"
+    if len(known) > 1:
+        ends = [percent(100 * z) for z in (min(known.values()), max(known.values()))]
+        note += f"; {ends[0]} to {ends[1]} over {len(known)} cases"
+    return Card(number(0.5 / known[shown]), "quality factor at the peak", note)
+
+
+def _blade_card(response: Response) -> Card | None:
+    """Return the largest amplification of a wheel whose sectors differ, and of which blade."""
+    if not response.has("amplification", "largest_blade"):
+        return None
+    factors = {c: response.number_of("amplification", c) for c in response.peaked}
+    known = sorted((c for c in factors if np.isfinite(factors[c])), key=lambda c: factors[c])
+    if not known:
+        return None
+    told = [f"blade {int(response.number_of('largest_blade', c))}{c.where}" for c in (known[-1], known[0])]
+    note = f"largest: {told[0]}"
+    if len(known) > 1:
+        note += f"; smallest of {len(known)} cases {number(factors[known[0]])}, {told[1]}"
+    label = f"{'largest ' * (len(known) > 1)}amplification over the wheel with all sectors alike"
+    return Card(number(factors[known[-1]]), label, note)
+
+
+def _loss_card(response: Response) -> Card | None:
+    """Return what one case loses at its peak; several have their shift instead."""
+    if len(response.peaked) != 1 or not response.has("dissipated_energy"):
+        return None
+    own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
+    energy = float(np.nansum(own))
+    lost = quantity(energy if energy > 1e-12 else 0.0, "J")
+    return Card(lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together")
+
+
+def _alert_cards(response: Response) -> list[Card]:
+    """Return how often more harmonics were asked for, and how wrong few would have been."""
+    asked = response.alert
+    if not asked.error.size:
+        return []
+    above, at = int(np.sum(asked.error > response.threshold)), int(np.argmax(asked.error))
+    share = f"{number(100 * above / asked.error.size, 2)} %"
+    note = f"{above} of {counted(asked.error.size, 'checked point')} above {percent(response.threshold)}"
+    where = f"at {number(float(asked.hz[at]), 5)} Hz{response.cases[asked.case[at]].where}"
+    worst = predicted(float(asked.error[at]))
+    return [
+        Card(share, "of points asked for more harmonics", note),
+        Card(worst, f"worst predicted error with H = {response.low_name}", where),
+    ]
+
+
+def _work_cards(response: Response) -> list[Card]:
+    """Return how often more harmonics were kept, where anything chose, and what that cost."""
+    n, found = int(response.converged.sum()), []
+    if response.decides:
+        more = int(np.sum(response.more & response.converged))
+        note = f"{more} of {counted(n, 'accepted point')}, chosen by {response.selection}"
+        label = f"of points keep other harmonics than H = {response.low_name}"
+        found = [Card(f"{number(100 * more / n, 2)} %" if n else NONE, label, note)]
+    if response.has("unknowns_solved", "newton_steps"):
+        work, steps = (int(response.floats(w).sum()) for w in ("unknowns_solved", "newton_steps"))
+        note = f"of all solutions together, in {counted(steps, 'Newton step')}"
+        found.append(Card(number(work, 6), "unknowns solved", note))
+    return found
+
+
+def _verdict_card(response: Response) -> Card | None:
+    """Return how many cases are trusted, of one case its verdict; and how many points are not."""
+    levels = [response.level(c) for c in response.cases]
+    if not levels[0]:
+        return None
+    points = {level: int(np.sum(response.levels == k)) for k, level in enumerate(POINT_LEVELS) if k}
+    off = [f"{n} {level}" for level, n in points.items() if n]
+    note = f"of {counted(response.levels.size, 'point')} {', '.join(off) or 'none is doubtful'}"
+    if len(levels) == 1:
+        return Card(levels[0], "verdict on the case", note)
+    cases = {level: levels.count(level) for level in LEVELS[1:]}
+    others = [f"{n} {level}" for level, n in cases.items() if n]
+    return Card(
+        f"{levels.count('trusted')} of {len(levels)}",
+        "cases to be trusted",
+        "; ".join([*([", ".join(others)] if others else []), note]),
+    )
+
+
+def cards(response: Response) -> list[Card]:
+    """Return the numbers that sum the response up."""
+    first = (
+        _peak_card(response),
+        _damping_card(response),
+        _blade_card(response),
+        _verdict_card(response),
+        _shift_card(response),
+        _loss_card(response),
+    )
+    alert = response.is_error and response.decides and not response.auto
+    rest = _alert_cards if alert else _work_cards
+    return [card for card in first if card is not None] + rest(response)

@@ -1,0 +1,353 @@
+"""A forced response as figures and tables see it."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.stability.stable_words import said_of
+from stickslip.analyses.forced_response.summary import MEASURED
+from stickslip.analyses.forced_response.verdicts.curve import Curve, branch_length, of_largest_blade, peak_output
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.harmonic_set import named
+from stickslip.harmonic.selection import strategy_named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.strategies import STRATEGIES
+from stickslip.report.cases import ShownCase, cases_of, varied
+from stickslip.report.content import Table
+from stickslip.report.node import Node
+from stickslip.report.quantities import Scale, number, predicted, scale_for
+from stickslip.study.verdict import LEVELS
+
+NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
+_TURNS = (".rx", ".ry", ".rz")
+_BLADE = re.compile(r"\[\d+\]")  # of the label of an output
+
+
+@dataclass(frozen=True, eq=False)
+class Alert:
+    """The solutions about which the strategy was asked, one a frequency: the first one by an alert, else the accepted one."""
+
+    case: IntArray
+    hz: FloatArray
+    error: FloatArray  # percent, as predicted; of a strategy that predicts no error its indicator
+
+
+@dataclass(frozen=True, eq=False)
+class Response(Node):
+    """Accepted points of all cases; any variable but those of `NEEDED` may be missing."""
+
+    @cached_property
+    def cases(self) -> tuple[ShownCase, ...]:
+        """All cases, in the order of the study."""
+        return cases_of(self.data)
+
+    @property
+    def varied(self) -> str:
+        """The varied keys: heading of legends and columns."""
+        return varied(self.data)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the values of a variable as floats; NaN of the shape of ``point`` if it is missing."""
+        if name not in self.data:
+            return np.full(self.data.sizes["point"], np.nan)
+        return self.values(name)
+
+    def of_case(self, name: str, case: ShownCase, *dimensions: str) -> FloatArray:
+        """Return what a variable with the dimension ``case`` holds of one, its dimensions in the order named."""
+        found = self.data[name].isel(case=case.index)
+        return np.asarray(found.transpose(*dimensions).values, dtype=np.float64)
+
+    def number_of(self, name: str, case: ShownCase) -> float:
+        """Return the number that a variable along ``case`` holds of one; NaN where it is missing."""
+        return float(self.values(name)[case.index]) if name in self.data else float("nan")
+
+    @cached_property
+    def point_case(self) -> IntArray:
+        """(point,) the case of each point."""
+        return self.integers("point_case")
+
+    @cached_property
+    def hz(self) -> FloatArray:
+        """(point,) frequency of each point."""
+        return self.floats("frequency_hz")
+
+    @cached_property
+    def outputs(self) -> IntArray:
+        """(case,) position along ``output`` of the output whose peak counts in each case: that of the largest blade of a mistuned wheel."""
+        return np.array([peak_output(self.data, c.index) for c in self.cases])
+
+    @property
+    def mistuned(self) -> bool:
+        """Whether it is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+        return bool(self.peaked) and all(of_largest_blade(self.data, c.index) for c in self.peaked)
+
+    @property
+    def output_name(self) -> str:
+        """Label of the output whose peak counts; of a mistuned wheel with several cases it says of which blade."""
+        labels = self.labels("output")
+        own = labels[int(self.outputs[0])]
+        if not self.mistuned:
+            return own
+        if len(self.cases) == 1:
+            return f"{own}, the largest blade at the peak"
+        return f"{_BLADE.sub('', own)} of the blade that is largest at the peak of each case"
+
+    def blade_at_peak(self, case: ShownCase) -> str:
+        """Return `` (tip[7].y)`` of the peak of a case where the largest blade of a mistuned wheel counts, else nothing."""
+        return f" ({self.labels('output')[self.outputs[case.index]]})" if self.mistuned else ""
+
+    def at_outputs(self, values: FloatArray) -> FloatArray:
+        """Return of values (point, ..., output) those of the output whose peak counts in the case of each point."""
+        return np.asarray(values[np.arange(len(values)), ..., self.outputs[self.point_case]])
+
+    @property
+    def length(self) -> str:
+        """Unit of the output's motion."""
+        return "rad" if self.labels("output")[self.outputs[0]].endswith(_TURNS) else "m"
+
+    @property
+    def per_force(self) -> bool:
+        """Whether responses are divided by the excitation: where every case has one."""
+        return all(c.excitation > 0 for c in self.cases)
+
+    @property
+    def unit(self) -> str:
+        """Unit of `response`."""
+        return f"{self.length}/N" if self.per_force else self.length
+
+    @property
+    def quantity(self) -> str:
+        """What `response` is called on an axis."""
+        own = MEASURED.get(str(self.data.attrs.get("amplitude_of", "first")), "amplitude")
+        return f"{own} / force" if self.per_force else own
+
+    @cached_property
+    def converged(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the point was accepted: the flag that means ``converged``, else zero."""
+        attributes = self.data["status"].attrs
+        meanings = str(attributes.get("flag_meanings", "")).split()
+        values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
+        good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
+        return np.isin(self.integers("status"), good or [0])
+
+    @property
+    def of_sector(self) -> str:
+        """`` of one sector`` where one sector answers for a tuned wheel; else empty."""
+        tuned = int(self.data.attrs.get("sectors", 1)) > 1 and not self.has("amplification")
+        return " of one sector" if tuned else ""
+
+    @cached_property
+    def levels(self) -> IntArray:
+        """(point,) level of the verdict on each point; a result that tells none trusts what converged."""
+        if self.has("verdict"):
+            return self.integers("verdict")
+        return np.where(self.converged, 0, 2)
+
+    @cached_property
+    def unstable(self) -> npt.NDArray[np.bool_]:
+        """(point,) whether the motion of a point is known to be unstable."""
+        if not self.has("motion_stability"):
+            return np.zeros(self.hz.size, dtype=bool)
+        return np.asarray(self.integers("motion_stability") == MOTION["unstable"])
+
+    def peak_is(self, case: ShownCase) -> str:
+        """Return what is known of the stability of the peak of a case, in a word or two."""
+        return said_of(Curve(self.data, case.index).peak_stability)
+
+    def level(self, case: ShownCase) -> str:
+        """Level of the verdict on a case; empty where the result tells none."""
+        return LEVELS[int(self.number_of("case_verdict", case))] if self.has("case_verdict") else ""
+
+    def trust(self, case: ShownCase) -> int:
+        """Position of the verdict on a case among `LEVELS`: 0 where it is trusted, or the result tells none."""
+        return LEVELS.index(self.level(case)) if self.level(case) else 0
+
+    @cached_property
+    def alert(self) -> Alert:
+        """Where the strategy was asked; the accepted points that have an indicator where harmonics were raised, or the file does not say."""
+        if "alert_error_percent" in self.data and not self.auto:
+            found = (self.values(f"alert_{name}") for name in ("frequency_hz", "error_percent"))
+            return Alert(self.integers("alert_case"), *found)
+        first = "predicted_error_percent" if self.is_error else "indicator"
+        error = self.floats("own_error_percent" if self.auto else first)
+        at = np.flatnonzero(~np.isnan(error))
+        return Alert(self.point_case[at], self.hz[at], error[at])
+
+    @property
+    def selection(self) -> str:
+        """Name of the strategy."""
+        return self.text("selection", "jacobian_alert")
+
+    @property
+    def is_error(self) -> bool:
+        """Whether the strategy's indicator is the predicted error of a solution."""
+        return self.text("indicator_name", "predicted error") == "predicted error"
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything chose: not with the same harmonics at every frequency."""
+        known = self.selection in STRATEGIES
+        return not known or always_kept(strategy_named(self.selection)) is None
+
+    @property
+    def auto(self) -> bool:
+        """Whether harmonics were raised along the branch until each point's own error was small enough."""
+        return self.text("passages") == "auto"
+
+    @property
+    def threshold(self) -> float:
+        """Threshold of the strategy; in percent where it is one of an error."""
+        if self.is_error:
+            return self.scalar("alert_threshold_percent", 5.0)
+        return self.scalar("selection_threshold")
+
+    def shown(self, indicator: float) -> str:
+        """Write what `alert` holds: in percent where it is an error."""
+        if self.is_error:
+            return predicted(indicator)
+        return "beyond all bounds" if np.isinf(indicator) else number(indicator)
+
+    @property
+    def low_harmonics(self) -> IntArray:
+        """Harmonics of the first passage, from 0."""
+        return self._support("low", 1)
+
+    @property
+    def high_harmonics(self) -> IntArray:
+        """Harmonics of the reference, from 0."""
+        return self._support("high", 5)
+
+    def _support(self, which: str, default: int) -> IntArray:
+        given = self.numbers(f"{which}_harmonics")
+        full = np.arange(int(self.scalar(f"{which}_order", default)) + 1)
+        return (given if given.size else full).astype(np.int64)
+
+    @property
+    def low_name(self) -> str:
+        """Few harmonics as text: those of the first passage, but with ``always_high``."""
+        return named(self.low_harmonics)
+
+    @property
+    def first_name(self) -> str:
+        """Harmonics of the first passage as text."""
+        return self.high_name if self.selection == "always_high" else self.low_name
+
+    @property
+    def high_name(self) -> str:
+        """Harmonics of the reference as text."""
+        return named(self.high_harmonics)
+
+    @cached_property
+    def kept(self) -> IntArray:
+        """(point, harmonic) 1 where the solution keeps the harmonic."""
+        return self.values("harmonic_kept", "point", "harmonic").astype(np.int64)
+
+    @cached_property
+    def more(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the solution keeps harmonics that the first passage does not."""
+        own = np.isin(np.arange(self.kept.shape[1]), self.low_harmonics)
+        return np.asarray((self.kept[:, ~own] > 0).any(axis=1))
+
+    @property
+    def more_name(self) -> str:
+        """What such points keep, as text: the harmonics of the reference where it is all of them."""
+        some = self.kept[self.more]
+        own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
+        return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"
+
+    def response(self, name: str = "amplitude") -> FloatArray:
+        """(point,) amplitude of the report output, divided by the excitation where there is one."""
+        values = self.at_outputs(self.values(name, "point", "output"))
+        force = np.array([c.excitation for c in self.cases])[self.point_case]
+        return np.asarray(values / force) if self.per_force else values
+
+    @cached_property
+    def accepted(self) -> FloatArray:
+        """(point,) response, NaN where the point did not converge."""
+        return np.where(self.converged, self.response(), np.nan)
+
+    @property
+    def scale(self) -> Scale:
+        """Engineering unit of the accepted responses."""
+        return scale_for(self.accepted, self.unit)
+
+    def table(
+        self,
+        heading: str,
+        told: Sequence[str],
+        head: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        *,
+        numeric: bool = True,
+        items: Sequence[str] = (),
+        folded: str = "",
+    ) -> Table:
+        """Return a table whose first column names the case; without it where there is one case."""
+        first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
+        cells = [list(row)[first:] for row in rows]
+        return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
+
+    def points(self, case: ShownCase) -> IntArray:
+        """Points of a case in the order in which a curve joins them, the unconverged ones included.
+
+        A branch that folds back keeps its order and leaves out the peak refinements behind its end, whose place on it is
+        not stored; otherwise the order is that of frequency.
+        """
+        index = np.flatnonzero(self.point_case == case.index)
+        branch = index[: branch_length(self.floats("refinement")[index])]
+        along = np.diff(self.hz[branch])
+        if np.any(along > 0) and np.any(along < 0):
+            return branch
+        return index[np.argsort(self.hz[index], kind="stable")]
+
+    def peak(self, case: ShownCase) -> int:
+        """Position of the peak along ``point``; -1 if there is none."""
+        value = self.number_of("peak_point", case)
+        inside = np.isfinite(value) and 0 <= value < self.data.sizes["point"]
+        return int(value) if inside else -1
+
+    def peak_response(self, case: ShownCase) -> float:
+        """Response at the peak; NaN without a peak."""
+        return float(self.response()[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    def peak_hz(self, case: ShownCase) -> float:
+        """Frequency of the peak in Hz; NaN without a peak."""
+        return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    def resonates(self, case: ShownCase) -> bool:
+        """Whether the peak of a case is known and lies within its sweep: at the end of it the largest amplitude is no resonance."""
+        own = Curve(self.data, case.index)
+        known = self.peak(case) >= 0 and np.isfinite(self.peak_response(case))
+        return bool(known and not own.at_the_end and not own.outside)
+
+    @cached_property
+    def peaked(self) -> tuple[ShownCase, ...]:
+        """The cases that have a peak."""
+        return tuple(c for c in self.cases if self.peak(c) >= 0)
+
+    @property
+    def chosen(self) -> int:
+        """The case whose contacts are shown first: of those with the best verdict the one with the smallest peak of resonance; -1 for none."""
+        if not self.peaked:
+            return -1
+
+        def rank(case: ShownCase) -> tuple[int, bool, float]:
+            return self.trust(case), not self.resonates(case), self.peak_response(case)
+
+        return min(self.peaked, key=rank).index
+
+    @cached_property
+    def groups(self) -> dict[str, list[int]]:
+        """Contact points by the contact of the model that they belong to; by contact line in files which do not say."""
+        names = self.labels("contact")
+        if self.has("contact_group"):
+            names = tuple(f"{v}." for v in self.data["contact_group"].values)
+        found: dict[str, list[int]] = {}
+        for index, name in enumerate(names):
+            found.setdefault(name.partition(".")[0], []).append(index)
+        return found

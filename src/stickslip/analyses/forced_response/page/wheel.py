@@ -1,0 +1,241 @@
+"""Figures of a wheel whose sectors differ: every blade over frequency, its peak, the wheel at the peak, its waves, its statistics."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.analyses.forced_response.page.curves import abscissa
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.bounds import BOUND
+from stickslip.arrays import FloatArray
+from stickslip.report.cases import ShownCase
+from stickslip.report.plot import GRID, INK, MUTED, Plot, colour, legend_above, log_ticks, styled
+from stickslip.report.quantities import number, percent, scale_for
+
+GAP = "gap in m"  # at the end of the name of a deviation that is no relative one
+MIN_HISTOGRAM_CASES = 5  # cases from which on their amplifications make a histogram
+BLADE = "rgba(0, 114, 178, 0.25)"
+
+
+def mistuned(response: Response) -> bool:
+    """Whether the result is of a wheel whose sectors differ."""
+    return response.has("blade_peak_amplitude") and bool(response.peaked)
+
+
+def blades(response: Response) -> Plot | None:
+    """Draw the amplitude of every blade over frequency, the largest one, and the wheel with all sectors alike."""
+    if not mistuned(response):
+        return None
+    count = response.data.sizes["blade"]
+    own = response.data.sizes["output"] // count
+    size = response.values("amplitude", "point", "output")[:, response.outputs[0] % own :: own]
+    size = np.where(response.converged[:, None], size, np.nan)
+    scale = scale_for(size, response.length)
+    x, name, unit = abscissa(response)
+    figure, said = go.Figure(), {}
+    for case in response.peaked:
+        at = response.points(case)
+        at = at[np.argsort(x[at], kind="stable")]
+        gaps = np.full((count, 1), np.nan)
+        every = np.hstack([size[at].T, gaps]).ravel() * scale.factor
+        figure.add_scatter(
+            x=np.tile(np.append(x[at], np.nan), count),
+            y=every,
+            mode="lines",
+            name="each blade",
+            line={"color": BLADE, "width": 1},
+            hoverinfo="skip",
+            meta=case.index,
+        )
+        figure.add_scatter(
+            x=x[at],
+            y=np.nanmax(size[at], axis=1) * scale.factor,
+            mode="lines",
+            name="largest blade",
+            line={"color": INK, "width": 2.2},
+            meta=case.index,
+            customdata=np.nanargmax(np.nan_to_num(size[at], nan=-1.0), axis=1),
+            hovertemplate=f"%{{x:.2f}} {unit}: blade %{{customdata}}, %{{y:.4g}} {scale.unit}<extra></extra>",
+        )
+        tuned = np.flatnonzero(response.integers("tuned_case") == case.index)
+        hertz, flat = (response.floats(f"tuned_{n}")[tuned] for n in ("frequency_hz", "amplitude"))
+        order = np.argsort(hertz, kind="stable")
+        figure.add_scatter(
+            x=hertz[order] * _per_hz(response, x),
+            y=flat[order] * scale.factor,
+            mode="lines",
+            name="all sectors alike",
+            line={"color": colour(1), "width": 2, "dash": "dash"},
+            meta=case.index,
+        )
+        said[case.index] = _amplified(response, case)
+    styled(figure, 460)
+    legend_above(figure)
+    figure.update_xaxes(title_text=f"{name} ({unit})")
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor))
+    text = f"Amplitude of every blade ({count} of them), the largest one at each frequency, and the wheel with all sectors alike."
+    return Plot("blades", "Every blade of the wheel", text, figure, said, response.chosen)
+
+
+def _per_hz(response: Response, x: FloatArray) -> float:
+    """Return what the frequencies of a figure are times to be its abscissa."""
+    known = np.isfinite(x) & (response.hz > 0)
+    return float(x[known][0] / response.hz[known][0]) if known.any() else 1.0
+
+
+def _amplified(response: Response, case: ShownCase) -> str:
+    factor, bound = (response.number_of(n, case) for n in ("amplification", "whitehead"))
+    blade = int(response.number_of("largest_blade", case))
+    return (
+        f"Largest: blade {blade}. Amplification {number(factor, 4)} over the wheel with all sectors alike. {BOUND} "
+        f"is {number(bound, 3)}."
+    )
+
+
+def peaks_of_blades(response: Response) -> Plot | None:
+    """Draw each blade's own peak and what it deviates by."""
+    if not mistuned(response):
+        return None
+    size = response.values("blade_peak_amplitude", "case", "blade")
+    scale = scale_for(size, response.length)
+    names = response.labels("mistuned") if response.has("deviation") else []
+    rows = 1 + len(names)
+    figure = make_subplots(rows, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[2.0, *[1.0] * len(names)])
+    numbers = np.arange(size.shape[1])
+    for case in response.peaked:
+        own = size[case.index] * scale.factor
+        flat = response.number_of("tuned_peak_amplitude", case) * scale.factor
+        hertz = response.values("blade_peak_hz", "case", "blade")[case.index]
+        figure.add_bar(
+            x=numbers,
+            y=own,
+            name="peak of each blade",
+            marker_color=colour(0),
+            meta=case.index,
+            customdata=hertz,
+            hovertemplate=f"blade %{{x}}: %{{y:.4g}} {scale.unit} at %{{customdata:.2f}} Hz<extra></extra>",
+            row=1,
+            col=1,
+        )
+        figure.add_scatter(
+            x=[-0.5, numbers[-1] + 0.5],
+            y=[flat, flat],
+            mode="lines",
+            name="all sectors alike",
+            line={"color": colour(1), "dash": "dash"},
+            meta=case.index,
+            row=1,
+            col=1,
+        )
+        for k, name in enumerate(names):
+            values = response.values("deviation", "case", "blade", "mistuned")[case.index, :, k]
+            factor = 1e6 if name.endswith(GAP) else 100
+            figure.add_bar(
+                x=numbers,
+                y=factor * values,
+                name=name,
+                marker_color=colour(2 + k),
+                meta=case.index,
+                showlegend=False,
+                row=2 + k,
+                col=1,
+            )
+    styled(figure, 340 + 130 * len(names))
+    legend_above(figure)
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", row=1)
+    for k, name in enumerate(names):
+        unit = "µm" if name.endswith(GAP) else "%"
+        figure.update_yaxes(title_text=f"{name.removesuffix(', ' + GAP)} ({unit})", row=2 + k)
+    figure.update_xaxes(title_text="blade", row=rows)
+    text = "Largest amplitude of each blade at any frequency" + (", and what it deviates by." if names else ".")
+    said = {c.index: _amplified(response, c) for c in response.peaked}
+    return Plot("blade_peaks", "Peak of each blade", text, figure, said, response.chosen)
+
+
+def wheel_at_peak(response: Response) -> Plot | None:
+    """Draw all blades at the peak, as a polar plot of amplitudes at two instants, and the waves that they make."""
+    if not mistuned(response):
+        return None
+    parts = response.values("blade_motion", "case", "blade", "part")
+    motion = parts[..., 0] + 1j * parts[..., 1]
+    waves = response.values("wave_amplitude", "case", "wave")
+    scale = scale_for(np.abs(motion), response.length)
+    figure = make_subplots(
+        1, 2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.5, 0.5], horizontal_spacing=0.14
+    )
+    said = {}
+    count = motion.shape[1]
+    angle = 360.0 * np.arange(count + 1) / count
+    for case in response.peaked:
+        own = motion[case.index]
+        closed = np.append(own, own[0])
+        figure.add_scatterpolar(
+            r=np.abs(closed) * scale.factor,
+            theta=angle,
+            mode="lines+markers",
+            name="amplitude",
+            fill="toself",
+            line={"color": colour(0)},
+            meta=case.index,
+            row=1,
+            col=1,
+        )
+        top = own[int(np.argmax(np.abs(own)))]
+        instant = np.real(closed * np.conj(top) / abs(top)) * scale.factor if abs(top) else 0 * angle
+        figure.add_scatterpolar(
+            r=np.abs(instant),
+            theta=angle,
+            mode="markers",
+            name="at the instant of the largest blade",
+            marker={"color": [colour(1) if v >= 0 else MUTED for v in instant], "size": 7},
+            meta=case.index,
+            row=1,
+            col=1,
+        )
+        figure.add_bar(
+            x=np.arange(count),
+            y=waves[case.index] * scale.factor,
+            name="waves",
+            marker_color=colour(0),
+            meta=case.index,
+            customdata=np.minimum(np.arange(count), count - np.arange(count)),
+            showlegend=False,
+            hovertemplate=f"wave %{{x}} ({{%{{customdata}}}} nodal diameters): %{{y:.4g}} {scale.unit}<extra></extra>",
+            row=1,
+            col=2,
+        )
+        share = waves[case.index] ** 2
+        main = int(np.argmax(share))
+        said[case.index] = (
+            f"Wave {main} ({min(main, count - main)} nodal diameters) carries {percent(100 * float(share[main] / share.sum()))} of the sum of "
+            f"squares; localisation factor {number(response.number_of('localisation', case), 3)} (0: all alike, 1: one blade alone)."
+        )
+    styled(figure, 460)
+    legend_above(figure)
+    figure.update_polars(
+        radialaxis={"gridcolor": GRID, "angle": 90, "ticksuffix": f" {scale.unit}", "nticks": 4},
+        angularaxis={"gridcolor": GRID, "direction": "counterclockwise"},
+    )
+    figure.update_xaxes(title_text="wave number", col=2)
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", col=2)
+    text = "All blades at the peak, the lowest harmonic that is driven. Left: amplitudes around the wheel. Right: the waves they are the sum of."
+    return Plot("wheel", "The wheel at the peak", text, figure, said, response.chosen)
+
+
+def statistics(response: Response) -> Plot | None:
+    """Draw how often which amplification occurs, where there are enough cases, as of several seeds."""
+    if not mistuned(response) or len(response.peaked) < MIN_HISTOGRAM_CASES:
+        return None
+    factors = np.array([response.number_of("amplification", case) for case in response.peaked])
+    bound = response.number_of("whitehead", response.peaked[0])
+    figure = go.Figure()
+    figure.add_histogram(x=factors, marker_color=colour(0), name="cases")
+    styled(figure, 380)
+    figure.update_xaxes(title_text="amplification")
+    figure.update_yaxes(title_text="cases")
+    at = np.quantile(factors, [0.5, 0.95])
+    text = (
+        f"Amplification in {factors.size} cases: mean {number(float(factors.mean()), 4)}, median {number(float(at[0]), 4)}, 95 % below "
+        f"{number(float(at[1]), 4)}, largest {number(float(factors.max()), 4)}. {BOUND} is {number(bound, 3)}."
+    )
+    return Plot("amplifications", "Amplification over all cases", text, figure)

@@ -1,0 +1,166 @@
+"""Verdicts that need the model, put down by the job, and the warnings of ``stickslip check``."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Response
+from stickslip.model.dofs import ROTATIONS
+from stickslip.response.free_motion import drift
+from stickslip.study.verdict import Verdict, doubt
+from stickslip.units import HZ, RPM
+
+COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
+RIGID = 5e-3  # Hz that are printed as zero
+LISTED = 5  # natural frequencies that a line names
+
+
+def known(question: Question, response: Response, shift: tuple[float, float]) -> tuple[Verdict, ...]:
+    """Return the verdicts on a whole case that its numbers alone do not tell, without the case's label.
+
+    Parameters
+    ----------
+    question, response
+        The case.
+    shift
+        What `peak_shift` found.
+    """
+    return (
+        *(doubt(text) for text in doubts_of_model(question)),
+        *(mixed_places(question.model.error_labels) if question.sweep.relative_to == "each" else ()),
+        *nothing_pressed(question),
+        *off_engine_order(question),
+        *_of_drift(question, response),
+        *_of_retention(question, response, shift),
+    )
+
+
+def doubts_of_model(question: Question) -> list[str]:
+    """Return what the assembled model warns of; of modes that the reduction misses those that the load can reach."""
+    known = question.model.frequencies
+    reach = question.driven[-1] * max(question.sweep.omega_range) / HZ
+    others = set(known.warnings())
+    return [t for t in question.model.warnings if t not in others] + known.warnings(reach)
+
+
+def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
+    """Doubt where an error is taken over rotations and displacements together."""
+    rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
+    others = [label for label in labels if label not in rotations]
+    if not rotations or not others:
+        return ()
+    why = (
+        f"harmonics.alert_over mixes rotations ({', '.join(rotations)}) with displacements ({', '.join(others)}): dofs that move "
+        "less than a thousandth of the largest are left out, and here radians are held against metres"
+    )
+    return (Verdict("doubtful", why=why, remedy="Name one kind only."),)
+
+
+def inside(question: Question) -> list[str]:
+    """Return the natural frequencies beside the range of the sweep, and the normal forces at rest."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    known, normal = question.model.frequencies, -question.model.static_force[:, 2]
+    told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
+    times, highest = question.driven[0], question.driven[0] * highest
+    if times > 1:
+        told.append(f"{question.driven_names[0]}, whose frequencies follow, acts at {times} times these frequencies")
+    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
+        rigid = int(np.count_nonzero(hertz < RIGID))
+        near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
+        near = [f"{rigid} of rigid motions"] * bool(rigid) + near
+        beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
+        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)
+    if np.any(normal):
+        pressed = np.count_nonzero(normal > 0)
+        told.append(
+            f"static equilibrium: {pressed} of {normal.size} contact points are pressed, normal forces up to {normal.max():.3g} N"
+        )
+    return told
+
+
+def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
+    """Doubt where friction under a normal force finds none in the static state."""
+    laws, normal = question.model.contacts.laws, -question.model.static_force[:, 2]
+    rubs = np.array([law in COULOMB for law in laws], dtype=bool)
+    if not rubs.any() or np.any(normal[rubs] > 0):
+        return ()
+    why = (
+        f"all {np.count_nonzero(rubs)} contact points with friction are open in the static state: they act only where the vibration "
+        "closes them"
+    )
+    remedy = "Check gaps, preloads, static loads and the direction in which the speed moves the surfaces."
+    return (Verdict("doubtful", why=why, remedy=remedy),)
+
+
+def off_engine_order(question: Question) -> tuple[Verdict, ...]:
+    """Note where an engine order at the speed of rotation excites outside the range of frequencies."""
+    rpm, order = question.rpm, question.model.engine_order
+    if question.over_speed or not order or not rpm:
+        return ()
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    own = order * rpm * RPM / HZ
+    if lowest <= own <= highest:
+        return ()
+    names = " and ".join(question.driven_names)
+    harmonics = question.driven
+    excited = " and ".join(f"{h * own:.6g}" for h in harmonics)
+    ranges = " and ".join(f"{h * lowest:.6g} to {h * highest:.6g} Hz" for h in harmonics)
+    speeds = " to ".join(f"{f * HZ / RPM / order:.0f}" for f in (lowest, highest))
+    why = (
+        f"at {rpm:.6g} rpm {names} excite{'s' * (len(harmonics) == 1)} at {excited} Hz, outside {ranges}: the response is that of the "
+        f"wheel at {rpm:.6g} rpm shaken at another frequency"
+    )
+    remedy = (
+        f'over = "speed" goes along the engine order\'s line, which passes this range at {speeds} rpm; give rotation.speed_rpm the '
+        "speed where [campbell] finds them crossing."
+    )
+    return (Verdict("trusted", why=why, remedy=remedy),)
+
+
+def no_resonance(question: Question) -> tuple[Verdict, ...]:
+    """Doubt where no natural frequency, contacts open or stuck, lies in the range of the sweep."""
+    if len(question.driven) > 1:  # known are the frequencies of one harmonic
+        return ()
+    lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
+    known = question.model.frequencies
+    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    if not every.size or np.any((every >= lowest) & (every <= highest)):
+        return ()
+    near = float(every[np.argmin(np.maximum(lowest - every, every - highest))])
+    why = (
+        f"no natural frequency lies between {lowest:.2f} and {highest:.2f} Hz, neither with open nor with stuck contacts; the "
+        f"nearest one is {near:.2f} Hz"
+    )
+    return (Verdict("doubtful", why=why, remedy=f"Widen forced_response.{question.key}."),)
+
+
+def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:
+    """Doubt where friction leaves the mean position of a body free."""
+    chosen = [a.point for a in response.accepted if not a.point.converged]
+    if response.top is not None:
+        chosen = [response.top.point, *chosen]
+    for point in chosen:
+        found = drift(question.problem, point)
+        if found.undetermined:
+            why = (
+                f"at {point.omega / HZ:.2f} Hz every contact slips or opens in each cycle, the mean position of {found.coordinate} "
+                "is undetermined and the body may drift"
+            )
+            remedy = (
+                "Give [retention] a small stiffness_n_per_m (1e-6 of the contact stiffness); the result then says how far it "
+                "moves the peak. A part that is no rigid body needs a weak spring to the ground."
+            )
+            yield Verdict("doubtful", why=why, remedy=remedy)
+            return
+
+
+def _of_retention(question: Question, response: Response, shift: tuple[float, float]) -> Iterator[Verdict]:
+    if question.model.retention > 0.0 and response.top is not None and math.isnan(shift[0]):
+        why = (
+            "no periodic motion was found at the peak with a tenth of the retention stiffness; the peak rests on the body being "
+            "held"
+        )
+        remedy = "Do not rely on it: find what holds the body, or give it a contact that does."
+        yield Verdict("doubtful", why=why, remedy=remedy)

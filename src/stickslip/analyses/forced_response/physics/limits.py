@@ -1,0 +1,251 @@
+"""Physical limits of a case: undamped modes, parts held by contacts alone, the most that friction can do."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Accepted, Response
+from stickslip.analyses.forced_response.records.values import Values
+from stickslip.errors import InputError
+from stickslip.response.physics.damper import DampedMode, damped_modes
+from stickslip.response.physics.friction import Friction, friction_of
+from stickslip.response.physics.modes import UNDAMPED_RATIO, Range, RangeMode, range_modes, springs_of
+from stickslip.response.recovery import damped_share, equivalent_damping, signals
+from stickslip.response.static_contact_state import pressed_by
+from stickslip.study.verdict import Verdict, to_json
+from stickslip.units import HZ
+
+PHYSICS = "physics"  # the note of a job
+BESIDE = 0.01  # of a frequency: a resonance stands so near to the mode that it belongs to
+# half the range of a normal force over its mean above which the estimate of what friction can do does not hold
+STEADY = 0.5
+NAMED_MODES = 3  # that a sentence lists
+GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
+
+
+@dataclass(frozen=True, eq=False)
+class Physics:
+    """What is known of the modes of a case without solving its response.
+
+    Parameters
+    ----------
+    stuck, sliding
+        Modes that the load passes within the range, with contacts that stick, and that slide freely where they can.
+    friction
+        Of the contacts under the static loads.
+    damped
+        What friction can do to each mode.
+    """
+
+    stuck: tuple[RangeMode, ...]
+    sliding: tuple[RangeMode, ...]
+    friction: Friction
+    damped: tuple[DampedMode, ...]
+
+    @property
+    def undamped(self) -> list[RangeMode]:
+        """Modes that the load drives and nothing damps while contacts stick."""
+        return [m for m in self.stuck if m.undamped]
+
+    @property
+    def unbounded(self) -> list[tuple[RangeMode, float]]:
+        """Modes without damping whose load is more than friction can bound, and how many times."""
+        each = [(m, m.excess(self.friction)) for m in self.sliding if m.undamped]
+        return [(m, excess) for m, excess in each if 1.0 < excess < np.inf]
+
+    @property
+    def driven(self) -> RangeMode | None:
+        """The mode whose linear resonance is largest with contacts stuck; None where the load drives none in the range."""
+        known = [m for m in self.stuck if m.force > 0.0]
+        return max(known, key=lambda m: m.resonance) if known else None
+
+    def ends(self, mode: RangeMode) -> float:
+        """Return the frequency that friction leads a mode to, rad/s: its own where there is none."""
+        near = [d for d in self.damped if abs(d.stuck - mode.omega) <= 1e-6 * mode.omega]
+        return near[0].ends if near else mode.omega
+
+
+def physics_of(question: Question) -> Physics | None:
+    """Return what is known of the modes of a case; None without a reduction, or where aerodynamic coefficients end within the range.
+
+    A wheel whose sectors differ is looked at with all of them alike.
+    """
+    model = question.model if question.model.blades is None else question.model.blades.tuned
+    system, load = model.system, model.load
+    if not system.structure.reduced or not system.interface.n_contacts:
+        return None
+    within = Range(*sorted(question.sweep.omega_range))
+    friction = friction_of(system.springs, model.static_gap, model.static_force)
+    holds = pressed_by(system.springs.laws, model.static_force)
+    stuck, sliding = springs_of(system, holds), springs_of(system, holds, friction.slips)
+    try:
+        modes = [tuple(range_modes(system, load, within, own)) for own in (stuck, sliding)]
+        harmonics = sorted(h for h, force in load.harmonics.items() if h and np.any(force))
+        damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
+    except InputError:  # a table of aerodynamic coefficients that does not reach so far
+        return None
+    return Physics(modes[0], modes[1], friction, tuple(damped))
+
+
+def beforehand(physics: Physics) -> Iterator[Verdict]:
+    """Yield what ``stickslip check`` says of a case that is not solved yet.
+
+    Parameters
+    ----------
+    physics
+        Of its modes.
+    """
+    if physics.undamped:
+        slip = "only slip bounds it" if physics.friction.any else "nothing bounds it"
+        why = f"nothing damps {_modes(physics.undamped)} while contacts stick: {slip}, and a peak where nothing slips has no finite value"
+        yield Verdict("doubtful", why=why, remedy=GIVE_DAMPING)
+    yield from _of_bounds(physics)
+    yield from _of_bodies(physics)
+    yield from _of_dampers(physics)
+
+
+def driven_line(physics: Physics) -> list[str]:
+    """Say which mode in the range counts: the one that the load drives most with the contacts stuck that are pressed."""
+    top = physics.driven
+    if top is None:
+        return []
+    others = [m for m in physics.stuck if m.force > 0.0 and m is not top]
+    beside = f"; it drives {_modes(others)} less" if others else ""
+    return [
+        f"the load drives the mode at {top.hz:.2f} Hz most (pressed contacts stuck): the resonance while nothing slips{beside}"
+    ]
+
+
+def afterwards(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
+    """Yield the verdicts on a solved case: by the balance of energy at its peak, and by what needs no response.
+
+    Parameters
+    ----------
+    question, physics
+        The case and its modes.
+    response
+        Of the case.
+    """
+    yield from _of_energy(question, physics, response)
+    yield from _of_bounds(physics)
+    yield from _of_bodies(physics)
+    yield from _of_dampers(physics, _loads_move(question, response), response.peak_hz)
+
+
+def of_physics(question: Question, response: Response) -> Values:
+    """Return the values that a job puts down of the physics of its case."""
+    physics = physics_of(question)
+    told = () if physics is None else afterwards(question, physics, response)
+    return {"physics_verdicts": to_json(told)}
+
+
+def _of_energy(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
+    """Yield a verdict where a mode without damping has its resonance and nothing takes energy there."""
+    top = response.top
+    if top is None or not physics.undamped:
+        return
+    known = _damping(question, top)
+    if known < UNDAMPED_RATIO and _decided_by_damping(question, top):
+        why = (
+            f"nothing damps {_modes(physics.undamped)} while contacts stick, and at the peak nothing slips enough to (equivalent damping "
+            f"{_plain(known)} of critical): the peak has no finite value, the number tells how near to it a frequency was solved"
+        )
+        yield Verdict("doubtful" if question.sweep.grid.size else "wrong", why=why, remedy=GIVE_DAMPING)
+        return
+    for mode in physics.undamped:
+        low, high = sorted((physics.ends(mode), mode.omega))
+        low, high = low * (1 - BESIDE), high * (1 + BESIDE)
+        near = [a for a in response.accepted if a.fields and low <= a.point.omega <= high]
+        if not near:
+            continue
+        most = max(near, key=response.amplitude)
+        # a branch that was followed passes no resonance unseen, one that contacts stiffen or soften is finite there
+        missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
+        if missed and _damping(question, most) < UNDAMPED_RATIO:
+            why = f"nothing damps the mode at {mode.hz:.2f} Hz while contacts stick, and nothing slips where it was solved: a larger peak may stand there"
+            remedy = f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
+            yield Verdict("doubtful", why=why, remedy=remedy)
+
+
+def _damping(question: Question, accepted: Accepted) -> float:
+    return equivalent_damping(question.problem, accepted.point)
+
+
+def _decided_by_damping(question: Question, accepted: Accepted) -> bool:
+    """Whether the damping that counts as none would change a motion by more than the threshold: else stiffness and inertia decide its size."""
+    share = damped_share(question.problem, accepted.point, UNDAMPED_RATIO)
+    return not share <= question.limit
+
+
+def _of_bounds(physics: Physics) -> Iterator[Verdict]:
+    """Yield a verdict where the load is more than friction can take."""
+    if physics.unbounded:
+        mode, excess = max(physics.unbounded, key=lambda own: own[1])
+        why = (
+            f"nothing bounds the resonance at {mode.hz:.2f} Hz (contacts sliding): the mode has no damping, and the load on it is {_plain(excess)} "
+            "times what friction bounds, 4/π of its limit"
+        )
+        yield Verdict("wrong", why=why, remedy=f"{GIVE_DAMPING} Or raise the friction.")
+
+
+def _of_bodies(physics: Physics) -> Iterator[Verdict]:
+    """Yield a verdict where a part alone vibrates on the springs of its contacts within the range."""
+    every = [m for m in physics.stuck if m.on_contacts]
+    if every:
+        mode = every[0]
+        why = (
+            f"the mode at {mode.hz:.2f} Hz is {mode.part} alone on the springs of its contacts ({100 * mode.kinetic:.4g} % of the kinetic and "
+            f"{100 * mode.strain:.4g} % of the strain energy): contacts are far stiffer and such bodies far lighter, as a rule"
+        )
+        remedy = f"Check the units of the contact stiffnesses and of the mass of {mode.part}: one of them may be a thousand times off."
+        yield Verdict("doubtful", why=why, remedy=remedy)
+
+
+def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> Iterator[Verdict]:
+    """Yield the note on what friction can do to the modes, of a peak to the mode that it belongs to, or why there is no estimate."""
+    if not physics.damped:
+        return
+    if moving:
+        why = f"what friction can do was not estimated: {moving}"
+        yield Verdict("trusted", why=why, remedy="stickslip check has the estimate for steady ones.")
+        return
+    shown = physics.damped[:NAMED_MODES]
+    if np.isfinite(peak_hz):
+        shown = (min(physics.damped, key=lambda d: d.apart(peak_hz * HZ)),)
+    told = "; ".join(str(d) for d in shown)
+    why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for steady normal loads and one slip ratio of all contacts"
+    yield Verdict("trusted", why=why, remedy="That is at one amplitude: smaller and larger motions are damped less.")
+
+
+def _loads_move(question: Question, response: Response) -> str:
+    """Return why normal loads at the peak are not steady enough for an estimate; empty where they are."""
+    if response.top is None:
+        return "there is no peak"
+    laws = question.model.system.springs.laws
+    follows = np.array([hasattr(law, "mu") for law in laws], dtype=bool)
+    if not follows.any():
+        return ""
+    normal = -signals(question.problem, response.top.point).force[follows, 2]
+    mean = normal.mean(axis=1)
+    pressed = normal[mean > 0.0]
+    if not len(pressed):
+        return "no contact is pressed at the peak"
+    swing = 0.5 * (pressed.max(axis=1) - pressed.min(axis=1)) / pressed.mean(axis=1)
+    opened = np.any(pressed <= 0.0, axis=1)
+    if opened.any():
+        return f"{opened.sum()} of {len(pressed)} contact points open at the peak"
+    most = float(np.average(swing, weights=pressed.mean(axis=1)))
+    return f"normal forces at the peak swing by {100 * most:.0f} % of their mean" if most > STEADY else ""
+
+
+def _modes(every: list[RangeMode]) -> str:
+    """Name modes by their frequencies."""
+    named = ", ".join(f"{m.hz:.2f}" for m in every[:NAMED_MODES])
+    more = f" and {len(every) - NAMED_MODES} more" if len(every) > NAMED_MODES else ""
+    return f"the mode{'s' * (len(every) > 1)} at {named} Hz{more}"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.2g}" if abs(value) > 1e-12 else "0"

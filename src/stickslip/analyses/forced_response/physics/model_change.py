@@ -1,0 +1,129 @@
+"""Sensitivity of a peak to the reduction, the contact points and the contact stiffness: each is changed, and the peak solved again."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Response
+from stickslip.analyses.forced_response.records.values import Values
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced.resonance import peak_from
+from stickslip.response.forced.response import (
+    ForcedPoint,
+    ForcedProblem,
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
+from stickslip.response.physics.contact_stiffness import stiffness_slope
+from stickslip.response.physics.fewer_points import halved
+from stickslip.response.system import System
+from stickslip.solve.newton_method import newton
+from stickslip.units import HZ
+
+Change = tuple[float, float]  # relative change of the amplitude, change of the frequency in Hz
+Found = tuple[ForcedProblem, ForcedPoint] | None
+UNKNOWN: Change = (float("nan"), float("nan"))
+BESIDE = 0.03  # half the width of a sweep about a peak, relative to its frequency,
+SWEPT_POINTS = 12  # and its points
+PEAK_POINTS = 4  # that resolve a peak found again
+AT_AN_END = 1e-9  # relative distance from an end of the sweep: no resonance, compared at its own frequency
+
+
+def model_changes(question: Question, response: Response) -> Values:
+    """Return by how much the peak changes with half again as many modes, and with half the points of meshed contacts; NaN where that says nothing."""
+    more = fewer = UNKNOWN
+    left_out = 0
+    richer, coarser = _richer(question), _coarser(question)
+    top, model = response.top, question.model
+    if top is not None and top.point.converged and (richer or coarser):
+        own = _found(question, model.system, model.load, top.point)
+        if richer is not None:
+            more = _change(response, own, _found(question, *richer, top.point))
+        if coarser is not None:
+            system, left_out = coarser
+            stays = np.isin(model.system.retained, system.retained)
+            point = replace(top.point, coefficients=top.point.coefficients[:, stays])
+            fewer = _change(response, own, _found(question, system, model.load, point))
+    return {
+        "modes_peak_change": more[0],
+        "modes_frequency_change_hz": more[1],
+        "points_peak_change": fewer[0],
+        "points_frequency_change_hz": fewer[1],
+        "points_left_out": left_out,
+    }
+
+
+def stiffness_changes(question: Question, response: Response) -> Values:
+    """Return by how much the peak changes with the stiffness of all contacts; NaN where that is not known."""
+    top, slope = response.top, None
+    if top is not None and top.point.converged:
+        resonance = _at_resonance(question, top.point)
+        slope = stiffness_slope(question.problem, top.point, response.output, resonance=resonance)
+    unknown = float("nan")
+    return {
+        "stiffness_peak_slope": unknown if slope is None else slope.amplitude,
+        "stiffness_frequency_slope_hz": unknown if slope is None else slope.omega / HZ,
+    }
+
+
+def _at_resonance(question: Question, point: ForcedPoint) -> bool:
+    """Whether a peak was resolved there: no frequencies are listed, and it is no end of the sweep."""
+    ends = np.array(question.sweep.omega_range)
+    return not (np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) or question.sweep.grid.size)
+
+
+def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
+    """Return the model with more modes, its sliders where those of the model are; None where there is none on the same coordinates."""
+    own = question.model.system
+    if question.richer is None or question.richer[0].retained_labels != own.retained_labels:
+        return None
+    system, load = question.richer
+    interface = replace(system.interface, laws=own.interface.laws)
+    return replace(system, interface=interface), load
+
+
+def _coarser(question: Question) -> tuple[System, int] | None:
+    """Return the model with half the points of meshed contacts, and how many are left out."""
+    model, table = question.model, question.model.contacts
+    if model.blades is not None or not model.system.structure.reduced or model.system.interface.rigid:
+        return None
+    return halved(model.system, table.groups, table.position, table.area)
+
+
+def _change(response: Response, own: Found, other: Found) -> Change:
+    """Return how a peak differs from the model's own, found in the same way; NaN where one is not found."""
+    if own is None or other is None:
+        return UNKNOWN
+    before, after = (problem.amplitude(point, response.output) for problem, point in (own, other))
+    return after / before - 1.0, (other[1].omega - own[1].omega) / HZ
+
+
+def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> ForcedPoint | None:
+    """Find a peak by a short sweep, where the solution at a point does not lead to that of another model; None where it is an end of that."""
+    around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
+    short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
+    problem = forced_problem(system, load, short)
+    found = [p for p in accepted_points(list(forced_response(system, load, short))) if p.converged]
+    top = max(found, key=problem.amplitude, default=None)
+    inside = top is not None and min(p.omega for p in found) < top.omega < max(p.omega for p in found)
+    return top if inside else None
+
+
+def _found(question: Question, system: System, load: HarmonicLoad, point: ForcedPoint) -> Found:
+    """Find the peak of a system near a point; at the frequency of the point where frequencies are listed, or it is the end of the sweep."""
+    own = point.support
+    few = min(question.sweep.peak_points, PEAK_POINTS)
+    sweep = replace(question.sweep, low=own, high=own, selection="always_high", peak_points=few)
+    problem = forced_problem(system, load, sweep)
+    if _at_resonance(question, point):
+        peak = peak_from(problem, point) or _swept(system, load, sweep, point)
+        return None if peak is None else (problem, peak)
+    balance = problem.balance(own)
+    start = balance.unknowns(point.coefficients)
+    found = newton(lambda x: balance.linearise(x, point.omega), start, sweep.newton)
+    if not found.status.converged:
+        return None
+    return problem, replace(point, coefficients=balance.coefficients(found.x))

@@ -1,0 +1,339 @@
+"""The problem of a job of the forced response, picklable."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from stickslip.analyses.facts import facts_of
+from stickslip.analyses.forced_response.chooser import Chooser, chooser_of
+from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
+from stickslip.analyses.forced_response.stability.examination import examines_every_wave
+from stickslip.analyses.forced_response.sweeps import measured, sweep_of
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
+from stickslip.assembly.build import static_state
+from stickslip.assembly.extent import Extent, extent_of
+from stickslip.assembly.model import Model
+from stickslip.assembly.parts.more_modes import more_modes
+from stickslip.assembly.sides.unreduced import KEPT, refuse_whole
+from stickslip.contact.laws import law_name
+from stickslip.errors import InputError, input_error, together
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import is_full, named
+from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.response.equilibrium import frozen_sliders
+from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.response.system import System
+from stickslip.response.time.sectors import sectors_in_time
+from stickslip.study.analysis import Case
+from stickslip.study.verdict import said
+from stickslip.units import RPM
+
+IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+STABLE = "stability"  # what every run finds out unless the study says no
+RIGID = "rigid_coulomb"  # the law that the balance solves without springs
+TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
+ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
+MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
+MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """The forced response of one case.
+
+    Parameters
+    ----------
+    label
+        Of the case; empty for a study without [vary].
+    model
+        The assembled model; its first output is the one whose peak is resolved.
+    sweep
+        How the response is computed.
+    limit
+        Change that more harmonics may make before there is a warning, a fraction.
+    facts
+        What the result says of the model, see `facts_of`.
+    key
+        Of the table, that gives the range: ``speed_rpm`` where the frequencies are those of a range of speeds.
+    checks
+        Checks asked for beside the response.
+    first
+        Whether it is the first case, which says what all have in common.
+    examine
+        Of which points the stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
+    bifurcations
+        Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
+    not_periodic_s
+        Seconds of a march where no periodic motion stands for the response; 0: none.
+    not_periodic_points
+        Most points that are marched so.
+    rpm
+        Speed of rotation, 1/min.
+    richer
+        The model and its load with half again as many modes; None where there are no more, or nobody asked.
+    extent
+        Size and stiffness of its bodies; None where nobody asked.
+    """
+
+    label: str
+    model: Assembled
+    sweep: Sweep
+    limit: float
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    key: str = "frequency_hz"
+    checks: frozenset[str] = frozenset()
+    first: bool = True
+    examine: Literal["auto", "peak", "off", "all"] = "auto"
+    bifurcations: Literal["off", "folds", "all", "branches"] = "off"
+    not_periodic_s: float = 0.0
+    not_periodic_points: int = 2
+    rpm: float = 0.0
+    richer: tuple[System, HarmonicLoad] | None = None
+    extent: Extent | None = None
+
+    @property
+    def over_speed(self) -> bool:
+        """Whether the frequencies are those of a range of speeds."""
+        return self.key == "speed_rpm"
+
+    @cached_property
+    def problem(self) -> ForcedProblem:
+        """What is solved."""
+        return forced_problem(self.model.system, self.model.load, self.sweep)
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Harmonics that the load drives."""
+        forces = self.model.load.harmonics
+        return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
+
+    @property
+    def driven_names(self) -> tuple[str, ...]:
+        """What these harmonics are called: engine orders on a wheel."""
+        orders = self.model.orders
+        return tuple(f"engine order {orders[h]}" if h in orders else f"harmonic {h}" for h in self.driven)
+
+    @property
+    def orders_lines(self) -> tuple[str, ...]:
+        """What the frequency is where several engine orders act at once, in words."""
+        base, orders = self.model.engine_order, self.model.orders
+        if len(orders) < 2 or not base:
+            return ()
+        waves = [f"{m} in harmonic {h} as wave {m % self.model.sectors}" for h, m in orders.items()]
+        range_of = "speeds are those of the wheel" if self.over_speed else f"{self.key} is {base} times the speed"
+        return (f"engine orders: {', '.join(waves)}; {range_of}",)
+
+    @property
+    def chooser(self) -> Chooser:
+        """How harmonics are chosen."""
+        return chooser_of(self.sweep, self.model.error_labels, self.driven)
+
+    def said(self, text: str) -> str:
+        """Return a sentence about the case, see `said`."""
+        return said(self.label, text)
+
+
+def too_large(question: Question) -> str:
+    """Return how many coordinates are too many to be integrated in time; empty where they are not."""
+    system = question.model.system
+    if not system.structure.reduced:
+        return f"a reduced model is needed, and {KEPT}"
+    sectors = sectors_in_time(system)
+    size, kept = sectors * system.structure.n, sectors * len(system.retained_labels)
+    if size <= MOST_IN_TIME:
+        return ""
+    return f"{size} coordinates {TOO_MANY} {MOST_IN_TIME}" + f", {kept} {ALONE}" * (kept > MOST_IN_TIME)
+
+
+def peak_first(model: Assembled) -> Assembled:
+    """Return the model with the output whose peak counts before the others: the solver resolves the peak of the first one."""
+    first = model.peak_output
+    if first == 0:
+        return model
+    order = [first, *(i for i in range(len(model.output_labels)) if i != first)]
+    labels = tuple(model.output_labels[i] for i in order)
+    system, bare = (replace(s, outputs=s.outputs[order]) for s in (model.system, model.bare))
+    return replace(model, system=system, bare=bare, output_labels=labels, peak_output=0)
+
+
+def with_comparisons(question: Question, case: Case, model: Model) -> Question:
+    """Return the question with what its peak is compared with: the model with more modes, and the extent of its bodies."""
+    order = question.sweep.high_harmonics[-1]
+    more = more_modes(model, order, case.store)
+    more = None if more is None else peak_first(more)
+    richer = None if more is None else (more.system, more.load)
+    return replace(question, richer=richer, extent=extent_of(model, order))
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves; whatever can be refused is, before anything long is computed.
+
+    Raises
+    ------
+    InputError
+        If the sweep is none, harmonics that loads drive are not kept, a check has no form for the model, or the estimated cost
+        exceeds the study's limits.
+    """
+    settings = case.settings
+    sweep = within_limits(model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits)
+    sweep = measured(sweep, model)
+    _require_driven(model, sweep)
+    if IN_TIME in case.checks:
+        refuse_whole("--verify", model, "run without --verify")
+        _require_integrable(model)
+    _refuse_for_rigid(model, sweep, case.checks)
+    check_limits(settings.limits, estimate(model, sweep))
+    # solutions are judged towards up to three times the harmonics that are kept
+    harmonics = REACH * sweep.high_harmonics[-1]
+    if IN_TIME in case.checks:
+        harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
+    assembled = assemble(model, harmonics, case.store)
+    asked = settings.forced_response
+    examined = asked.stability != "off" or asked.bifurcations in ("all", "branches")
+    if examined and examines_every_wave(assembled.system):
+        assembled = assemble(model, harmonics, case.store, every_wave=True)
+    if IN_TIME in case.checks:
+        _require_sectors(model, assembled)
+    if (share := settings.forced_response.static_friction_share) is not None:
+        assembled = _with_frozen_sliders(assembled, share)
+    _require_coefficients(assembled, sweep)
+    try:
+        forced_problem(assembled.system, assembled.load, sweep)
+    except InputError as error:
+        place = _driving(settings.load)
+        raise error.at(f"{place} ({case.label})" if case.label else place) from None
+    counts = {name: assembled.counts[name] for name in ("reduced", "retained")}
+    return Question(
+        label=case.label,
+        model=peak_first(assembled),
+        sweep=sweep,
+        limit=sweep.threshold,
+        facts=facts_of(model, model.speed / RPM) | counts,
+        key=settings.forced_response.range_key,
+        checks=case.checks,
+        first=case.index == 0,
+        examine=settings.forced_response.stability,
+        bifurcations=settings.forced_response.bifurcations,
+        not_periodic_s=(
+            settings.forced_response.not_periodic_s if settings.forced_response.not_periodic == "in_time" else 0.0
+        ),
+        not_periodic_points=settings.forced_response.not_periodic_points,
+        rpm=model.speed / RPM,
+    )
+
+
+def _require_coefficients(model: Assembled, sweep: Sweep) -> None:
+    """Refuse aerodynamic coefficients that do not reach to all harmonics that may be kept."""
+    force = model.system.structure.feedback_of(1)
+    if force is None:
+        return
+    first = sweep.first_harmonics
+    most = (first if always_kept(sweep.strategy) is not None else sweep.high_harmonics)[-1]
+    low, high = sweep.omega_range
+    what = f"a response with harmonics up to {most}"
+    force.influence.require(min(h for h in first if h) * low, most * high, what)
+
+
+def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
+    """Return the model whose sliders start from the static state under a share of the friction, and that state."""
+    try:
+        system = frozen_sliders(model.system, model.load.static, share)
+    except InputError as error:
+        raise error.at(f"forced_response.static_friction_share: {error.place}") from None
+    gap, force = static_state(system, model.load.static)
+    bare = replace(model.bare, interface=system.interface)
+    return replace(model, system=system, bare=bare, static_gap=gap, static_force=force)
+
+
+def _driving(loads: Mapping[str, Any]) -> str:
+    """Return the key of the only load that vibrates; the table where there are several."""
+    driven = {name: table for name, table in loads.items() if table.harmonic > 0}
+    if len(driven) != 1:
+        return "load"
+    (name, table), *_ = driven.items()
+    return f"load.{name}.{'ratio' if table.ratio_of else 'force_n'}"
+
+
+def _require_driven(model: Model, sweep: Sweep) -> None:
+    for name, harmonic in model.driven.items():
+        if harmonic not in sweep.low_harmonics:
+            raise input_error(
+                "harmonics.low",
+                f"must hold harmonic {harmonic}, which load.{name} drives, got {named(sweep.low_harmonics)}",
+                f"Add it, for example low = {sorted({*sweep.low_harmonics[1:], harmonic})}, or leave low out.",
+            )
+
+
+def _require_integrable(model: Model) -> None:
+    """Refuse a check by time integration of what it does not know."""
+    for name, part in model.parts.items():
+        if part.structure.loss is not None or (part.damping and part.damping.loss_factor):
+            raise input_error(
+                f"part.{name}.damping.loss_factor",
+                "--verify integrates in time, and structural damping is defined for vibration at one frequency",
+                "Run without --verify, or take a modal ratio of half the loss factor, which is the same at resonance.",
+            )
+    found = [
+        input_error(
+            f"contact.{name}.law",
+            f"--verify integrates in time, and {RIGID} has no stiffness: its force is no function of the gap",
+            "Run without --verify, or give a law with stiffnesses, such as elastic_coulomb.",
+        )
+        for name, contact in model.contacts.items()
+        if law_name(contact.law) == RIGID
+    ]
+    if found:
+        raise together(found)
+
+
+def _require_sectors(model: Model, assembled: Assembled) -> None:
+    """Refuse a wheel whose sectors are too many coordinates to be integrated."""
+    side = assembled.system.structure
+    if side.wheel is None:
+        if assembled.blades is not None and side.n > MOST_IN_TIME:
+            raise input_error(
+                "mistuning",
+                f"--verify integrates all sectors, {side.n} coordinates, more than {MOST_IN_TIME}",
+                "Keep fewer modes, or verify a wheel of fewer sectors.",
+            )
+        return
+    place = f"part.{next(name for name, part in model.parts.items() if part.sectors > 1)}.sectors"
+    size = sectors_in_time(assembled.system) * side.n
+    if size > MOST_IN_TIME:
+        raise input_error(
+            place,
+            f"--verify integrates all sectors that may do different things, {size} coordinates, more than {MOST_IN_TIME}",
+            "Run without --verify; --verify-harmonics works.",
+        )
+
+
+def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> None:
+    """Refuse what needs contact forces that are functions of the gaps, where a contact is rigid."""
+    found = [name for name, contact in model.contacts.items() if law_name(contact.law) == RIGID]
+    if not found:
+        return
+    because = f"and contact.{found[0]} is {RIGID}, whose force is no function of the gap"
+    if always_kept(sweep.strategy) is None:
+        raise input_error(
+            "harmonics.selection",
+            f"is {sweep.selection!r}, which predicts from contact forces what harmonics would change, {because}",
+            'Give selection = "always_high": harmonics up to high are kept at every frequency.',
+        )
+    for key, own in (("low", sweep.low_harmonics), ("high", sweep.high_harmonics)):
+        if not is_full(own):
+            raise input_error(
+                f"harmonics.{key}",
+                f"leaves harmonics out, got {named(own)}, {because}",
+                f"Give {own[-1]}: all harmonics up to it.",
+            )
+    if HARMONICS in checks:
+        raise input_error(
+            f"contact.{found[0]}.law",
+            f"--verify-harmonics predicts from contact forces what more harmonics would change, {because}",
+            "Run without it, and compare with a larger harmonics.high.",
+        )

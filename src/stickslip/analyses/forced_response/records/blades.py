@@ -1,0 +1,77 @@
+"""A mistuned response beside the tuned one: amplification, largest blade, waves, localisation."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.bounds import BOUND, localisation, whitehead
+from stickslip.analyses.forced_response.records.points import Response, collect
+from stickslip.analyses.forced_response.records.values import Values
+from stickslip.arrays import ComplexArray, IntArray
+from stickslip.response.forced.response import forced_problem, forced_response
+from stickslip.study.store.progress import LOG
+from stickslip.units import HZ
+
+
+def tuned_response(question: Question) -> Response:
+    """Solve the same wheel with all sectors alike."""
+    blades = question.model.blades
+    assert blades is not None
+    tuned = blades.tuned
+    own = int(question.model.peak_of[0]) % len(blades.labels)
+    system = replace(tuned.system, outputs=np.roll(tuned.system.outputs, -own))
+    sweep = question.sweep
+    points = list(forced_response(system, tuned.load, sweep))
+    return collect(forced_problem(system, tuned.load, sweep), points, 0)
+
+
+def of_blades(question: Question, response: Response) -> Values:
+    """Return the variables of a wheel whose sectors differ; the tuned one is solved here."""
+    blades = question.model.blades
+    assert blades is not None
+    where = blades.same_in_all(int(question.model.peak_of[0]))
+    tuned = tuned_response(question)
+    count = len(question.model.output_labels)
+    every = np.array([a.amplitudes(count)[where] for a in response.accepted])
+    hertz = np.array([a.point.omega / HZ for a in response.accepted])
+    known = np.nan_to_num(every, nan=-1.0)
+    at = np.argmax(known, axis=0)
+    own = every[at, np.arange(where.size)]
+    motion = _motion(response, where)
+    sizes = np.linalg.norm(motion, axis=0)
+    factor = response.peak_amplitude / tuned.peak_amplitude
+    found = {
+        "blade_peak_amplitude": own,
+        "blade_peak_hz": hertz[at],
+        "blade_motion": np.stack([motion[0].real, motion[0].imag], axis=-1),
+        "wave_amplitude": np.abs(np.fft.fft(motion, axis=1) / where.size),
+        "largest_blade": int(np.argmax(own)) if where.size else -1,
+        "tuned_peak_amplitude": tuned.peak_amplitude,
+        "tuned_peak_hz": tuned.peak_hz,
+        "amplification": factor,
+        "whitehead": whitehead(where.size),
+        "localisation": localisation(sizes),
+        "tuned_frequency_hz": np.array([a.point.omega / HZ for a in tuned.accepted]),
+        "tuned_amplitude": np.array([a.amplitudes(1)[0] for a in tuned.accepted]),
+        "deviation": np.array([*blades.deviations.values()]).reshape(-1, where.size).T,
+        "mistuned": tuple(blades.deviations),
+    }
+    found["wave_amplitude"] = np.linalg.norm(found["wave_amplitude"], axis=0)
+    LOG.info(question.said(sentence(where.size, factor, int(found["largest_blade"]))))
+    return found
+
+
+def sentence(blades: int, factor: float, largest: int) -> str:
+    """Say what the amplification is, and what it may be compared with."""
+    bound = whitehead(blades)
+    return f"largest blade {largest}, amplification {factor:.4g} over the wheel with all sectors alike; {BOUND} is {bound:.3g}"
+
+
+def _motion(response: Response, where: IntArray) -> ComplexArray:
+    """Return the (driven, blades) amplitudes at the peak."""
+    top = response.top
+    driven = list(response.accepted[0].driven) if response.accepted else [1]
+    if top is None or top.fields is None:
+        return np.full((len(driven), len(where)), np.nan, dtype=complex)
+    return np.asarray(top.fields.outputs[driven][:, where])

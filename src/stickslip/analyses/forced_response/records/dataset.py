@@ -1,0 +1,140 @@
+"""The responses of all cases as one labelled dataset."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.records.quantities import QUANTITIES, flags
+from stickslip.analyses.forced_response.records.values import Values
+from stickslip.analyses.forced_response.verdicts.cases import with_levels
+from stickslip.study.verdict import said
+
+LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
+# dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
+ROWS = {
+    "point": ("point_case", "frequency_hz"),
+    "attempt": ("attempt_case", "attempt_frequency_hz"),
+    "alert_point": ("alert_case", "alert_frequency_hz"),
+    "check": ("verify_case", "verify_frequency_hz"),
+    "examined": ("stability_case", "stability_frequency_hz"),
+    "another": ("another_case", "another_frequency_hz"),
+    "not_periodic": ("not_periodic_case", "not_periodic_frequency_hz"),
+    "tuned_point": ("tuned_case", "tuned_frequency_hz"),
+    "bifurcation": ("bifurcation_case", "bifurcation_frequency_hz"),
+    "side_branch": ("side_branch_case", "side_branch_frequency_hz"),
+    "side_point": ("side_point_case", "side_point_frequency_hz"),
+}
+SOME = (
+    "check",
+    "examined",
+    "another",
+    "not_periodic",
+    "tuned_point",
+    "bifurcation",
+    "side_branch",
+    "side_point",
+)  # dimensions of what some cases may lack
+COUNTED = ("harmonic", "sample", "mode")  # dimensions that may be longer in one case than in another
+AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
+
+
+def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
+    """Return the dataset of finished cases.
+
+    What some cases lack (a contact with other points, a higher harmonic) is filled: with zero for harmonics not kept, else NaN or -1.
+
+    Parameters
+    ----------
+    cases
+        Values of each case by name; the first one gives what is not told case by case, such as the places of contacts.
+    labels
+        What is varied in each, as text; empty for a study without [vary].
+    """
+    before = np.cumsum([0, *(int(c["points"]) for c in cases)])
+    each = _aligned([_of_case(i, c, int(before[i])) for i, c in enumerate(cases)])
+    found = {
+        name: _joined([e[name].variable for e in each if name in e], along=quantity.dims[0])
+        for name, quantity in QUANTITIES.items()
+        if (any if quantity.dims[0] in SOME else all)(name in e for e in each)
+    }
+    empty = [name for name, variable in found.items() if not _told(name, variable)]
+    ordered = {name: variable for name, variable in found.items() if name not in empty}
+    used = {d for v in ordered.values() for d in v.dims}
+    coordinates: dict[str, Any] = {n: each[0][n].values for n in LABELLED if n in each[0].coords}
+    coordinates |= {name: values for name, values in AXES.items() if name in used}
+    data = xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
+    data = data.assign(with_levels(data, labels))
+    for name, variable in data.data_vars.items():
+        quantity = QUANTITIES[str(name)]
+        variable.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(str(name))
+    return data
+
+
+def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any]:
+    """Return the attributes of the dataset: texts and numbers; what chose the harmonics is that of the first case."""
+    both = list(zip(labels, cases, strict=True))
+    told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
+    own: dict[str, Any] = json.loads(cases[0]["attributes"])
+    return own | {"alert_explanation": " ".join(told), "failed": sum(int(c["points_failed"]) for c in cases)}
+
+
+def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
+    """Return the variable of all cases, one after the other; of what all cases share that of the first."""
+    if along not in ("case", *ROWS):
+        return each[0]
+    joined: xr.Variable = xr.Variable.concat(each, along)  # type: ignore[no-untyped-call]
+    return joined.astype(str) if joined.dtype.kind == "O" else joined
+
+
+def _told(name: str, variable: xr.Variable) -> bool:
+    """Whether a variable says anything: checks that were not asked for and speeds that nothing runs over do not."""
+    nothing = name == "speed_rpm" and bool(np.all(np.isnan(variable.values)))
+    return not nothing and variable.sizes.get(variable.dims[0], 1) > 0
+
+
+def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
+    """Return the values of a case with their dimensions, its number in its rows."""
+    peak = int(values["peak_point"])
+    values = values | {"peak_point": peak + before if peak >= 0 else peak}
+    for own, like in ROWS.values():
+        if like in values:
+            values[own] = np.full(len(values[like]), index)
+    data = {
+        name: xr.Variable(quantity.dims, _shaped(values[name], quantity.dims))
+        for name, quantity in QUANTITIES.items()
+        if name in values
+    }
+    named = {name: [str(x) for x in values[name]] for name in LABELLED if name in values}
+    made = xr.Dataset(data, coords=named)
+    return made.assign_coords({d: np.arange(made.sizes[d]) for d in COUNTED if d in made.sizes})
+
+
+def _shaped(value: Any, dims: Sequence[str]) -> Any:
+    array = np.asarray(value)
+    array = array.astype(object) if array.dtype.kind == "U" else array
+    return array[None] if dims[0] == "case" else array
+
+
+def _aligned(each: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return datasets of cases with the same labels and lengths."""
+    counts = {d: np.arange(max(e.sizes.get(d, 0) for e in each)) for d in COUNTED}
+    labelled = [d for d in LABELLED if any(d in e.coords for e in each)]
+    labels = {d: list(dict.fromkeys(x for e in each for x in e[d].values)) for d in labelled}
+    return [_filled(e, {d: n for d, n in counts.items() if d in e.sizes} | labels) for e in each]
+
+
+def _filled(data: xr.Dataset, labels: Mapping[str, Any]) -> xr.Dataset:
+    if all(np.array_equal(data[d].values, own) for d, own in labels.items()):
+        return data
+    zero = {n: 0 for n in data.data_vars if "harmonic" in data[n].dims}
+    blank = {n: _blank(data[n].dtype) for n in data.data_vars}
+    higher = {d: own for d, own in labels.items() if d == "harmonic"}
+    others = {d: own for d, own in labels.items() if d != "harmonic"}
+    return data.reindex(higher, fill_value=blank | zero).reindex(others, fill_value=blank)
+
+
+def _blank(kind: np.dtype[Any]) -> Any:
+    return {"f": np.nan, "i": -1, "O": ""}[kind.kind]

@@ -1,0 +1,305 @@
+"""Choice of the points whose stability is examined, and the verdicts that follow for the others."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from heapq import heapify, heappop, heappush
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Accepted, Response
+from stickslip.analyses.forced_response.stability.examination import by_hill
+from stickslip.analyses.forced_response.stability.stable import Examined, why_not
+from stickslip.analyses.forced_response.verdicts.curve import branch_length
+from stickslip.analyses.forced_response.verdicts.jumps import jumps, stored_energy
+from stickslip.arrays import IntArray
+from stickslip.model.structure import Structure
+from stickslip.response.stability.course import Course, course_of
+from stickslip.response.stability.cycle import has_transitions
+from stickslip.response.stability.found import changes
+from stickslip.response.stability.missing_harmonics import newton_work
+from stickslip.units import HZ
+
+ALWAYS_ROWS = 500  # of matrices, up to which every point is examined or follows from such
+CARRIED = 0.95  # largest modulus, its error included, of multipliers between which a verdict is carried along
+FURTHER = 10  # points that are examined to find the largest motion that is not unstable,
+FEW = 3  # and so many of them whatever has been spent
+
+Examine = Callable[[Accepted], Examined]
+
+
+def examined_points(question: Question, response: Response, examine: Examine) -> list[Examined]:
+    """Return what is known of the stability of points, in the order of the branch.
+
+    Parameters
+    ----------
+    question, response
+        A case.
+    examine
+        Looks at a point of it.
+    """
+    if question.examine == "off" or response.top is None:
+        return []
+    if why_not(question):
+        return [replace(examine(response.top), position=response.peak)]
+    course = _course(question, response)
+    search = _Search(question, response, course, examine, _allowed(question, response))
+    search.look(course.order.index(response.peak))
+    if question.examine == "all" and not by_hill(question.model.system):
+        for place in range(len(course.order)):
+            search.look(place)
+    elif question.examine != "peak":
+        search.along()
+    search.settle_peak()
+    return search.all_points()
+
+
+def neighbours_of(
+    question: Question, response: Response, examined: list[Examined], attained: list[float]
+) -> list[Examined]:
+    """Return the same with those undecided points stable that stand beside one that a motion in time has attained, on the same branch, where nothing changes between."""
+    known = [e for e in examined if e.omega in attained]
+    if not known or not any(e.verdict == "undecided" for e in examined):
+        return examined
+    course = _course(question, response)
+    place = {position: k for k, position in enumerate(course.order)}
+
+    def beside(e: Examined) -> Examined:
+        if e.verdict != "undecided" or e.motion:
+            return e
+        near = [k for k in known if course.like(place[k.position], place[e.position])]
+        if not near:
+            return e
+        said = (
+            f"the motion in time has attained its neighbour at {near[0].omega / HZ:.3f} Hz on the same branch, with the same transitions "
+            "in the cycle"
+        )
+        return replace(e, verdict="stable", basis="carried", reason=said)
+
+    return [beside(e) for e in examined]
+
+
+@dataclass(eq=False)
+class _Search:
+    """Goes over the points of a course and puts down what is known."""
+
+    question: Question
+    response: Response
+    course: Course
+    examine: Examine
+    allowed: float
+    spent: float = 0.0
+    found: dict[int, Examined] = field(default_factory=dict)  # by place on the course
+
+    def look(self, place: int) -> Examined:
+        """Examine a point, whatever it takes, once."""
+        if place not in self.found:
+            position = self.course.order[place]
+            one = self._linear(place) or self.examine(self.response.accepted[position])
+            self.found[place] = replace(one, position=position)
+            self.spent += one.work
+        return self.found[place]
+
+    def along(self) -> None:
+        """Examine the points beside which stability may change, and halve what lies between until it follows from both ends."""
+        for place in self._first():
+            if self.spent > self.allowed:
+                return
+            if place not in self.found and not self._opposed(place):
+                self.look(place)
+        ends = sorted(self.found)
+        open_ = [(a - b, a, b) for a, b in pairwise(ends)]
+        heapify(open_)
+        while open_ and self.spent <= self.allowed:
+            _, a, b = heappop(open_)
+            if b == a + 1 or self._carries(a, b):
+                continue
+            middle = (a + b) // 2
+            if not self._opposed(middle):
+                self.look(middle)
+            heappush(open_, (a - middle, a, middle))
+            heappush(open_, (middle - b, middle, b))
+
+    def settle_peak(self) -> None:
+        """Examine the largest motion that is not known to be unstable until one is known that is not; a few, whatever they take."""
+        for further in range(FURTHER):
+            every = self.all_points()
+            position = largest(self.response, every)
+            known = any(e.position == position for e in every)
+            if position < 0 or known or (further >= FEW and self.spent > self.allowed):
+                return
+            self.look(self.course.order.index(position))
+
+    def all_points(self) -> list[Examined]:
+        """Return what is known of every point: examined, carried along, by the sign of the determinant, or nothing."""
+        own = dict(self.found)
+        for k, position in enumerate(self.course.order):
+            linear = None if k in own else self._linear(k)
+            if linear is not None:
+                own[k] = replace(linear, position=position)
+        for a, b in pairwise(sorted(self.found)):
+            if b > a + 1 and self._carries(a, b):
+                own = {k: self._carried(k, a, b) for k in range(a + 1, b)} | own
+        for k in range(len(self.course.order)):
+            # beside a fold Newton's method may find the stable motion from the unstable one
+            open_ = k not in own or own[k].verdict in ("stable", "undecided")
+            if open_ and self._opposed(k):
+                own[k] = self._by_sign(k)
+        return [own[k] for k in sorted(own)]
+
+    # --- what follows for points that are not examined ------------------------------------------
+
+    def _carries(self, a: int, b: int) -> bool:
+        """Whether the verdict of two examined points is that of all between."""
+        if a not in self.found or b not in self.found:
+            return False
+        ends = (self.found[a], self.found[b])
+        far = all(e.verdict == "stable" and e.multiplier + e.error < CARRIED for e in ends)
+        # where more harmonics lead to another motion, its transitions are not those of the points between as they were solved
+        as_solved = all(e.raised is None for e in ends)
+        return far and as_solved and self.course.like(a, b) and _inside_between(*ends)
+
+    def _carried(self, place: int, a: int, b: int) -> Examined:
+        ends = (self.found[a], self.found[b])
+        larger = max(ends, key=lambda e: e.multiplier)
+        low, high = sorted(e.omega / HZ for e in ends)
+        said = (
+            f"carried along between {low:.3f} and {high:.3f} Hz: at both ends all multipliers are below {CARRIED:g}, none of them moves so far "
+            "between them that it may pass the unit circle, the transitions in the cycle are the same and the branch does not turn"
+        )
+        return Examined(
+            self._omega(place),
+            "stable",
+            larger.multiplier,
+            larger.error,
+            said,
+            basis="carried",
+            position=self.course.order[place],
+        )
+
+    def _by_sign(self, place: int) -> Examined:
+        said = (
+            "the determinant of the Jacobian has another sign than at stable points of the branch: an odd number of real multipliers lies "
+            "above 1"
+        )
+        return Examined(
+            self._omega(place), "unstable", np.nan, np.nan, said, basis="by sign", position=self.course.order[place]
+        )
+
+    def _opposed(self, place: int) -> bool:
+        """Whether the determinant has another sign than at the nearest stable point of the branch, and examined points beside it with its sign are unstable."""
+        sign, stretch = self.course.sign, self._stretches
+        others = [k for k in self._of_run(place) if k != place]
+        same = {self.found[k].verdict for k in others if stretch[k] == stretch[place]}
+        stable = [k for k in others if self.found[k].verdict == "stable"]
+        if same != {"unstable"} or not stable:
+            return False
+        return bool(sign[min(stable, key=lambda k: abs(k - place))] * sign[place] < 0.0)
+
+    def _of_run(self, place: int) -> list[int]:
+        run = self._runs[place]
+        return [k for k in self.found if self._runs[k] == run]
+
+    @cached_property
+    def _runs(self) -> IntArray:
+        """(n,) number of the run of the branch that a point belongs to."""
+        return np.concatenate([[0], np.cumsum(self.course.cut)]).astype(np.int64)
+
+    @cached_property
+    def _stretches(self) -> IntArray:
+        """(n,) number of the stretch of one sign that a point belongs to."""
+        sign = self.course.sign
+        return np.concatenate([[0], np.cumsum((sign[1:] != sign[:-1]) | self.course.cut)]).astype(np.int64)
+
+    def _omega(self, place: int) -> float:
+        return self.response.accepted[self.course.order[place]].point.omega
+
+    def _linear(self, place: int) -> Examined | None:
+        """Return what is known of a point at which no contact changes its state, from another one with the same states: both obey one linear system.
+
+        Its exponents do not depend on the frequency of the load, and its multipliers are those of the other to the ratio of the periods.
+        Samples may miss a short slip; it acts on harmonics beyond those driven, so that the solution must be exact, too.
+        """
+        cycle, side = self.course.cycle[place], self.question.model.system.structure
+        point = self.response.accepted[self.course.order[place]].point
+        exact = point.predicted_error == 0.0
+        if cycle is None or has_transitions(cycle) or not exact or type(side) is not Structure:
+            return None
+        omega = point.omega
+        for k, e in self.found.items():
+            if self.course.cycle[k] == cycle and e.verdict == "stable" and e.error == 0.0:
+                size = e.multiplier ** (e.omega / omega)
+                return replace(e, omega=omega, multiplier=size, work=0.0, reason=e.linear(size))
+        return None
+
+    # --- where to look ----------------------------------------------------------------------------
+
+    def _first(self) -> Iterator[int]:
+        """Yield the ends of the branch, the points beside folds, and those between which the list of transitions changes, the nearest to the peak first."""
+        course = self.course
+        peak = course.order.index(self.response.peak)
+        yield from (k for run in course.runs() for k in (run[0], run[-1]))
+        for steps in (course.fold | course.turns, course.changes & ~course.fold):
+            beside = {int(k) + d for k in np.flatnonzero(steps) for d in (0, 1)}
+            yield from sorted(beside, key=lambda k: abs(k - peak))
+
+
+def _inside_between(one: Examined, other: Examined) -> bool:
+    """Whether no multiplier moves so far from one point to another that it may pass the unit circle between them.
+
+    A pair keeps the modulus of its damping while it moves along its circle, until it meets on the real axis: there one of the two may leave.
+    """
+    for a, b in ((one, other), (other, one)):
+        _, moduli = changes(a.multipliers, b.multipliers)
+        if not np.all(np.abs(a.multipliers) + moduli < 1.0):
+            return False
+    return True
+
+
+def largest(response: Response, known: list[Examined]) -> int:
+    """Return the position of the largest motion that is not known to be unstable; -1 where there is none."""
+    off = {e.position for e in known if e.verdict == "unstable"}
+    sizes = [
+        (response.amplitude(a), -i) for i, a in enumerate(response.accepted) if i not in off and a.fields is not None
+    ]
+    return -max(sizes)[1] if sizes else -1
+
+
+def with_stable_peak(response: Response, known: list[Examined]) -> Response:
+    """Return the response whose peak is its largest motion that is not known to be unstable, the larger unstable one being remembered."""
+    position = largest(response, known)
+    unstable = {e.position for e in known if e.verdict == "unstable"}
+    if response.peak not in unstable or position < 0:
+        return response
+    return replace(response, peak=position, unstable_peak=response.peak)
+
+
+def _course(question: Question, response: Response) -> Course:
+    every = response.accepted
+    along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
+    return course_of(question.problem, [a.point for a in every], along, _jumps(response, along))
+
+
+def _jumps(response: Response, along: int) -> list[int]:
+    """Return the positions of points behind which the response jumps."""
+    every = response.accepted
+    branch = [i for i, a in enumerate(every[:along]) if a.fields is not None]
+    shown = [f for f in (every[i].fields for i in branch) if f is not None]
+    amplitude = np.array([response.amplitude(every[i]) for i in branch])
+    few = np.array([every[i].point.support == response.low_harmonics for i in branch], dtype=bool)
+    loss = np.array([f.energy.sum() for f in shown])
+    elastic = max((stored_energy(f.gaps[None, 1:], f.forces[None, 1:]) for f in shown), default=0.0)
+    return [branch[jump.step] for jump in jumps(amplitude, loss, few, elastic)]
+
+
+def _allowed(question: Question, response: Response) -> float:
+    """Return the operations that examinations of a case may take: without limit where matrices are small, else as many as its solutions took."""
+    system = question.model.system
+    side = system.structure
+    sectors = 1 if side.wheel is None else side.wheel.sectors
+    rows = max(2 * sectors * side.n, *(p.unknowns for p in response.solved))
+    if not by_hill(system) and rows <= ALWAYS_ROWS:
+        return np.inf
+    return sum(p.iterations * newton_work(p.unknowns) for p in response.solved)

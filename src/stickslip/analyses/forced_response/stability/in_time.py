@@ -1,0 +1,295 @@
+"""The check inside a run (``--verify``): the same reduced model integrated in time at the peak, and beside it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, isfinite, log
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.points import Accepted, Response
+from stickslip.analyses.forced_response.stability.comparison import LARGE, PATIENCE, STEPS, Check, Motion
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import one_structure
+from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.system import System
+from stickslip.response.time.sectors import all_sectors, sectors_in_time
+from stickslip.response.time.start import TransientStart, start_from_harmonics
+from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
+from stickslip.solve.newton_method import newton
+from stickslip.units import HZ
+
+NAMED = 3  # drifting coordinates that a sentence names
+MORE = 3  # times the harmonics, and the samples, of that repeat
+LEAST_HARMONICS, MOST_HARMONICS = 15, 63  # of it
+APART = 10.0  # percent: a motion in time that is farther from every balance is another one
+KICK = 1e-3  # of their own amplitude, by which speeds are disturbed where multipliers do not say that disturbances die
+SHOWN = 1e3  # times: a disturbance that has grown or decayed so much has shown what becomes of it
+RINGS = 1e-3  # scatter of a motion that repeats but for what goes on ringing
+DECAYS, GROWS = 0.5, 1.1  # change of the last third of an integration over that of the third before
+MOST_TOLD = 10**6  # periods
+GOLDEN = 2.399963  # rad, of which no few multiples are alike
+WHOLE = 41  # harmonics of an integration where amplitudes are of the whole motion
+REPORTED = 7  # harmonics of an integration, or those that the load drives
+FLOPS = 4e9  # a second, of a march
+MOST_STEPS = (
+    8 * STEPS
+)  # of an integration that is repeated with twice the steps for as long as these change it by more than `LARGE`
+
+
+def chosen(question: Question, response: Response) -> list[Accepted]:
+    """Return the points that are integrated: the peak of each case, and where there is one case alone its flanks, too."""
+    if response.top is None:
+        return []
+    beside = () if question.label else response.flanks
+    return sorted((response.top, *beside), key=lambda a: a.point.omega)
+
+
+def check_in_time(question: Question, response: Response, accepted: Accepted, multiplier: float | None = None) -> Check:
+    """Integrate in time at a point of the response, and compare.
+
+    Parameters
+    ----------
+    question, response
+        The model, and its finished response.
+    accepted
+        One of its points.
+    multiplier
+        Modulus of the multiplier of a point that is not known to be stable, NaN where none is known: the motion then begins with
+        disturbed speeds and is followed for as long as these need to show. None: neither.
+    """
+    point = accepted.point
+    after = 0 if multiplier is None else shows_after(multiplier)
+    found = integrated(
+        question.problem,
+        point,
+        question.model.load,
+        kick=0.0 if multiplier is None else KICK,
+        least=max(1, min(after, PATIENCE)),
+    )
+    check = _compared(question, response, point, found, STEPS)
+    if found.settled and not abs(check.difference_percent) <= LARGE:
+        check, found = _with_steps_enough(question, response, point, found, check)
+    known = _driven(question, _known(found)[:, response.output])
+    balances = [_of_balance(question, response, point)]
+    if not (abs(check.difference_percent) <= LARGE and _apart(balances[0], known) <= APART):
+        order = min(max(MORE * point.order, LEAST_HARMONICS), MOST_HARMONICS)
+        check = replace(check, refined_order=max(order, point.order + 1))
+        better = refined(question, point, check.refined_order)
+        if better is not None:
+            balances.append(_of_balance(question, response, better))
+            check = replace(check, refined=_amplitude(question, response, better))
+    motion = _motion(check, found, min(_apart(one, known) for one in balances))
+    return replace(check, motion=motion, shows_after=after)
+
+
+def shows_after(multiplier: float) -> int:
+    """Return the periods in which a disturbance grows or decays a thousandfold by a multiplier; more than are ever followed where it does neither.
+
+    Parameters
+    ----------
+    multiplier
+        Its modulus; NaN: not known.
+    """
+    rate = abs(log(multiplier)) if isfinite(multiplier) and multiplier > 0.0 else float("nan")
+    if multiplier == 0.0:
+        return 1
+    return ceil(log(SHOWN) / rate) if rate > log(SHOWN) / MOST_TOLD else MOST_TOLD
+
+
+def seconds_in_time(system: System) -> float:
+    """Return about how long an integration takes that does not settle, s, by the size of all sectors that are marched."""
+    sectors = sectors_in_time(system)
+    rows, gaps = 2 * sectors * system.structure.n, 3 * sectors * system.interface.n_contacts
+    return PATIENCE * STEPS * (2.0 * rows**2 + float(gaps) ** 3) / FLOPS
+
+
+def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
+    """Return what the motion in time did, `apart` percent from the nearest balance."""
+    if not isfinite(check.transient):
+        return "left"
+    if not found.settled and found.scatter > RINGS:
+        return "not settled" if found.decay < DECAYS else "not periodic"
+    if not found.settled and found.decay > GROWS:
+        return "not settled"
+    return "attained" if apart <= APART else "left"
+
+
+def _apart(balance: ComplexArray, known: ComplexArray) -> float:
+    """Return the distance of a balance from the integration, phases included, percent of the latter."""
+    size = float(np.linalg.norm(known))
+    return 100 * float(np.linalg.norm(balance - known)) / size if size > 0.0 else float("inf")
+
+
+def _of_balance(question: Question, response: Response, point: ForcedPoint) -> ComplexArray:
+    """Return the driven harmonics of the report output, m."""
+    motion = question.problem.low.linear.recover(point.omega, point.coefficients)
+    return _driven(question, motion[:, question.problem.system.outputs[response.output]])
+
+
+def _amplitude(question: Question, response: Response, point: ForcedPoint) -> float:
+    return question.problem.amplitude(point, response.output)
+
+
+def _size(question: Question, harmonics: ComplexArray) -> float:
+    """Return the amplitude of an output from its harmonics, m."""
+    of = question.sweep.amplitude_of
+    return float(amplitudes(harmonics[:, None], question.driven, of)[0])
+
+
+def _driven(question: Question, harmonics: ComplexArray) -> ComplexArray:
+    """Return of the harmonics of an output those that the load drives: amplitudes are their norm."""
+    return np.array([harmonics[h] if h < len(harmonics) else 0.0 for h in question.driven])
+
+
+def _known(found: TransientResult) -> ComplexArray:
+    """Return the (n_h + 1, n_outputs) harmonics of an integration, m; of what did not settle the average."""
+    return found.harmonics if found.settled else found.averages
+
+
+def _compared(question: Question, response: Response, point: ForcedPoint, found: TransientResult, steps: int) -> Check:
+    """Return the comparison with an integration."""
+    every = _known(found)
+    known = every[:, response.output]
+    motion = question.problem.low.linear.recover(point.omega, point.coefficients)
+    outputs = motion[:, question.problem.system.outputs]
+    return Check(
+        frequency_hz=point.omega / HZ,
+        balance=_amplitude(question, response, point),
+        transient=_size(question, known),
+        settled=bool(found.settled),
+        periods=int(found.periods),
+        scatter=float(found.scatter),
+        drifting=listed(found.drifting),
+        order=point.order,
+        steps=steps,
+        outputs_percent=100 * _of_outputs(question.problem, every, outputs),
+    )
+
+
+def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray) -> float:
+    """Return the largest relative difference of outputs (H+1, n_outputs) from those of an integration, by the measure of errors, a fraction."""
+    if not np.all(np.isfinite(true)):
+        return float("nan")
+    rows = min(len(true), len(found))
+    measure = problem.of_outputs
+    return measure.change(true[:rows], found[:rows] - true[:rows])[0]
+
+
+def _with_steps_enough(
+    question: Question, response: Response, point: ForcedPoint, found: TransientResult, coarse: Check
+) -> tuple[Check, TransientResult]:
+    """Go on from a settled motion with twice the steps until these do not change it: too long a step is the first to suspect."""
+    steps = STEPS
+    while True:
+        steps *= 2
+        finer = integrated(question.problem, point, question.model.load, begin=found.final, steps=steps)
+        fine = _compared(question, response, point, finer, steps)
+        moved = 100 * (fine.transient / coarse.transient - 1.0)
+        if abs(moved) <= LARGE and coarse.steps == STEPS:
+            return coarse, found
+        coarse, found = replace(fine, step_percent=moved), finer
+        if abs(moved) <= LARGE or not found.settled or steps >= MOST_STEPS:
+            return coarse, found
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first few of many names as text."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
+
+
+def integrated(
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    load: HarmonicLoad,
+    periods: int = PATIENCE,
+    *,
+    begin: TransientStart | None = None,
+    steps: int = STEPS,
+    kick: float = 0.0,
+    least: int = 1,
+) -> TransientResult:
+    """Integrate in time from the balance's state at t = 0: near what is judged, so that little has to settle.
+
+    Parameters
+    ----------
+    problem, point
+        What was solved, and the solution.
+    load
+        Its loads.
+    periods
+        Give up settling after so many.
+    begin
+        Where to begin instead, as where an integration with fewer steps has ended.
+    steps
+        Steps in a period.
+    kick
+        Disturbance of the speeds at the beginning, a fraction of the amplitude that each of them has.
+    least
+        Go on for so many periods in any case.
+    """
+    system = problem.system
+    motion = problem.low.linear.recover(point.omega, point.coefficients)
+    structure, contacts = system.structure, system.interface
+    wheel = system.structure.wheel
+    if wheel is not None:
+        # with every wave any sector may do something else: what leaves the tuned motion then does so here too
+        whole = all_sectors(system, load, every=wheel.has_every_wave)
+        motion, structure, contacts = whole.spread(motion), whole.structure, whole.contacts
+        load = whole.load
+    return integrate(
+        one_structure(structure, "time integration"),
+        contacts.gap_operator,
+        contacts.laws,
+        load,
+        point.omega,
+        system.outputs,
+        start=begin
+        or _kicked(
+            start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws),
+            kick * _speeds(motion, point.omega),
+        ),
+        stepping=TimeStepping(
+            steps_per_period=steps,
+            max_periods=periods,
+            min_periods=least,
+            harmonics=max(REPORTED if problem.sweep.amplitude_of == "first" else WHOLE, *load.harmonics),
+        ),
+        weights=contacts.weights,
+    )
+
+
+def _speeds(motion: ComplexArray, omega: float) -> FloatArray:
+    """Return the (n,) amplitudes of the speeds of a motion (H + 1, n), rad/s its frequency: the sums over its harmonics."""
+    orders = np.arange(len(motion))[:, None]
+    return np.asarray(np.sum(np.abs(orders * omega * motion), axis=0))
+
+
+def _kicked(start: TransientStart, speeds: FloatArray) -> TransientStart:
+    """Return a start with other speeds: by up to `speeds`, in other shares for each coordinate, that no symmetry hides a disturbance."""
+    shares = np.cos(GOLDEN * np.arange(speeds.size))
+    return replace(start, velocity=start.velocity + shares * speeds)
+
+
+def refined(question: Question, point: ForcedPoint, order: int) -> ForcedPoint | None:
+    """Solve the balance with `order` harmonics; None if it does not converge.
+
+    Parameters
+    ----------
+    question
+        The model and how it is solved.
+    point
+        A solution with fewer harmonics, where Newton begins.
+    order
+        Harmonics; the samples grow with them.
+    """
+    sweep = replace(question.sweep, high=order, samples=(MORE + 1) * question.sweep.samples)
+    balance = forced_problem(question.model.system, question.model.load, sweep).high
+    start = balance.unknowns(point.coefficients)
+    solution = newton(lambda x: balance.linearise(x, point.omega), start, sweep.newton)
+    if not solution.status.converged:
+        return None
+    return replace(point, coefficients=balance.coefficients(solution.x))

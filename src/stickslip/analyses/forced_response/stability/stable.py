@@ -1,0 +1,299 @@
+"""Stability of a motion of a response: by multipliers, and by time integration."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import Question, too_large
+from stickslip.analyses.forced_response.records.points import Accepted, Response
+from stickslip.analyses.forced_response.stability.comparison import Check
+from stickslip.analyses.forced_response.stability.examination import (
+    FLOPS,
+    by_hill,
+    examination_work,
+    hill_work,
+    too_long,
+)
+from stickslip.analyses.forced_response.stability.in_time import seconds_in_time
+from stickslip.arrays import ComplexArray
+from stickslip.errors import InputError, StickslipError
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.problem import ForcedPoint
+from stickslip.response.stability import Stability, hill_stability, settled_stability
+from stickslip.response.stability.hill_method.hill_segment import Keep, not_kept
+from stickslip.response.stability.missing_harmonics import with_more
+from stickslip.response.stability.modulus import modulus_text
+from stickslip.response.stability.waves import WaveDisturbance, growing_wave, point_disturbances
+from stickslip.units import HZ
+
+Word = Literal["stable", "unstable", "neutral", "undecided", "not examined"]
+Basis = Literal["not examined", "examined", "carried", "by sign"]
+MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
+FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
+ONE_SECTOR = "what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
+BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not periodic": "unstable"}
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What was found of the stability of a point.
+
+    Parameters
+    ----------
+    omega
+        Where, rad/s.
+    verdict
+        In one of four words.
+    multiplier, error
+        Modulus of the multiplier that decides and its error; NaN where none is known.
+    reason
+        What the verdict rests on.
+    motion
+        What the motion in time did where the multipliers left the verdict undecided; empty where it was not asked.
+    large
+        Why the model is not integrated in time; empty where it can be.
+    basis
+        Whether the point itself was examined, or its verdict follows from others: carried along between two of them, or by the sign of the
+        determinant of the balance's Jacobian.
+    position
+        Of the point in the response.
+    work
+        Floating point operations that the examination took.
+    multipliers
+        All that are known, so that it can be said whether one may pass the unit circle on the way to another point.
+    raised
+        The motion with more harmonics that the verdict is of, where the point as it was solved has another one; else None.
+    """
+
+    omega: float
+    verdict: Word
+    multiplier: float
+    error: float
+    reason: str
+    motion: str = ""
+    large: str = ""
+    basis: Basis = "examined"
+    position: int = -1
+    work: float = 0.0
+    multipliers: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    raised: ForcedPoint | None = None
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the multipliers were looked at and do not show that disturbances die."""
+        return self.verdict in ("unstable", "undecided")
+
+    def linear(self, size: float) -> str:
+        """Return why another point is stable whose contacts rest in the states of this one, its largest multiplier having a modulus."""
+        return (
+            f"no contact changes its state, as at {self.omega / HZ:.3f} Hz, so that the exponents are the same: the largest multiplier has the "
+            f"modulus {modulus_text(size)}"
+        )
+
+    @property
+    def sentence(self) -> str:
+        """What was found and why."""
+        told = f"{self.omega / HZ:.3f} Hz: {self.verdict}"
+        if self.verdict == "undecided" and not self.motion:
+            if self.large:
+                return f"{told}: {self.reason}; not integrated in time: {self.large}"
+            return f"{told}: {self.reason}; an integration in time (--verify) tells more"
+        if not self.motion:
+            return f"{told}: {self.reason}"
+        return f"{told}, the motion in time being {self.motion}; by the multipliers undecided: {self.reason}"
+
+
+def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Examined:
+    """Return what the multipliers say of a point, or why they say nothing; `keep` keeps pieces of a long examination."""
+    omega = accepted.point.omega
+    why, hill = why_not(question), by_hill(question.model.system)
+    if why:
+        return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
+    try:
+        if hill:
+            return _by_hill(question, accepted, keep)
+        settled = settled_stability(question.problem, accepted.point, accepted.audit)
+        found = settled.stability
+        wave = _of_wave(question, accepted, found)
+    except InputError as error:
+        return Examined(omega, "not examined", np.nan, np.nan, error.problem, basis="not examined")
+    except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
+        why = f"no multipliers ({error})"
+        return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
+    seen = _seen(question, accepted, found, f"{found.reason}{wave}")
+    return seen if settled.motion is None else _of_motion(question, seen, settled.motion)
+
+
+def _of_motion(question: Question, seen: Examined, motion: ForcedPoint) -> Examined:
+    """Return what was found with the motion that it was found of; undecided where a study fixes fewer harmonics than that has."""
+    if question.sweep.auto and question.problem.strategy.verifies:
+        return replace(seen, raised=motion)
+    more = f"with H = {motion.order} it is {seen.verdict}; the harmonics asked for are too few for its stability"
+    return replace(seen, verdict="undecided", reason=f"{seen.reason}: {more}")
+
+
+def with_raised(points: Sequence[ForcedPoint], examined: Sequence[Examined]) -> list[ForcedPoint]:
+    """Return the motions whose stability is told, where the points as they were solved have another: points that take their places.
+
+    Parameters
+    ----------
+    points
+        That stand in the response, by position.
+    examined
+        What is known of them.
+    """
+    raised = []
+    for one in examined:
+        if one.raised is not None:
+            own = points[one.position]
+            stage: Stage = "peak" if own.stage == "peak" else "settled"
+            raised.append(replace(one.raised, stage=stage, index=own.index))
+    return raised
+
+
+def as_note(examined: Examined) -> dict[str, Any]:
+    """Return what a job puts down of an examined point."""
+    note = asdict(replace(examined, raised=None))
+    del note["raised"], note["multipliers"]
+    note |= {"re": examined.multipliers.real, "im": examined.multipliers.imag}
+    more = examined.raised
+    if more is None:
+        return note
+    motion = {
+        "raised_re": more.coefficients.real,
+        "raised_im": more.coefficients.imag,
+        "raised_harmonics": more.harmonics,
+        "raised_error": more.predicted_error,
+    }
+    return note | motion
+
+
+def from_note(note: Mapping[str, Any], point: ForcedPoint) -> Examined:
+    """Return an examined point from what a job has put down of it."""
+    apart = ("re", "im", "raised_re", "raised_im", "raised_harmonics", "raised_error")
+    own = Examined(**{name: value for name, value in note.items() if name not in apart})
+    own = replace(own, multipliers=_complex(note, ""))
+    if "raised_re" not in note:
+        return own
+    harmonics, error = np.asarray(note["raised_harmonics"]), float(note["raised_error"])
+    return replace(own, raised=with_more(point, _complex(note, "raised_"), harmonics, error))
+
+
+def _complex(note: Mapping[str, Any], of: str) -> ComplexArray:
+    return np.asarray(note[f"{of}re"]) + 1j * np.asarray(note[f"{of}im"])
+
+
+def _by_hill(question: Question, accepted: Accepted, keep: Keep) -> Examined:
+    """Return what Hill's method says of a point of a wheel, against every wave."""
+    hill = hill_stability(question.problem, accepted.point, keep)
+    found, said = hill.stability, hill.reason
+    wheel = question.model.system.structure.wheel
+    if wheel is not None and hill.disturbance is not None and found.verdict != "stable":
+        said += _named(question, hill.disturbance)
+    return _seen(question, accepted, found, said)
+
+
+def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -> Examined:
+    return Examined(
+        accepted.point.omega,
+        found.verdict,
+        found.multiplier,
+        found.multiplier_error,
+        said,
+        large=too_large(question),
+        work=hill_work(question.model.system) if by_hill(question.model.system) else found.work,
+        multipliers=found.floquet.multipliers,
+    )
+
+
+def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
+    """Return which wave of a wheel the multiplier that decides belongs to; empty where disturbances die."""
+    if question.model.system.structure.wheel is None or found.verdict == "stable":
+        return ""
+    wave = growing_wave(point_disturbances(question.problem, accepted.point), found.multiplier)
+    return "" if wave is None else _named(question, wave)
+
+
+def _named(question: Question, wave: WaveDisturbance) -> str:
+    """Return which wave a disturbance is."""
+    wheel = question.model.system.structure.wheel
+    diameters = 0 if wheel is None else wave.nodal_diameter(wheel.sectors)
+    return f", in wave {wave.wave} ({diameters} nodal diameters) near {wave.omega / HZ:.5g} Hz"
+
+
+def with_motion(examined: Examined, check: Check | None) -> Examined:
+    """Return what was found with what the motion in time did, where the multipliers do not decide."""
+    if check is None or examined.verdict != "undecided" or not check.motion:
+        return examined
+    verdict = BY_MOTION.get(check.motion, examined.verdict)
+    alone = np.isfinite(check.transient) and not np.isfinite(check.refined)
+    if check.motion == "left" and alone and abs(check.difference_percent) < FAR:
+        verdict = "undecided"  # few harmonics may be so far off the motion that they stand for
+    if check.wanders_near:
+        verdict = "undecided"  # a machine does not leave it by more than it is known
+    return replace(examined, verdict=verdict, motion=check.motion)
+
+
+def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
+    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done."""
+    return (
+        response.top is not None
+        and any(e.position == response.peak and e.verdict == "undecided" and not e.motion for e in examined)
+        and integrable(question)
+    )
+
+
+def integrable(question: Question) -> bool:
+    """Whether motions are integrated in time without being asked to: where their stability can be examined and that is soon done; not with structural damping."""
+    system = question.model.system
+    can = not why_not(question) and system.structure.of_harmonic(1).loss is None
+    return can and seconds_in_time(system) < MOST_IN_TIME
+
+
+def why_not(question: Question) -> str:
+    """Return why no point of a case is examined; empty where the multipliers, or Hill's method, can be had."""
+    system = question.model.system
+    if not by_hill(system):
+        return unexaminable(question)
+    wheel = system.structure.wheel
+    return ONE_SECTOR if wheel is not None and not wheel.has_every_wave else ""
+
+
+def unexaminable(question: Question) -> str:
+    """Return why no point of a case has all its multipliers; empty where nothing is known against it."""
+    system = question.model.system
+    if system.interface.rigid:
+        return "a contact is rigid: its force is no function of the gap"
+    why, wheel = too_long(system, forced=True), system.structure.wheel
+    if not why and wheel is not None and not wheel.has_every_wave:
+        return ONE_SECTOR
+    return why
+
+
+def cost_line(question: Question) -> str:
+    """Return what ``stickslip check`` says of the examination."""
+    if question.examine == "off":
+        return 'stability: not examined, forced_response.stability is "off"'
+    why = why_not(question)
+    if why:
+        return f"stability: not examined, {why}"
+    if by_hill(question.model.system):
+        system = question.model.system
+        waves = "" if system.structure.wheel is None else " against every wave, one sector at a time"
+        most = max(1.0, hill_work(system) / FLOPS)
+        return f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s"
+    points = {
+        "all": "every point",
+        "peak": "the peak",
+        "auto": "the peak, and other points as far as the work of the solutions goes, all of them where matrices are small,",
+    }[question.examine]
+    seconds = seconds_in_time(question.model.system)
+    motion = (
+        f"up to {seconds:.1f} s of integration in time"
+        if seconds < MOST_IN_TIME
+        else f"it stays undecided without --verify (about {seconds:.0f} s)"
+    )
+    which = "the peak" if question.examine == "peak" else "one"
+    return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where {which} is undecided, {motion}"

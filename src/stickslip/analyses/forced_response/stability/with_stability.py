@@ -1,0 +1,178 @@
+"""The response of a case with the stability of its points: examined once, undecided ones integrated in time, motions raised to more harmonics."""
+
+from collections.abc import Generator, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import IN_TIME, STABLE, Question
+from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
+from stickslip.analyses.forced_response.stability.comparison import Check
+from stickslip.analyses.forced_response.stability.examining import (
+    examined_points,
+    neighbours_of,
+    with_stable_peak,
+)
+from stickslip.analyses.forced_response.stability.in_time import check_in_time, seconds_in_time
+from stickslip.analyses.forced_response.stability.stable import (
+    Examined,
+    as_note,
+    examine,
+    from_note,
+    integrable,
+    to_integrate,
+    with_motion,
+    with_raised,
+)
+from stickslip.errors import InputError
+from stickslip.response.forced.problem import ForcedPoint
+from stickslip.study.analysis import Notes, Pieces
+from stickslip.study.store.progress import LOG
+from stickslip.units import HZ
+
+MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
+MOST_DOUBTS = 20  # other motions that are integrated in time,
+SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
+
+
+@dataclass(eq=False)
+class Looked:
+    """Examines points in the order in which they are asked for.
+
+    Parameters
+    ----------
+    question
+        Of the case.
+    notes
+        Of the job.
+    count
+        Points that were asked for.
+    taken
+        Those of them that a stopped run had examined.
+    """
+
+    question: Question
+    notes: Notes
+    count: int = 0
+    taken: int = 0
+
+    def __call__(self, accepted: Accepted) -> Examined:
+        """Return what is found of the stability of a point."""
+        name, self.count = f"{STABLE}.{self.count}", self.count + 1
+        known, pieces = self.notes.get(name), Pieces(self.notes, name)
+        one = from_note(known, accepted.point) if known else examine(self.question, accepted, pieces.keep)
+        self.taken += bool(known)
+        self.notes.put(name, as_note(one))
+        pieces.give_up()
+        if pieces.taken:
+            self._say(f"{one.omega / HZ:.3f} Hz: {pieces.taken} pieces are taken over from a run that was stopped")
+        return one
+
+    def tell(self) -> None:
+        """Say how many points were known."""
+        if self.taken:
+            self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")
+
+    def _say(self, text: str) -> None:
+        LOG.info(f"stability: {self.question.said(text)}")
+
+
+def with_stability(
+    question: Question, points: Sequence[ForcedPoint], notes: Notes
+) -> Generator[ForcedPoint, None, tuple[Response, list[Examined]]]:
+    """Return the response with its stable peak and what is known of the stability; yield motions that take the place of points whose stability they tell."""
+    ended = notes.get("finished") or {"points": len(points)}
+    notes.put("finished", ended)
+    solved, raised = list(points[: ended["points"]]), list(points[ended["points"] :])
+    response = collect(question.problem, solved, question.model.peak_output)
+    look = Looked(question, notes)
+    examined = _examined(question, response, notes, look)
+    for point in with_raised([a.point for a in response.accepted], examined)[len(raised) :]:
+        raised.append(point)
+        yield point
+    if raised:
+        response = collect(question.problem, [*solved, *raised], question.model.peak_output)
+        examined = _with_peak(response, examined, look)
+    return with_stable_peak(response, examined), examined
+
+
+def _with_peak(response: Response, examined: list[Examined], look: Looked) -> list[Examined]:
+    """Examine the largest motion, too, where another one has become it since motions took the places of points."""
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, examined)
+        known = {e.position for e in examined if e.basis != "not examined"}
+        if peak.top is None or peak.peak in known:
+            break
+        found = replace(look(peak.top), position=peak.peak, raised=None)
+        others = [e for e in examined if e.position != peak.peak]
+        examined = sorted([*others, found], key=lambda e: e.position)
+    return examined
+
+
+def _examined(question: Question, response: Response, notes: Notes, look: Looked) -> list[Examined]:
+    """Examine the stability; what an interrupted run has examined is not done again.
+
+    Where a motion stays undecided and is soon integrated in time, that decides: of the peak, whose place another takes where the motion leaves it, then
+    of others.
+    """
+    found = examined_points(question, response, look)
+    look.tell()
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, found)
+        if not to_integrate(question, peak, found) or peak.top is None:
+            break
+        check = integrated(question, peak, peak.top, found, notes)
+        found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
+    if question.examine in ("peak", "off") or not integrable(question):
+        return found
+    return _doubts_in_time(question, response, found, notes)
+
+
+def _doubts_in_time(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
+    """Integrate in time the points that multipliers or predictions leave open, the largest first, and carry what a motion attains to its neighbours."""
+    found, tried = examined, set[int]()
+    seconds = seconds_in_time(question.model.system)
+    for _ in range(min(MOST_DOUBTS, int(SECONDS_OF_DOUBTS / seconds))):
+        open_ = _open_places(question, response, found) - tried
+        if not open_:
+            break
+        place = max(open_, key=lambda i: response.amplitude(response.accepted[i]))
+        tried.add(place)
+        own = response.accepted[place]
+        try:
+            check = integrated(question, response, own, found, notes)
+        except InputError:
+            break  # a model that has no form in time keeps its doubts
+        found = [with_motion(e, check) if e.position == place else e for e in found]
+        found = neighbours_of(question, response, found, [own.point.omega] * (check.motion == "attained"))
+    return found
+
+
+def _open_places(question: Question, response: Response, examined: Sequence[Examined]) -> set[int]:
+    """Return the positions of points whose stability is undecided, and of those whose harmonics a prediction alone doubts; not of unstable ones."""
+    undecided = {e.position for e in examined if e.verdict == "undecided" and not e.motion}
+    unstable = {e.position for e in examined if e.verdict == "unstable"}
+    threshold = question.problem.strategy.threshold
+    predicted = (
+        i
+        for i, a in enumerate(response.accepted)
+        if a.point.converged and np.isnan(a.audit_error) and a.own_error > threshold
+    )
+    return undecided | ({*predicted} - unstable)
+
+
+def integrated(
+    question: Question, response: Response, accepted: Accepted, examined: Sequence[Examined], notes: Notes
+) -> Check:
+    """Integrate in time; what an interrupted run has integrated is not done again."""
+    omega = accepted.point.omega
+    name = f"{IN_TIME}.{omega!r}"
+    known = notes.get(name)
+    if known:
+        check = Check(**known)
+    else:
+        doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
+        check = check_in_time(question, response, accepted, *doubted)
+    notes.put(name, asdict(check))
+    LOG.info(f"time integration: {question.said(check.sentence)}")
+    return check

@@ -1,0 +1,153 @@
+"""Verdicts on a forced response, point by point and case by case."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.chooser import error_text
+from stickslip.analyses.forced_response.stability.stable_words import said_of
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.finding import Finding, without_place
+from stickslip.analyses.forced_response.verdicts.physics_rules import PHYSICS_RULES, told_of_model
+from stickslip.analyses.forced_response.verdicts.rules import RULES
+from stickslip.analyses.forced_response.verdicts.stable_rules import LEFT
+from stickslip.arrays import IntArray
+from stickslip.harmonic.judging import REACH
+from stickslip.study.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level, Verdict, of_all_cases, worst
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A case, and what each rule has found of it."""
+
+    label: str
+    case: Curve
+    findings: tuple[tuple[Finding, ...], ...]
+
+    @property
+    def level(self) -> Level:
+        """The case is as bad as its peak and as what holds for all of it."""
+        every = (f for own in self.findings for f in own)
+        return worst(f.level for f in every if not f.points or self.case.peak in f.points)
+
+    @property
+    def of_points(self) -> tuple[IntArray, list[str]]:
+        """(n,) number of the level of each point among `POINT_LEVELS`, and why, empty where it is trusted."""
+        levels = np.zeros(self.case.at.size, dtype=np.int64)
+        reasons: list[list[str]] = [[] for _ in levels]
+        for found, i in ((f, i) for own in self.findings for f in own for i in f.points):
+            levels[i] = max(levels[i], LEVELS.index(found.level))
+            reasons[i].append(found.why)
+        for i in self.case.unstable:
+            if levels[i] < LEVELS.index("wrong"):
+                levels[i] = POINT_LEVELS.index(UNSTABLE)
+                reasons[i].insert(0, LEFT)
+        return levels, ["; ".join(own) for own in reasons]
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """The worst first; a case that is trusted says what it was examined for."""
+        found = sorted((v for own in self.findings for v in self._of_rule(own)), reverse=True)
+        if self.level == "trusted":
+            hz = self.case.peak_hz if self.case.peak >= 0 else None
+            found = [Verdict("trusted", self.label, hz, _examined(self.case)), *found]
+        return said_once(found)
+
+    def _of_rule(self, found: Sequence[Finding]) -> Iterator[Verdict]:
+        """Yield a verdict for what holds as a whole, and of each level one for its points: of the peak, else of the worst."""
+        whole = [f for f in found if not f.points]
+        yield from (Verdict(f.level, self.label, None, f.why, f.remedy) for f in whole)
+        for level in LEVELS:
+            group = [f for f in found if f.points and f.level == level]
+            if group:
+                first = max(group, key=self._weight)
+                at = self.case.peak if self.case.peak in first.points else first.points[0]
+                why = first.why + (self._others(group, first) if len(group) > 1 else "")
+                yield Verdict(level, self.label, float(self.case.hz[at]), why, first.remedy)
+
+    def _weight(self, found: Finding) -> tuple[bool, float, float]:
+        """Return what decides which finding stands for all: at the peak, else the largest, else the nearest to the peak."""
+        apart = np.abs(self.case.hz[list(found.points)] - self.case.peak_hz).min()
+        return self.case.peak in found.points, found.size, -float(np.nan_to_num(apart))
+
+    def _others(self, group: Sequence[Finding], first: Finding) -> str:
+        """Say at how many points the same was found, and the largest value with its own frequency."""
+        hz = self.case.hz[sorted({i for f in group for i in f.points})]
+        count = f"{hz.size} of {self.case.hz.size} points"
+        most = max(group, key=lambda f: f.size)
+        told = ""
+        if most.value and most is not first:
+            told = f", the most at {self.case.hz[most.points[0]]:.2f} Hz ({most.value})"
+        return f"; the same is said of {count}, {hz.min():.2f} to {hz.max():.2f} Hz{told}"
+
+
+def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
+    """Return verdicts of a case without what one before says whole, as a part of a sentence: the same march in time is a doubt of a point and belongs to a note."""
+    told: list[Verdict] = []
+    for v in verdicts:
+        known = [before.why for before in told if len(before.why) >= ALIKE]
+        told.append(replace(v, why=reduce(lambda why, own: why.replace(f"; {own}", ""), known, v.why)))
+    return tuple(told)
+
+
+def _examined(case: Curve) -> str:
+    """Say what was examined at the peak, its stability first, and what was not."""
+    if case.peak < 0:
+        return "nothing to judge"
+    peak = case.peak
+    because = [
+        f" ({without_place(str(row['stability_sentence'])).removeprefix('not examined: ')})"
+        for point, row in case.examined("stability_verdict")
+        if point == peak and row["stability_verdict"] == "not examined"
+    ]
+    said = [f"peak with H = {case.kept[peak]}, {said_of(case.peak_stability)}{''.join(because)}"]
+    said += ["exact, as no force acts on the harmonics left out"] * bool(case.exact[peak])
+    for value, about in (
+        (np.nan if case.exact[peak] else case.own_error[peak], "predicted error"),
+        (case.audit[peak], "difference from more harmonics"),
+        (case.reference[peak], f"predicted change with up to {REACH * case.cap} harmonics"),
+    ):
+        said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
+    said += ["attained in time integration"] * bool(case.attained[peak])
+    said += told_of_model(case)
+    return ", ".join(said)
+
+
+def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
+    """Return what the rules find of each case of a finished dataset.
+
+    Parameters
+    ----------
+    data
+        Of `put_together`.
+    labels
+        Of the cases.
+    """
+    curves = [Curve(data, i) for i in range(len(labels))]
+    return tuple(
+        Judged(label, curve, tuple(tuple(rule(curve)) for rule in (*RULES, *PHYSICS_RULES)))
+        for label, curve in zip(labels, curves, strict=True)
+    )
+
+
+def verdicts(data: xr.Dataset, labels: Sequence[str]) -> tuple[Verdict, ...]:
+    """Return the verdicts of all cases; what holds for each of several is said once."""
+    return of_all_cases([v for own in judged(data, labels) for v in own.verdicts], labels)
+
+
+def with_levels(data: xr.Dataset, labels: Sequence[str]) -> dict[str, tuple[str, object]]:
+    """Return the level of each case and of each point, and why, as variables: dimension and values."""
+    every = judged(data, labels)
+    found: dict[str, tuple[str, object]] = {
+        "case_verdict": ("case", np.array([LEVELS.index(own.level) for own in every]))
+    }
+    if "point_case" not in data:
+        return found
+    levels = np.zeros(data.sizes["point"], dtype=np.int64)
+    reasons = np.full(levels.size, "", dtype=object)
+    for own in every:
+        levels[own.case.at], reasons[own.case.at] = own.of_points
+    return found | {"verdict": ("point", levels), "verdict_reason": ("point", reasons.astype(str))}

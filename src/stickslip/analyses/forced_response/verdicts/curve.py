@@ -1,0 +1,394 @@
+"""One case of a finished dataset, for the rules of its verdicts; missing variables are NaN, empty or absent."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.problem import RIGID
+from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.verdicts.jumps import stored_energy
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.harmonic.harmonic_set import named
+from stickslip.response.forced.amplitude import amplitudes
+
+DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
+ATTAINED = 1.0  # percent between a settled time integration and the balance
+HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
+UNSTABLE = MOTION["unstable"]
+CHECKS = ("verify", "stability")  # whose rows speak of single points
+CARRIED = 2  # the number of motion_stability_basis
+FREQUENCY_RTOL = 1e-9  # relative difference of frequencies that are one
+
+
+def motion_of(said: Mapping[str, Any]) -> str:
+    """Return what the motion in time did by the row of a check; files that do not tell it say whether it settled."""
+    settled = "attained" if int(said["verify_settled"]) else "not settled"
+    return str(said.get("verify_motion", "")) or settled
+
+
+def branch_length(refinement: FloatArray) -> int:
+    """Return how many points stand along the branch; behind them stand those that were added to resolve the peak.
+
+    Parameters
+    ----------
+    refinement
+        (n,) 1 for points of the peak; one in the place of a point of the branch keeps the place.
+    """
+    along = np.flatnonzero(np.nan_to_num(refinement) == 0)
+    return int(along[-1]) + 1 if along.size else 0
+
+
+def peak_output(data: xr.Dataset, case: int) -> int:
+    """Return the position of the output whose peak counts in a case: of a wheel whose sectors differ that of the blade which attains it."""
+    labels = [str(x) for x in data["output"].values] if "output" in data.coords else []
+    wanted = str(data.attrs.get("report_output", ""))
+    named = labels.index(wanted) if wanted in labels else 0
+    top = float(data["peak_point"].values[case]) if "largest_blade" in data else -1.0
+    if not 0 <= top < data.sizes["point"]:
+        return named
+    off = np.abs(data["amplitude"].values[int(top)] - data["peak_amplitude"].values[case])
+    return named if off[named] <= off.min() else int(np.argmin(off))
+
+
+def of_largest_blade(data: xr.Dataset, case: int) -> bool:
+    """Whether the peak of a case is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+    if "blade_peak_amplitude" not in data or "largest_blade" not in data:
+        return False
+    each = data.sizes["output"] // data.sizes["blade"]
+    return bool(peak_output(data, case) // each == int(data["largest_blade"].values[case]))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A case.
+
+    Parameters
+    ----------
+    data
+        The dataset of all cases.
+    case
+        Position along ``case``.
+    """
+
+    data: xr.Dataset
+    case: int
+
+    def has(self, name: str) -> bool:
+        """Whether the dataset holds a variable."""
+        return name in self.data
+
+    @cached_property
+    def at(self) -> IntArray:
+        """(n,) the points of the case along ``point``."""
+        if "point_case" not in self.data:
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(self.data["point_case"].values == self.case)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the (n,) values of a variable along ``point``; NaN where there is none."""
+        if not self.has(name):
+            return np.full(self.at.size, np.nan)
+        return np.asarray(self.data[name].values[self.at], dtype=float)
+
+    def number(self, name: str) -> float:
+        """Return the value of a variable along ``case``; NaN where there is none."""
+        return float(self.data[name].values[self.case]) if self.has(name) else float("nan")
+
+    def text(self, name: str) -> str:
+        """Return the text of a variable along ``case``; empty where there is none."""
+        return str(self.data[name].values[self.case]) if self.has(name) else ""
+
+    def texts(self, name: str) -> list[str]:
+        """Return the texts of a variable along ``point``; empty ones where there is none."""
+        if not self.has(name):
+            return [""] * self.at.size
+        return [str(text) for text in self.data[name].values[self.at]]
+
+    @cached_property
+    def hz(self) -> FloatArray:
+        """(n,) frequencies."""
+        return self.floats("frequency_hz")
+
+    @cached_property
+    def status(self) -> IntArray:
+        """(n,) how the solver ended."""
+        return np.nan_to_num(self.floats("status")).astype(np.int64)
+
+    @cached_property
+    def converged(self) -> BoolArray:
+        """(n,) whether there is a solution."""
+        return np.asarray(self.status == 0)
+
+    @cached_property
+    def branch(self) -> IntArray:
+        """Positions of the points in the order of the branch; those that resolve the peak and stand behind its end are left out."""
+        return np.arange(branch_length(self.floats("refinement")))
+
+    @cached_property
+    def output(self) -> str:
+        """Label of the output whose peak counts."""
+        return str(self.data["output"].values[peak_output(self.data, self.case)])
+
+    @cached_property
+    def amplitude(self) -> FloatArray:
+        """(n,) amplitude of that output, m; of the largest blade at each point where the largest of a mistuned wheel counts."""
+        column, size = peak_output(self.data, self.case), self.data["amplitude"].values[self.at]
+        if not of_largest_blade(self.data, self.case):
+            return np.asarray(size[:, column])
+        each = self.data.sizes["output"] // self.data.sizes["blade"]
+        return np.asarray(np.fmax.reduce(size[:, column % each :: each], axis=1))
+
+    @cached_property
+    def dissipation(self) -> FloatArray:
+        """(n,) energy that all contacts dissipate in a cycle, J; zero where the dataset does not say."""
+        if not self.has("dissipated_energy"):
+            return np.zeros(self.at.size)
+        return np.asarray(np.nansum(self.data["dissipated_energy"].values[self.at], axis=1))
+
+    @cached_property
+    def elastic(self) -> float:
+        """Largest energy that the contacts store, J: beside it the rounding of `dissipation` is seen."""
+        if not self.has("gap") or not self.has("contact_force"):
+            return 0.0
+        gap, force = (self.data[name].values[self.at, 1:] for name in ("gap", "contact_force"))
+        return stored_energy(gap, force)
+
+    @cached_property
+    def peak(self) -> int:
+        """Position of the peak, -1 if there is none."""
+        top = self.number("peak_point")
+        found = np.flatnonzero(self.at == top)
+        return int(found[0]) if found.size else -1
+
+    @cached_property
+    def hump(self) -> int:
+        """Position of the largest maximum inside the sweep, -1 if there is none that stands out on both sides."""
+        order = np.flatnonzero(self.converged & np.isfinite(self.amplitude))
+        order = order[np.argsort(self.hz[order], kind="stable")]
+        size = self.amplitude[order]
+        inner = np.arange(1, len(size) - 1)
+        inner = inner[(size[inner] >= size[inner - 1]) & (size[inner] >= size[inner + 1])]
+        for k in sorted(inner, key=lambda k: -size[k]):
+            if order[k] != self.peak and size[k] > HUMP * max(size[:k].min(), size[k:].min()):
+                return int(order[k])
+        return -1
+
+    @property
+    def peak_hz(self) -> float:
+        """Frequency of the peak; NaN if there is none."""
+        return float(self.hz[self.peak]) if self.peak >= 0 else float("nan")
+
+    @cached_property
+    def supports(self) -> list[tuple[int, ...]]:
+        """Harmonics that each point keeps."""
+        rows = self.data["harmonic_kept"].values[self.at]
+        return [tuple(int(h) for h in np.flatnonzero(row)) for row in rows]
+
+    @cached_property
+    def kept(self) -> list[str]:
+        """The same as texts."""
+        return [named(own) for own in self.supports]
+
+    @cached_property
+    def few(self) -> BoolArray:
+        """(n,) whether a point keeps the harmonics of the first passage."""
+        own = tuple(int(h) for h in np.atleast_1d(self.data.attrs.get("low_harmonics", [0, 1])))
+        return np.array([s == own for s in self.supports], dtype=bool)
+
+    @property
+    def low(self) -> str:
+        """These as text."""
+        return named(np.atleast_1d(self.data.attrs.get("low_harmonics", [0, 1])))
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything chose the harmonics."""
+        return bool(np.isfinite(self.data.attrs.get("selection_threshold", np.nan)))
+
+    @property
+    def limit(self) -> float:
+        """Error above which an answer is doubtful, a fraction."""
+        return float(self.data.attrs.get("error_limit_percent", DEFAULT_LIMIT)) / 100
+
+    @cached_property
+    def own_error(self) -> FloatArray:
+        """(n,) error predicted of each point's own solution, a fraction; NaN where it was not judged."""
+        return self.floats("own_error_percent") / 100
+
+    @property
+    def exact(self) -> BoolArray:
+        """(n,) whether no force acts on the harmonics that a point leaves out."""
+        return np.asarray(self.own_error == 0.0)
+
+    @cached_property
+    def audit(self) -> FloatArray:
+        """(n,) difference from a solution with more harmonics, a fraction; NaN where none was made."""
+        return self.floats("audit_error_percent") / 100
+
+    @cached_property
+    def reference(self) -> FloatArray:
+        """(n,) change that the judging set of the most harmonics is predicted to make, a fraction; NaN where it was not asked for."""
+        return self.floats("reference_error_percent") / 100
+
+    @cached_property
+    def unstable(self) -> IntArray:
+        """Positions of points whose motion is known to be unstable."""
+        off = self.floats("motion_stability") == UNSTABLE
+        for point, row in self.examined("stability_verdict"):
+            off[point] |= str(row["stability_verdict"]) == "unstable"
+        return np.flatnonzero(off)
+
+    @cached_property
+    def sure(self) -> BoolArray:
+        """(n,) whether a point is known to be stable, and its harmonics to be enough: by an audit, else by prediction, or by a motion in time."""
+        error = np.where(np.isnan(self.audit), self.own_error, self.audit)
+        return np.asarray(
+            (self.floats("motion_stability") == MOTION["stable"]) & (self.attained | (error <= self.limit))
+        )
+
+    @cached_property
+    def known(self) -> frozenset[int]:
+        """Positions of points whose stability follows from others, whatever their own multipliers leave open."""
+        carried = self.floats("motion_stability_basis") == CARRIED
+        return frozenset(np.flatnonzero(carried).tolist())
+
+    @property
+    def peak_stability(self) -> str:
+        """What is known of the stability of the peak, in a word; of files that hold rows of examined points alone what its row says."""
+        rows = [row for point, row in self.examined("stability_verdict") if point == self.peak]
+        known = [str(row["stability_verdict"]) for row in rows]
+        word = self.floats("motion_stability")[self.peak] if self.peak >= 0 else np.nan
+        return next(iter(known), next((name for name, k in MOTION.items() if k == word), ""))
+
+    @property
+    def rigid(self) -> bool:
+        """Whether a contact is rigid."""
+        laws = self.data["contact_law"].values if self.has("contact_law") else ()
+        return RIGID in [str(law) for law in laws]
+
+    @property
+    def forward(self) -> float:
+        """1 where the frequencies were asked for upwards, -1 downwards."""
+        return -1.0 if self.data.attrs.get("direction", "up") == "down" else 1.0
+
+    @property
+    def auto(self) -> bool:
+        """Whether harmonics were raised along the branch."""
+        return bool(self.data.attrs.get("passages", "") == "auto")
+
+    @property
+    def cap(self) -> int:
+        """Highest harmonic that the response might keep."""
+        return int(self.data.attrs.get("high_order", max(s[-1] for s in self.supports)))
+
+    @property
+    def stepped(self) -> bool:
+        """Whether frequencies were given, instead of a branch followed."""
+        return bool(self.data.attrs.get("stepped", 0))
+
+    @property
+    def outside(self) -> bool:
+        """Whether the peak lies beyond the frequencies that were asked for, where a branch goes round a fold."""
+        low, high = self.number("lowest_hz"), self.number("highest_hz")
+        return bool(self.peak_hz < low * (1 - FREQUENCY_RTOL) or self.peak_hz > high * (1 + FREQUENCY_RTOL))
+
+    @property
+    def at_the_end(self) -> bool:
+        """Whether the peak is the end of the sweep, or the last point that was found there."""
+        ends = [self.hz.min(), self.hz.max(), self.number("lowest_hz"), self.number("highest_hz")]
+        return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= FREQUENCY_RTOL * self.peak_hz))
+
+    @property
+    def range_key(self) -> str:
+        """Key of the study that says where the response is."""
+        known = "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
+        return str(self.data.attrs.get("range_key", known))
+
+    @property
+    def nearer(self) -> str:
+        """What gives more points."""
+        listed = self.range_key == "frequencies_hz"
+        return "nearer forced_response.frequencies_hz" if listed else "more forced_response.points"
+
+    def examined(self, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Yield the points that a check looked at, with what its row says.
+
+        Parameters
+        ----------
+        name
+            A variable of the check, such as ``verify_settled``: the first word begins the names of all.
+        """
+        yield from self._looked_at.get(name.partition("_")[0], ()) if self.has(name) else ()
+
+    @cached_property
+    def _looked_at(self) -> dict[str, list[tuple[int, dict[str, Any]]]]:
+        """What `examined` yields, by the first word: rules ask for it again and again, and the dataset makes an array at each look."""
+        words = [w for w in CHECKS if self.at.size and self.has(f"{w}_case")]
+        return {word: list(self._points_of(word)) for word in words}
+
+    def _points_of(self, word: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        for said in self.rows(word):
+            off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
+            near = np.flatnonzero(self.converged & (off <= FREQUENCY_RTOL))
+            # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
+            told = MOTION.get(str(said.get("stability_verdict")), -1)
+            other = self.floats("motion_stability") != told
+            for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[:1]:
+                yield point, said
+
+    def rows(self, word: str) -> Iterator[dict[str, Any]]:
+        """Yield what is told of the case along the dimension `word`, whose variables begin with it."""
+        if f"{word}_case" not in self.data:
+            return
+        own = self.data[f"{word}_case"].dims
+        columns = {str(n): v.values for n, v in self.data.data_vars.items() if v.dims == own}
+        for k in np.flatnonzero(columns[f"{word}_case"] == self.case):
+            yield {name: column[k] for name, column in columns.items()}
+
+    @cached_property
+    def attained(self) -> BoolArray:
+        """(n,) whether a time integration settled to the same amplitude, and to the same outputs within the error that is tolerated."""
+        near = [abs(off) <= self.allowed_in_time(i) for i, off in enumerate(self.integrated)]
+        return np.array(near, dtype=bool) & ~(self.outputs_off > self.limit)
+
+    def allowed_in_time(self, point: int) -> float:
+        """Return the difference from a time integration up to which a point stands, percent: of the peak `ATTAINED`, of others the error that is tolerated."""
+        return ATTAINED if point == self.peak else 100 * self.limit
+
+    @cached_property
+    def left_out(self) -> tuple[int, float, float] | None:
+        """Of the peak the largest harmonic that its amplitude leaves out, the mean apart, its share of half of peak to peak, and that, m; None where none is."""
+        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has("output_displacement"):
+            return None
+        parts = self.data["output_displacement"].values[self.at[self.peak]]
+        column = peak_output(self.data, self.case)
+        motion = parts[:, column, 0] + 1j * parts[:, column, 1]
+        driven = [int(h) for h in np.atleast_1d(self.data.attrs.get("driven_harmonics", [1]))]
+        rest = np.abs(motion)
+        rest[[0, *(h for h in driven if h < rest.size)]] = 0.0
+        whole = float(amplitudes(motion[:, None], (), "half_peak_to_peak")[0])
+        if not whole > 0.0:
+            return None
+        return int(rest.argmax()), float(rest.max()) / whole, whole
+
+    @cached_property
+    def outputs_off(self) -> FloatArray:
+        """(n,) largest difference of an output from a time integration that attains the motion, with its phase, a fraction; NaN where none was taken."""
+        found = np.full(self.at.size, np.nan)
+        for point, said in self.examined("verify_difference_percent"):
+            if motion_of(said) == "attained":
+                found[point] = float(said.get("verify_outputs_percent", np.nan)) / 100
+        return found
+
+    @cached_property
+    def integrated(self) -> FloatArray:
+        """(n,) difference from a time integration that attains the motion, percent; NaN where none did."""
+        found = np.full(self.at.size, np.nan)
+        for point, said in self.examined("verify_difference_percent"):
+            if motion_of(said) == "attained":
+                found[point] = float(said["verify_difference_percent"])
+        return found

@@ -1,0 +1,310 @@
+"""The working range of the friction: the ends of an optimisation curve, from its peaks and the contacts.
+
+Along the curve, from the end where all contacts stick to the other, a damper first only stiffens, then takes the peak down, and at
+last lets go: its force no longer grows with the motion, and the peak over the force rises again.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby, takewhile
+from typing import Literal, get_args
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.jumps import LOSS_SEEN
+from stickslip.arrays import IntArray
+from stickslip.contact.law import OPEN, SLIP
+from stickslip.study.varied import first_varied_number, other_values
+from stickslip.study.verdict import LEVELS
+
+Regime = Literal["stuck", "stiffens", "works", "lets go"]
+REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a dataset is its place
+HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
+MIN_PEAKS = 3  # peaks of a curve
+HELD_BY = (
+    "ratio",
+    "friction_coefficient",
+    "slip_limit_n",
+    "slip_limit_pa",
+    "preload_n",
+    "preload_pa",
+    "interference_m",
+)  # the more of them, the longer contacts stick; ratio: pull over excitation
+FORCE = "force_n"  # of a load
+APART = 0.25  # of the cycle: by so much more an end sticks that is told by its contacts
+SLIDES_MORE = 2.0  # times the loss over the amplitude at the other end
+SETTINGS = (
+    "forced_response",
+    "harmonics",
+    "limits",
+    "output",
+    "reduction",
+    "retention",
+    "solver",
+)  # tables of how things are computed: over them no joint goes from stick to slip
+
+
+@dataclass(frozen=True)
+class ContactsAtPeak:
+    """What the contacts do in the cycle of a peak.
+
+    Parameters
+    ----------
+    sticking
+        Share of the cycle that they stick, the mean over all.
+    linear
+        Whether none slips, none opens or closes, and they dissipate nothing: the peak is that of a linear system.
+    holding
+        Whether any sticks from the beginning of the cycle to its end.
+    """
+
+    sticking: float
+    linear: bool
+    holding: bool
+
+
+def contacts_at_peak(state: IntArray) -> ContactsAtPeak:
+    """Return what contacts do whose states over a cycle, (contact, tangent, sample), are 0 stick, 1 slip or 2 open."""
+    slips, opens = (np.any(state == s, axis=1) for s in (SLIP, OPEN))
+    stays = ~np.any(slips | opens, axis=1)
+    shut = np.all(opens, axis=1)
+    return ContactsAtPeak(
+        sticking=float(np.mean(~(slips | opens))),
+        linear=bool(np.all((stays | shut) & ~np.any(slips, axis=1))),
+        holding=bool(np.any(stays)),
+    )
+
+
+@dataclass(frozen=True)
+class CurvePeak:
+    """A point of an optimisation curve.
+
+    Parameters
+    ----------
+    value
+        Of the varied key.
+    size
+        Largest amplitude, over the force where every case has one; m or m/N.
+    hertz
+        Its frequency.
+    contacts
+        What they do there.
+    amplitude
+        The largest amplitude itself, m.
+    loss
+        Energy that the contacts dissipate in a cycle of it, J; zero where it is rounding, NaN where it is not known.
+    case
+        Position along ``case``.
+    force
+        Amplitude of the excitation, N; NaN where it is not known.
+    """
+
+    value: float
+    size: float
+    hertz: float
+    contacts: ContactsAtPeak
+    amplitude: float = float("nan")
+    loss: float = float("nan")
+    case: int = -1
+    force: float = float("nan")
+
+
+@dataclass(frozen=True)
+class WorkingRange:
+    """An optimisation curve and its regimes.
+
+    Parameters
+    ----------
+    peaks
+        From the end where contacts stick to the other; by rising values where that end is not known.
+    regimes
+        One a peak, none where it is not known at which end contacts stick: ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak; ``works``: more; ``lets go``: on the other
+        side of the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
+    key
+        What is varied.
+    others
+        Values of what else is varied; empty where nothing is.
+    per_force
+        Whether sizes are over the force.
+    left_out
+        Labels of cases whose largest amplitude is no peak to judge by.
+    """
+
+    peaks: tuple[CurvePeak, ...]
+    regimes: tuple[Regime, ...]
+    key: str = ""
+    others: str = ""
+    per_force: bool = True
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def judged(self) -> bool:
+        """Whether it is known at which end contacts stick."""
+        return bool(self.regimes)
+
+    def of(self, *regimes: Regime) -> list[CurvePeak]:
+        """Return the peaks of some regimes, from the stuck end on."""
+        return [p for p, own in zip(self.peaks, self.regimes, strict=True) if own in regimes]
+
+    @property
+    def stretches(self) -> list[list[CurvePeak]]:
+        """Neighbours at which friction works."""
+        pairs = zip(self.peaks, self.regimes, strict=True)
+        runs = groupby(pairs, key=lambda pair: pair[1])
+        return [[p for p, _ in run] for regime, run in runs if regime == "works"]
+
+    @property
+    def loose(self) -> list[CurvePeak]:
+        """The last peaks, beyond the last one at which friction works; empty where it works to the end or nowhere lets go."""
+        backwards = zip(self.peaks[::-1], self.regimes[::-1], strict=True)
+        gone = takewhile(lambda pair: pair[1] == "lets go", backwards)
+        return [p for p, _ in gone][::-1]
+
+    @property
+    def smallest(self) -> CurvePeak:
+        """The optimum among the values computed."""
+        return min(self.peaks, key=lambda p: p.size)
+
+    @property
+    def stuck(self) -> CurvePeak | None:
+        """The stuck peak next to the first slip; None where no value was computed at which all contacts stick."""
+        own = self.of("stuck")
+        return own[-1] if own else None
+
+    @property
+    def falling(self) -> bool:
+        """Whether the stuck end is that of large values."""
+        return self.peaks[0].value > self.peaks[-1].value
+
+
+def regimes_of(peaks: Sequence[CurvePeak]) -> tuple[Regime, ...]:
+    """Return the regime of each peak of a curve that begins at the end where contacts stick."""
+    first = next((i for i, p in enumerate(peaks) if not p.contacts.linear), len(peaks))
+    best = int(np.argmin([p.size for p in peaks]))
+    least = peaks[best].size
+    known = peaks[first - 1].size * HALF_POWER if first else np.inf
+    bound = known if first else least / HALF_POWER
+    found: list[Regime] = []
+    for i, p in enumerate(peaks):
+        if i < first:
+            found.append("stuck")
+        elif i > best and least <= known and p.size > min(known, least / HALF_POWER):
+            found.append("lets go")
+        else:
+            found.append("works" if p.size <= bound else "stiffens")
+    return tuple(found)
+
+
+def sticks_at(peaks: Sequence[CurvePeak], key: str = "") -> Literal["low", "high"] | None:
+    """Return at which end of a curve of rising values contacts stick; None where it cannot be told.
+
+    The peak of a linear system tells it, with contacts that stick at one end or none that touches at the other; then the meaning of
+    the varied key; at last `_by_contacts`.
+    """
+    low, high = peaks[0], peaks[-1]
+    stuck = [p.contacts.linear and p.contacts.sticking > 0.0 for p in (low, high)]
+    gone = [p.contacts.linear and p.contacts.sticking == 0.0 for p in (low, high)]
+    if stuck[0] != stuck[1]:
+        return "low" if stuck[0] else "high"
+    if gone[0] != gone[1]:
+        return "low" if gone[1] else "high"
+    name = key.rpartition(".")[2]
+    if low.value > 0.0 and name in HELD_BY:
+        return "high"
+    if low.value > 0.0 and name == FORCE and _excites(low, high):
+        return "low"
+    return _by_contacts(low, high)
+
+
+def _excites(low: CurvePeak, high: CurvePeak) -> bool:
+    """Whether the force that is varied is the excitation: no pull, and none that the excitation grows with."""
+    scaled = np.isclose(high.force * low.value, low.force * high.value, rtol=1e-9)
+    return bool(scaled and not np.isclose(low.size, high.size, rtol=1e-3))
+
+
+def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | None:
+    """Return the end that sticks for a much larger share of the cycle, and where contacts dissipate less over the amplitude.
+
+    A contact that opens slips less, too: small differences of the share tell nothing.
+    """
+    more = low.contacts.sticking - high.contacts.sticking
+    holds, slides = (low, high) if more > 0.0 else (high, low)
+    lost = [p.loss / p.amplitude for p in (holds, slides)]
+    if abs(more) < APART or not lost[1] > SLIDES_MORE * lost[0]:
+        return None
+    return "low" if more > 0.0 else "high"
+
+
+def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | None:
+    """Put a curve over a key in order and judge it; None where there are too few peaks, or no friction."""
+    rising = sorted(peaks, key=lambda p: p.value)
+    if len(rising) < MIN_PEAKS or all(p.contacts.linear or p.loss == 0.0 for p in rising):
+        return None
+    end = sticks_at(rising, key)
+    if end is None:
+        return WorkingRange(tuple(rising), (), key)
+    ordered = rising if end == "low" else rising[::-1]
+    return WorkingRange(tuple(ordered), regimes_of(ordered), key)
+
+
+def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
+    """Return the curves of a forced response over the first varied number, one for each set of other values."""
+    key, values = first_varied_number(data)
+    if not key or key.split(".")[0] in SETTINGS or "peak_state" not in data:
+        return ()
+    force = data["excitation_n"].values if "excitation_n" in data else np.full(len(values), np.nan)
+    per_force = bool(np.all(force > 0))
+    labels = [str(x) for x in data["case_label"].values]
+    families: dict[str, list[int]] = {}
+    for case, others in enumerate(other_values(data, key)):
+        families.setdefault(others, []).append(case)
+    found = []
+    for others, cases in families.items():
+        known = {c: _peak(data, c, float(values[c]), float(force[c]), per_force=per_force) for c in cases}
+        own = working_range([p for p in known.values() if p is not None], key)
+        if own is not None:
+            out = tuple(labels[c] for c, p in known.items() if p is None)
+            found.append(replace(own, others=others, per_force=per_force, left_out=out))
+    return tuple(found)
+
+
+def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool) -> CurvePeak | None:
+    """Return the peak of a case; None where it is not known, no resonance, or wrong."""
+    curve = Curve(data, case)
+    wrong = curve.number("case_verdict") == LEVELS.index("wrong")
+    if curve.peak < 0 or curve.at_the_end or curve.outside or wrong:
+        return None
+    amplitude = float(curve.amplitude[curve.peak])
+    state = data["peak_state"].isel(case=case).transpose("contact", "tangent", "sample").values
+    if not np.isfinite(amplitude) or np.any(state < 0):
+        return None
+    contacts, loss = contacts_at_peak(state), _loss(curve)
+    if loss > 0.0:  # some laws, such as dahl, dissipate before they slip
+        contacts = replace(contacts, linear=False)
+    size = amplitude / force if per_force else amplitude
+    return CurvePeak(value, size, curve.peak_hz, contacts, amplitude, loss, case, force)
+
+
+def _loss(curve: Curve) -> float:
+    """Return the energy that contacts dissipate at a peak, J: zero where it is rounding, NaN where the dataset does not tell."""
+    if not curve.elastic > 0.0:
+        return float("nan")
+    loss = float(curve.dissipation[curve.peak])
+    return loss if loss > LOSS_SEEN * curve.elastic else 0.0
+
+
+def with_regimes(data: xr.Dataset) -> xr.Dataset:
+    """Return the dataset of a forced response with the regime of each case, -1 where it was not judged."""
+    ranges = [own for own in working_ranges(data) if own.judged]
+    if not ranges:
+        return data
+    number = np.full(data.sizes["case"], -1)
+    for own in ranges:
+        for p, regime in zip(own.peaks, own.regimes, strict=True):
+            number[p.case] = REGIMES.index(regime)
+    about = "what friction does at the peak, -1 where it was not judged"
+    flags = {"flag_values": np.arange(len(REGIMES)), "flag_meanings": " ".join(r.replace(" ", "_") for r in REGIMES)}
+    named = xr.Variable("case", number, {"units": "1", "long_name": about} | flags)
+    return data.assign(friction_regime=named)

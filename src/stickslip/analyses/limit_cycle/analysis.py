@@ -1,0 +1,40 @@
+"""Motions that nothing drives: unstable waves that friction bounds, where it does, and whether the machine stays there."""
+
+from stickslip.analyses.forced_response.stability.examination import too_long
+from stickslip.analyses.limit_cycle.dataset import dataset
+from stickslip.analyses.limit_cycle.problem import IN_TIME, question_of
+from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.limit_cycle.solve import solve
+from stickslip.analyses.limit_cycle.table import LimitCycleTable
+from stickslip.analyses.limit_cycle.verdicts import tables
+from stickslip.assembly.model import Model
+from stickslip.reduction.waves import NO_WAVE
+from stickslip.study.analysis import Analysis, Case, of_tables
+
+
+def _check(case: Case, model: Model) -> tuple[str, ...]:
+    """Say which modes grow, and whether their stability can be examined."""
+    question = question_of(case, model)
+    lines = []
+    for wave in question.waves:
+        for mode in question.followed(question.modes(wave)):
+            of = "" if wave == NO_WAVE else f"wave {wave}, "
+            lines.append(f"limit_cycle: {of}mode {mode.number}, damping ratio {100 * mode.ratio:+.3g} %")
+    why = too_long(question.model.system, forced=False)
+    stability = f"limit_cycle: stability not examined, {why}" if why else ""
+    none = "limit_cycle: no mode grows with contacts stuck"
+    return tuple(line for line in (*(lines or [none]), stability) if line)
+
+
+LIMIT_CYCLE = Analysis(
+    name="limit_cycle",
+    table=LimitCycleTable,
+    record=CycleBranch,
+    key=of_tables("limit_cycle", "solver"),
+    inputs=question_of,
+    solve=solve,
+    dataset=dataset,
+    check=_check,
+    summary=tables,
+    checks=(IN_TIME,),
+)

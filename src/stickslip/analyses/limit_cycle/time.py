@@ -1,0 +1,169 @@
+"""Motions in time beside limit cycles: whether a stable one is kept, and which of several unstable waves wins."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import MOST_IN_TIME
+from stickslip.analyses.limit_cycle.problem import Question
+from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.vibrating import as_wave, coordinate
+from stickslip.arrays import ComplexArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.errors import StickslipError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import LinearSide
+from stickslip.reduction.waves import NO_WAVE
+from stickslip.response.self_excited.in_time import Marched, march_periods, mixed_start, wave_history
+from stickslip.response.system import System
+from stickslip.response.time.sectors import whole_wheel
+from stickslip.response.time.start import TransientStart, start_from_harmonics
+from stickslip.study.store.progress import LOG
+from stickslip.units import HZ, millimetres
+
+STEPS = 512
+FEW_STEPS = 256  # where hundreds of periods are followed for what wins
+KICK = 1e-3  # of their own amplitude, by which speeds are disturbed
+SETTLED = 1e-7
+GOLDEN = 2.399963  # rad, of which no few multiples are alike
+SHARE = 0.3  # of the attracting cycle of each wave, with which waves begin that compete
+
+
+def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
+    """Return amplitude (m) and frequency (rad/s) that time integration goes to from beside each attracting cycle; NaN of others."""
+    cycles = len(branch.cycle_amplitude)
+    amplitude, omega = np.full((2, cycles), np.nan)
+    said = ""
+    for i in range(cycles):
+        if not branch.slope[i] > 0.0:
+            continue
+        try:
+            marched = _from_cycle(question, branch, i)
+        except StickslipError as error:
+            said = str(error)
+            continue
+        if not marched.overflowed:
+            amplitude[i], omega[i] = marched.amplitude[0], marched.frequency[0]
+        LOG.info(
+            f"time integration: {millimetres(amplitude[i], 5)} at {omega[i] / HZ:.4f} Hz where the balance has "
+            f"{millimetres(branch.cycle_amplitude[i], 5)} at {branch.cycle_omega[i] / HZ:.4f} Hz{_unconfirmed(branch, i, marched)}"
+        )
+    return {"amplitude": amplitude, "omega": omega, "said": said}
+
+
+def _unconfirmed(branch: CycleBranch, i: int, marched: Marched) -> str:
+    """Say that to stay near an unstable cycle for so many periods does not confirm it."""
+    if json.loads(branch.stable)[i] != "unstable":
+        return ""
+    return (
+        f"; that confirms nothing: the cycle is unstable, and {len(marched.first)} periods may be too few to leave it"
+    )
+
+
+def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
+    """Return what becomes of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
+    there = [b for b in branches if b.wave_number != NO_WAVE and (b.ratio < 0.0 or _attracts(b))]
+    own = {"waves": np.array([b.wave_number for b in there], dtype=np.int64)}
+    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}
+    if len({b.wave_number for b in there}) < 2:
+        return own | nothing
+    try:
+        system = as_wave(question.model.system, there[0].wave_number)
+        structure, contacts, load, outputs = in_time(system, question)
+        motions = _beginnings(question, there)
+    except StickslipError as error:
+        return own | nothing | {"left_out": str(error)}
+    omega = motions[0][1]
+    rest = np.zeros((2, structure.n), dtype=complex)
+    like = start_from_harmonics(rest, omega, contacts.gap_operator, contacts.laws)
+    start = _kicked(mixed_start(motions, like), motions)
+    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, FEW_STEPS)
+    history = wave_history(marched)
+    if not history.time.size:
+        return own | nothing | {"left_out": f"it grew beyond all numbers in {len(marched.first)} periods"}
+    return own | {
+        "time": history.time,
+        "amplitude": history.amplitude,
+        "sentence": history.sentence,
+        "kept": json.dumps(list(history.waves)),
+        "left_out": "",
+    }
+
+
+def _attracts(branch: CycleBranch) -> bool:
+    return bool(np.any(branch.slope > 0.0))
+
+
+def _beginnings(question: Question, branches: Sequence[CycleBranch]) -> list[tuple[ComplexArray, float]]:
+    """Return amplitudes (n,) of all sectors and frequencies, rad/s, with which waves begin: a share of their attracting cycle.
+
+    Where none was found the mode itself begins, with the amplitude at which it slips; where it never does, with the least of the others.
+    """
+    slips = [b.slips for b in branches if np.isfinite(b.slips)]
+    found = []
+    for branch in branches:
+        if _attracts(branch):
+            i = int(np.flatnonzero(branch.slope > 0.0)[0])
+            found.append((SHARE * _motion(question, branch, i)[1], float(branch.cycle_omega[i])))
+            continue
+        if not slips:
+            raise StickslipError("no wave has an amplitude from which on it slips")
+        amplitude = branch.slips if np.isfinite(branch.slips) else min(slips)
+        system = as_wave(question.model.system, branch.wave_number)
+        mode = next(m for m in question.modes(branch.wave_number) if m.number == branch.mode)
+        shape = amplitude / abs(mode.shape[coordinate(system)]) * mode.shape
+        full = np.array([np.zeros_like(shape), shape])
+        found.append((whole_wheel(system).spread(full)[1], mode.omega))
+    return found
+
+
+def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
+    """Return what is marched, and the peak output of each sector.
+
+    Raises
+    ------
+    InputError
+        If it is too large.
+    """
+    side = system.structure
+    at = coordinate(system)
+    if side.wheel is None:
+        return side, system.interface, question.model.load, np.array([at])
+    if side.n * side.wheel.sectors > MOST_IN_TIME:
+        raise StickslipError(
+            f"time integration marches all sectors, {side.n * side.wheel.sectors} coordinates, more than {MOST_IN_TIME}"
+        )
+    whole = whole_wheel(system)
+    own = whole.structure.n // side.wheel.sectors
+    static = np.tile(question.model.load.static[:own], side.wheel.sectors)
+    places = at + own * np.arange(side.wheel.sectors)
+    return whole.structure, whole.contacts, HarmonicLoad(static), places
+
+
+def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
+    system = as_wave(question.model.system, branch.wave_number)
+    structure, contacts, load, outputs = in_time(system, question)
+    motion, omega = _motion(question, branch, i), float(branch.cycle_omega[i])
+    start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
+    start = _kicked(start, [(motion[1], omega)])
+    return march_periods(
+        structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS, settles=SETTLED
+    )
+
+
+def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:
+    """Return the (H+1, n) amplitudes of a cycle; of a wheel those of all sectors."""
+    full = branch.coefficients[i, ..., 0] + 1j * branch.coefficients[i, ..., 1]
+    if branch.wave_number == NO_WAVE:
+        return full
+    return whole_wheel(as_wave(question.model.system, branch.wave_number)).spread(full)
+
+
+def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:
+    """Return a start with speeds that are off by another share for each coordinate."""
+    size = sum(omega * np.abs(motion) for motion, omega in motions)
+    shares = np.cos(GOLDEN * np.arange(start.velocity.size))
+    return replace(start, velocity=start.velocity + KICK * shares * size)

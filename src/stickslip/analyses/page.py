@@ -1,0 +1,189 @@
+"""The report: one HTML page of all analyses of a result, which needs neither network nor our package."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+import xarray as xr
+
+from stickslip.analyses.all_motions import page as all_motions
+from stickslip.analyses.forced_response.page import chapter as forced_response
+from stickslip.analyses.forced_response.page.contacts.tractions import with_bands
+from stickslip.analyses.inputs import inputs, study_of
+from stickslip.analyses.limit_cycle import page as limit_cycle
+from stickslip.analyses.modal_synthesis import page as modal_synthesis
+from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
+from stickslip.analyses.pictures import model
+from stickslip.analyses.quasi_periodic import page as quasi_periodic
+from stickslip.analyses.residual_tractions import page as residual_tractions
+from stickslip.analyses.resonance import page as resonance
+from stickslip.analyses.run_up import page as run_up
+from stickslip.analyses.waves.page import campbell, flutter, modes, safe
+from stickslip.errors import input_error
+from stickslip.report.cases import cases_of, varied
+from stickslip.report.content import Table, Words, chooser
+from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
+from stickslip.report.node import Node
+from stickslip.report.plot import Plot
+from stickslip.report.quantities import NONE, fixed, quantity
+from stickslip.report.result import analysis, open_result, versions
+from stickslip.report.section import Block, Card, Content, Part, Section
+from stickslip.study.store.netcdf import alike, one_case
+from stickslip.study.verdict import conclusion, not_trusted, of_tree
+
+SECTIONS: tuple[Section, ...] = (
+    forced_response.SECTION,
+    nonlinear_mode.SECTION,
+    modal_synthesis.SECTION,
+    quasi_periodic.SECTION,
+    limit_cycle.SECTION,
+    resonance.SECTION,
+    all_motions.SECTION,
+    residual_tractions.SECTION,
+    modes.SECTION,
+    campbell.SECTION,
+    flutter.SECTION,
+    safe.SECTION,
+    run_up.SECTION,
+)
+
+
+def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
+    """Return the sections whose analysis is in the result, with its dataset."""
+    for section in SECTIONS:
+        data = analysis(tree, section.name) if section.name in tree.children else xr.Dataset()
+        data = with_bands(data, tree) if section.name == forced_response.SECTION.name else data
+        if all(name in data for name in section.needs) and data.sizes.get("case"):
+            yield section, data
+
+
+def _views(section: Section, data: xr.Dataset) -> list[Any]:
+    """Return what a section draws: all cases at once, or one after the other; the first for all where they are alike."""
+    if not section.by_case:
+        return [section.view(data)]
+    n = data.sizes["case"]
+    drawn = range(n) if len(alike(data)) > 1 else [0]
+    each = [one_case(data, k) for k in drawn] if n > 1 else [data.isel(case=0)]
+    views = [section.view(own.assign_attrs(drawn_cases=len(each))) for own in each]
+    return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
+
+
+def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
+    """Return what the parts of a chapter show of a view."""
+    for part in parts:
+        shown = part(view)
+        if isinstance(shown, Sequence):
+            yield from shown
+        elif shown is not None:
+            yield shown
+
+
+def _chapter(
+    section: Section, block: Block, data: xr.Dataset, views: Sequence[Any], placing: Placing
+) -> Chapter | None:
+    """Return a chapter for all cases, or for each case with the buttons that choose between them; None for an empty one."""
+    bodies = [placing(_contents(block.parts, view)) for view in views]
+    if not any(bodies):
+        return None
+    if len(bodies) == 1:
+        n = data.sizes["case"] if section.by_case else 1
+        same = [Words((f"The same in all {n} cases.",))] if n > 1 else []
+        return Chapter(block.key, block.title, [*placing(same), *bodies[0]], folded=block.folded)
+    cases = cases_of(data)
+    buttons = chooser(varied(data), cases, 0)
+    each = [CaseBody(k, case.label, body) for k, (case, body) in enumerate(zip(cases, bodies, strict=True))]
+    return Chapter(block.key, block.title, placing([buttons] if buttons else []), each, block.folded)
+
+
+def _nodes(tree: xr.DataTree) -> dict[str, Node]:
+    return {section.name: _views(section, data)[0] for section, data in _shown(tree)}
+
+
+def _provenance(tree: xr.DataTree) -> list[Content]:
+    """Who made this, with what, from which study."""
+    node = Node(tree.to_dataset())
+    used = versions(node.text("versions", "{}"))
+    rows = [
+        ["created", node.text("created", NONE)],
+        ["stickslip", node.text("stickslip_version", NONE)],
+        *([name, used[name]] for name in used if name != "stickslip"),
+        ["wall time", quantity(node.scalar("wall_seconds"), "s")],
+    ]
+    for section, data in _shown(tree):
+        own = Node(data)
+        if own.text("selection"):
+            rows.append([f"{section.name}: harmonics", f"chosen by {own.text('selection')}"])
+            rows.append([f"{section.name}: samples per period", fixed(own.scalar("samples"), 0)])
+    study, table = node.text("study_toml"), Table((), rows, numeric=False)
+    return [table, Words(folded="The study file", preformatted=study)] if study else [table]
+
+
+def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
+    """Return every figure of the page by its name, in the order of the page."""
+    found: list[Content] = []
+    for section, data in _shown(tree):
+        parts = [part for block in section.blocks for part in block.parts]
+        for view in _views(section, data):
+            found += _contents(parts, view)
+    found += _contents((nonlinear_mode.over_responses, model.picture), _nodes(tree))
+    return {own.key: own.figure for own in found if isinstance(own, Plot)}
+
+
+def report_html(tree: xr.DataTree) -> str:
+    """Return the whole page.
+
+    Parameters
+    ----------
+    tree
+        A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
+    """
+    placing, nodes = Placing(), _nodes(tree)
+    root = Node(tree.to_dataset())
+    given = inputs(study_of(root), nodes)
+    drawing = model.picture(nodes)
+    body = placing([*([drawing] if drawing else []), *given])
+    chapters = [Chapter("inputs", "What was computed", body)] if body else []
+    cards: list[Card] = []
+    for section, data in _shown(tree):
+        views = _views(section, data)
+        cards += section.cards(views[0])
+        own = (_chapter(section, block, data, views, placing) for block in section.blocks)
+        chapters += [chapter for chapter in own if chapter is not None]
+    for key, title, parts in (
+        ("backbones", "Responses and modes", (nonlinear_mode.over_responses,)),
+        ("model", "Model", model.PARTS),
+    ):
+        body = placing(_contents(parts, nodes))
+        chapters += [Chapter(key, title, body)] if body else []
+    chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree))))
+    made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
+    told = concluded(of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree)))
+    return page_html(root.text("title") or "Result", made, chapters, cards=cards, conclusion=told)
+
+
+def write_report(tree: xr.DataTree, path: Path) -> None:
+    """Write the page of a result; the folder of `path` must exist."""
+    write_page(report_html(tree), path)
+
+
+def report_file(path: Path, html_path: Path | None = None) -> Path:
+    """Write the page of a result file; return where it is.
+
+    Parameters
+    ----------
+    path
+        The file, or the folder that holds it.
+    html_path
+        The page to write; ``report.html`` beside the result if left out.
+    """
+    tree = open_result(path)
+    if not any(True for _ in _shown(tree)):
+        known = ", ".join(section.name for section in SECTIONS)
+        raise input_error(
+            str(path), f"holds none of {known}", "This is no result of 'stickslip run'; run the study again."
+        )
+    target = html_path or (path if path.is_dir() else path.parent) / "report.html"
+    write_report(tree, target)
+    return target

@@ -1,0 +1,140 @@
+"""The problem of a job: the model and its bounds over residual tractions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyses.facts import facts_of
+from stickslip.analyses.forced_response.estimate import Estimate, estimate
+from stickslip.analyses.forced_response.problem import peak_first
+from stickslip.analyses.residual_tractions.table import ResidualTractionsTable
+from stickslip.analyses.vibrating import represented
+from stickslip.arrays import FloatArray
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
+from stickslip.assembly.model import Model
+from stickslip.assembly.sides.unreduced import refuse_whole
+from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.initial_sliders import starts_of
+from stickslip.errors import InputError, input_error
+from stickslip.harmonic.judging import REACH
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.parameter import Discretisation
+from stickslip.response.residual_tractions.search import TractionSearch
+from stickslip.study.analysis import Case
+from stickslip.study.models.cost import above
+from stickslip.units import HZ, RPM
+
+MOTIONS = (20, 100)  # solved at a frequency: where hardly a spring keeps a traction, and where many do
+STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A case of the analysis.
+
+    Parameters
+    ----------
+    label
+        Of the case.
+    model
+        Assembled; the first output is the one whose amplitude is bounded.
+    asked
+        The table.
+    evaluator
+        Of the contact forces.
+    excitation
+        Amplitude of the harmonic force, N; NaN for none.
+    facts
+        What results say of the model.
+    """
+
+    label: str
+    model: Assembled
+    asked: ResidualTractionsTable
+    evaluator: Evaluator
+    excitation: float
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def omegas(self) -> FloatArray:
+        """Frequencies at which bounds are computed, rad/s."""
+        first, last = self.asked.frequency_hz
+        return np.asarray(HZ * np.linspace(first, last, self.asked.points))
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """Of the motions."""
+        return represented(self.asked.harmonics, self.evaluator)
+
+    @property
+    def search(self) -> TractionSearch:
+        """How hard extremes are looked for."""
+        return TractionSearch(starts=self.asked.starts, seed=self.asked.seed)
+
+
+def cost_of(model: Model, asked: ResidualTractionsTable) -> Estimate:
+    """Return what a case is estimated to cost."""
+    first, last = asked.frequency_hz
+    sweep = Sweep(
+        omega_range=(HZ * first, HZ * last),
+        low=max(asked.harmonics, 1),
+        high=max(asked.harmonics, 1),
+        selection="always_high",
+        frequencies=asked.points,
+        points=asked.points,
+        peak_points=0,
+    )
+    once = estimate(model, sweep)
+    least, most = MOTIONS
+    return replace(
+        once, least_seconds=STEPS * least * once.least_seconds, most_seconds=STEPS * most * once.most_seconds
+    )
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves.
+
+    Raises
+    ------
+    InputError
+        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none, or a force of zero, or the estimated cost
+        exceeds the study's limits.
+    """
+    asked: ResidualTractionsTable = case.settings.residual_tractions
+    driven = sorted(set(model.driven.values()))
+    if not driven:
+        raise input_error("residual_tractions", "nothing vibrates: no load has a harmonic", "Add a harmonic load.")
+    if driven[-1] > asked.harmonics:
+        raise input_error(
+            "residual_tractions.harmonics",
+            f"is {asked.harmonics}, and a load drives harmonic {driven[-1]}",
+            f"Give {driven[-1]} or more.",
+        )
+    cost = cost_of(model, asked)
+    what = f"a case of residual_tractions ({asked.points} frequencies, {cost.unknowns} unknowns, up to {MOTIONS[1]} motions each) is estimated"
+    if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
+        raise refusal
+    refuse_whole("residual_tractions", model)
+    assembled = peak_first(assemble(model, REACH * asked.harmonics, case.store))
+    if not any(np.any(force) for force in assembled.load.harmonics.values()):
+        name = next(iter(model.driven))
+        raise input_error(
+            f"load.{name}.force_n",
+            "is 0 N where it acts: residual_tractions needs a vibration",
+            "Give it a force that is not zero.",
+        )
+    try:
+        starts_of(assembled.system.interface)
+    except InputError as error:
+        raise error.at(f"residual_tractions: {error.place}") from None
+    return Question(
+        case.label,
+        assembled,
+        asked,
+        case.settings.solver.evaluator,
+        float(assembled.excitation),
+        facts_of(model, model.speed / RPM),
+    )

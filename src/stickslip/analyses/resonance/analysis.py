@@ -1,0 +1,191 @@
+"""Resonance peaks over a design parameter: the analysis ``resonance``."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.analyses.resonance.dataset import dataset
+from stickslip.analyses.resonance.envelope import heights, valley
+from stickslip.analyses.resonance.problem import Question, more_than, question_of
+from stickslip.analyses.resonance.table import ResonanceTable
+from stickslip.analyses.resonance.verdicts import tables
+from stickslip.analyses.vibrating import represented
+from stickslip.arrays import FloatArray
+from stickslip.assembly.model import Model
+from stickslip.errors import InputError
+from stickslip.response.resonances.curve import peak_curve
+from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
+from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.tracker import represented_as
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
+from stickslip.study.analysis import Analysis, Case, Notes, of_tables
+from stickslip.study.store.progress import LOG, advance
+from stickslip.study.verdict import doubt, to_json
+from stickslip.units import HZ, millimetres
+
+SWEEPS = 8  # at most, at values spread over those that are in question
+UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
+HARMONICS = "harmonics"  # note: the highest peak with more of them
+
+
+def unmet_peaks(
+    search: PeakSearch, points: Sequence[PeakPoint], values: Sequence[float], later: int
+) -> dict[str, FloatArray]:
+    """Return number and value of the peaks that no sweep was seen to reach.
+
+    Parameters
+    ----------
+    search
+        Of what.
+    points
+        All that was found.
+    values
+        In the order in which they were visited; the peaks of the last one were found by a sweep.
+    later
+        Number of the first peak that was followed back.
+    """
+    back = [p for p in points if p.peak >= later and p.converged and p.is_maximum]
+    places = [i for i, v in enumerate(values[:-1]) if any(p.value == v for p in back)]
+    share = np.linspace(0, len(places) - 1, min(SWEEPS, len(places)))
+    swept = sorted({places[int(i)] for i in share})
+    met: dict[tuple[int, int], bool] = {}
+    for i in swept:
+        here = [p for p in back if p.value == values[i]]
+        met |= {(p.peak, i): own for p, own in zip(here, met_by_a_sweep(search, here), strict=True)}
+
+    def reached(peak: int, i: int) -> bool:
+        # what sweeps meet on both sides of a value, one would meet there
+        before = max((j for j in swept if j <= i), default=-1)
+        after = min((j for j in swept if j >= i), default=len(values) - 1)
+        return met.get((peak, before), False) and met.get((peak, after), False)
+
+    unmet = [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]
+    return {
+        "peak": np.array([peak for peak, _ in unmet], dtype=float),
+        "value": np.array([v for _, v in unmet], dtype=float),
+    }
+
+
+MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
+
+
+def _inputs(case: Case, model: Model) -> Question:
+    """Return what is followed; refuse what cannot be."""
+    question = question_of(case, model)
+    LOG.info(f"resonance: peaks of {question.output} over {question.asked.parameter}")
+    return question
+
+
+def _solve(inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterator[PeakPoint]:
+    """Yield the peaks that are not done."""
+    if notes.get(LAST) is not None:
+        return
+    asked = inputs.asked
+    notes.put(MODEL, {"verdicts": to_json(map(doubt, inputs.warnings)), "output": inputs.output, **inputs.facts})
+    every = list(done)
+    try:
+        for point in _told(_points_of(inputs, done), inputs):
+            every.append(point)
+            yield point
+    except InputError as error:  # no peak in the range
+        notes.put(LAST, {"problem": error.problem})
+        return
+    # what was followed back from the last value before an interruption is none of the first ones
+    first = notes.get(FIRST)
+    known = [p for p in every if first is None or p.peak < first["peaks"]]
+    later = 1 + max((p.peak for p in known), default=-1)
+    notes.put(FIRST, {"peaks": later})
+    problem = ""
+    if asked.values is not None and len(asked.values) > 1:
+        try:
+            back = later_peaks(inputs.search, asked.values, known, asked.peaks, done)
+            for point in _told(back, inputs):
+                every.append(point)
+                yield point
+        except InputError as error:
+            problem = error.problem
+        between = valley(every, heights(every, asked.values), asked.values)
+        notes.put(UNMET, unmet_peaks(inputs.search, every, asked.values, later))
+        notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
+    notes.put(HARMONICS, _more_harmonics(inputs, every))
+    notes.put(LAST, {"problem": problem})
+
+
+def _points_of(inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoint]:
+    asked, search = inputs.asked, inputs.search
+    if asked.values is not None:
+        yield from follow_peaks(search, asked.values, asked.peaks, done)
+        return
+    # a curve by arc length is followed again to where it was left: it has no state but its points
+    for peak in range(asked.peaks):
+        known = sum(p.peak == peak for p in done)
+        try:
+            for i, point in enumerate(peak_curve(search, asked.ends, asked.points, peak)):
+                if i >= known:
+                    yield point
+        except InputError as error:
+            if peak == 0 or error.place != "peak":
+                raise
+            return  # there are no more
+
+
+def _check(case: Case, model: Model) -> tuple[str, ...]:
+    """Say what is followed, and how many peaks there will be at most."""
+    question = question_of(case, model)
+    asked = question.asked
+    count = len(asked.values) if asked.values else asked.points
+    told = f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}"
+    if asked.span is not None and callable(question.search.parameter):
+        told += "; a span makes the model anew for each trial, which takes minutes where a contact begins to slip at the peak: values are faster"
+    return (told,)
+
+
+def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
+    first, last = inputs.asked.ends
+    for point in points:
+        share = abs((point.value - first) / (last - first)) if last != first else 1.0
+        state = "" if point.converged else f", {point.status.advice}"
+        advance(
+            0.9 * min(share, 1.0),
+            f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {millimetres(point.amplitude, 5)}{state}",
+        )
+        yield point
+
+
+def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, float]:
+    """Return by how much twice the harmonics and one change the highest peak, relatively; NaN where it is not found with them."""
+    maxima = [p for p in points if p.converged and p.is_maximum]
+    if not maxima:
+        return {}
+    top = max(maxima, key=lambda p: p.amplitude)
+    order = more_than(inputs.asked.harmonics)
+    how = represented(order, inputs.search.how.evaluator)
+    more = represented_as(inputs.search, top, how)
+    # a peak by phase lies below the maximum, by what it says itself
+    there = top.amplitude * (1.0 + (top.below if np.isfinite(top.below) else 0.0))
+    change = more.amplitude / there - 1.0 if more.converged else np.nan
+    return {"change": change, "value": top.value, "peak": top.peak, "order": order}
+
+
+def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:
+    """Return the lowest place of the highest peak between two values; nothing where that is not found."""
+    r = inputs.search
+    try:
+        best = smallest_peak(r.system, r.load, r.parameter, between, r.omega_range, r.output, r.how)
+    except InputError as error:
+        LOG.info(f"the lowest peak was not found: {error}")
+        return {}
+    return {"value": best.value, "amplitude": best.amplitude, "omega": best.omega}
+
+
+RESONANCE = Analysis(
+    name="resonance",
+    table=ResonanceTable,
+    record=PeakPoint,
+    key=of_tables("resonance", "solver"),
+    inputs=_inputs,
+    solve=_solve,
+    dataset=dataset,
+    check=_check,
+    summary=tables,
+)

@@ -1,0 +1,191 @@
+"""The problem of a job of the run-up, picklable."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.analyses.facts import facts_of
+from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
+from stickslip.analyses.forced_response.problem import peak_first
+from stickslip.analyses.forced_response.sweeps import measured
+from stickslip.analyses.run_up.sweeps import sweep_along
+from stickslip.analyses.run_up.table import RunUpTable
+from stickslip.arrays import FloatArray
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.model import Model
+from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
+from stickslip.errors import input_error
+from stickslip.harmonic.judging import REACH
+from stickslip.model.gyroscopic import gyroscopic_modes
+from stickslip.model.modes import natural_frequencies, with_springs
+from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.waves import excited_wave
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, Sweep, forced_problem
+from stickslip.study.analysis import Case
+from stickslip.study.verdict import said
+
+DRAWN = 9  # speeds at which natural frequencies are shown
+
+
+@dataclass(frozen=True, eq=False)
+class RunUpPoint(ForcedPoint):
+    """A point along an engine order.
+
+    Attributes
+    ----------
+    engine_order
+        Whose it is; the speed is the frequency over it.
+    """
+
+    engine_order: int = 0
+
+
+def of_order(point: ForcedPoint, engine_order: int) -> RunUpPoint:
+    """Return a point of a forced response as one along an engine order."""
+    own = {f.name: getattr(point, f.name) for f in fields(ForcedPoint)}
+    return RunUpPoint(**own, engine_order=engine_order)
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """One engine order.
+
+    Parameters
+    ----------
+    model
+        Its system is that of all speeds.
+    sweep
+        How the response is computed.
+    error
+        Of the polynomials between speeds, see `OverSpeed`.
+    static_force
+        (k, p, 3) static contact forces at the speeds of the line, N.
+    coriolis
+        Whether Coriolis forces are in the damping.
+    common
+        Whether modes of several speeds are kept at all, see `OverSpeed`.
+    """
+
+    model: Assembled
+    sweep: Sweep
+    error: float
+    static_force: FloatArray
+    coriolis: bool
+    common: bool = False
+
+    @property
+    def line(self) -> SpeedLine:
+        """What vibrates."""
+        return cast("SpeedLine", self.model.system.structure)
+
+    @property
+    def order(self) -> int:
+        """The engine order of the first harmonic."""
+        return self.line.engine_order
+
+    @property
+    def wave_number(self) -> int:
+        """Of the first harmonic; 0 for a single structure."""
+        return excited_wave(self.order, self.model.sectors)
+
+    @cached_property
+    def problem(self) -> ForcedProblem:
+        """What is solved."""
+        return forced_problem(self.model.system, self.model.load, self.sweep)
+
+    def frequencies(self, speeds: FloatArray, n_modes: int, stuck: bool) -> FloatArray:
+        """Return (s, n_modes) natural frequencies in Hz, contacts open or all stuck; NaN where there are not as many."""
+        system = self.model.system
+        found = np.full((len(speeds), n_modes), np.nan)
+        for i, speed in enumerate(speeds):
+            structure = self.line.at(float(speed)).of_harmonic(1)
+            if stuck:
+                springs = system.springs.stuck_stiffness()
+                structure = with_springs(structure, system.interface.gap_operator, springs)
+            structure = _unconstrained(structure, self.line)
+            count = min(n_modes, structure.n)
+            if self.coriolis:
+                hertz = gyroscopic_modes(structure, count).frequencies_hz
+            else:
+                hertz = natural_frequencies(structure, count)
+            found[i, : len(hertz)] = hertz
+        return found
+
+
+def _unconstrained(structure: Structure, line: SpeedLine) -> Structure:
+    """Return a structure on the motions that its constraints leave."""
+    way = own_motions(structure, line.multipliers)
+    return in_coordinates(structure, way, structure.dofs.take(np.arange(way.shape[1])), {})
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """The run-up of one case.
+
+    Parameters
+    ----------
+    label
+        Of the case; empty for a study without [vary].
+    lines
+        One an engine order.
+    modes
+        Natural frequencies shown.
+    rates
+        Of fast run-ups, rpm/s.
+    limit
+        Change that more harmonics may make before there is a warning, a fraction.
+    facts
+        What the result says of the model.
+    """
+
+    label: str
+    lines: tuple[Along, ...]
+    modes: int
+    rates: tuple[float, ...]
+    limit: float
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def said(self, text: str) -> str:
+        """Return a sentence about the case."""
+        return said(self.label, text)
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves; whatever can be refused is, before anything long is computed."""
+    settings = case.settings
+    table: RunUpTable = settings.run_up
+    lines = []
+    for order in table.engine_orders or (model.engine_order,):
+        if not order:
+            raise input_error(
+                "run_up.engine_orders",
+                "is missing, and the loads have no engine order above 0",
+                "Give the engine orders, a list of whole numbers from 1.",
+            )
+        turning = model if table.engine_orders is None else with_engine_order(model, order)
+        sweep = sweep_along(settings, order, turning.driven.values())
+        sweep = measured(sweep, turning)
+        sweep = within_limits(turning, sweep, settings.limits)
+        check_limits(settings.limits, estimate(turning, sweep))
+        # peaks are judged towards up to three times the harmonics that are kept
+        harmonics, tolerance = REACH * sweep.high_harmonics[-1], table.tolerance
+        found = over_speed(turning, order, table.speeds, harmonics, case.store, tolerance)
+        own = peak_first(found.assembled)
+        said = found.error, found.static_force, model.coriolis, found.common
+        along = Along(own, sweep, *said)
+        forced_problem(own.system, own.load, sweep)  # what cannot be solved is refused now
+        lines.append(along)
+    return Question(
+        case.label,
+        tuple(lines),
+        table.modes,
+        tuple(table.rate_rpm_per_s or ()),
+        settings.harmonics.alert_threshold_percent / 100,
+        facts_of(model, float("nan")),
+    )

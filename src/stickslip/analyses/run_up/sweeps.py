@@ -1,0 +1,24 @@
+"""The sweep along each engine order of a run-up."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from stickslip.analyses.forced_response.sweeps import sweep_through
+from stickslip.response.forced.response import Sweep
+
+
+def sweep_along(settings: Any, engine_order: int, driven: Iterable[int] = (1,)) -> Sweep:
+    """Return the sweep along an engine order that a study's tables ask for.
+
+    Parameters
+    ----------
+    settings
+        With the tables ``run_up``, ``harmonics`` and ``solver``.
+    engine_order
+        Times the speed it is the frequency of the first harmonic.
+    driven
+        Harmonics that loads act in.
+    """
+    table = settings.run_up
+    lowest, highest = (engine_order * speed for speed in table.speeds)
+    return sweep_through(settings, table, (lowest, highest), driven)

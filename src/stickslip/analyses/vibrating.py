@@ -1,0 +1,130 @@
+"""Requests that several analyses share: waves that may vibrate, modes with stuck contacts, representation of motions."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyses.forced_response.problem import peak_first
+from stickslip.arrays import FloatArray
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.assembling import assemble
+from stickslip.assembly.model import Model
+from stickslip.assembly.parts.reduced import Store
+from stickslip.contact.evaluators import Evaluator
+from stickslip.errors import InputError, input_error
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.modes import StuckMode, stuck_modes
+from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
+from stickslip.response.static_contact_state import pressed_by
+from stickslip.response.system import System
+
+SAMPLES = 256
+
+
+def represented(order: int, evaluator: Evaluator) -> Discretisation:
+    """Return how motions of so many harmonics are represented."""
+    samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
+    return Discretisation(order=order, samples=samples, evaluator=evaluator)
+
+
+def free_to_vibrate(model: Model, harmonics: int, store: Store) -> Assembled:
+    """Return a model without its harmonic loads, a tuned wheel with all its waves, the output whose peak counts first."""
+    still = model.undriven
+    wheel = still.sectors > 1 and still.mistuning is None
+    wave = 0 if wheel else None
+    return peak_first(assemble(still, harmonics, store, wave_number=wave, every_wave=wheel))
+
+
+def refuse_rigid(analysis: str, model: Assembled) -> None:
+    """Refuse contacts whose force is no function of their gap."""
+    if model.system.interface.rigid:
+        raise input_error(
+            analysis,
+            "a contact is rigid: its force is no function of its gap",
+            "Give the contacts a stiffness, such as elastic_coulomb.",
+        )
+
+
+def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> None:
+    """Refuse wave numbers of a model that is no tuned wheel, and those that it does not have."""
+    if wanted is None:
+        return
+    if model.sectors == 1 or model.mistuning is not None:
+        raise input_error(
+            f"{analysis}.wave_numbers", "are those of a tuned wheel, and the model is none", "Leave them out."
+        )
+    beyond = [k for k in wanted if k >= model.sectors]
+    if beyond:
+        raise input_error(
+            f"{analysis}.wave_numbers",
+            f"holds {beyond[0]}, and {model.sectors} sectors have the waves 0 to {model.sectors - 1}",
+            f"A backward wave of d nodal diameters is d, a forward one {model.sectors} - d.",
+        )
+
+
+def no_such_mode(key: str, told: str, of: str = "the model") -> InputError:
+    """Return the refusal of the number of a mode."""
+    return input_error(
+        key,
+        f"{told}, and {of} has no such mode that vibrates",
+        "Modes count from 1 by frequency with contacts stuck; [modes] lists them.",
+    )
+
+
+def require_flow(model: Assembled, modes: Sequence[StuckMode], most: int, what: str) -> None:
+    """Refuse modes beyond the frequencies of a table of aerodynamic coefficients, up to so many harmonics of the highest of them."""
+    force = model.system.structure.feedback_of(1)
+    if force is not None and force.influence.refuses and modes:
+        low, high = (f(m.omega for m in modes) for f in (min, max))
+        force.influence.require(low, most * high, f"{what} with up to {most} harmonics (most_harmonics)")
+
+
+def as_wave(system: System, wave: int) -> System:
+    """Return what vibrates as a wave: a single structure as it is."""
+    wheel = system.structure.wheel
+    return system if wheel is None else replace(system, structure=wheel.travelling_as(wave))
+
+
+def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[StuckMode]:
+    """Return so many modes of a wave, or of that of the loads, what the static loads press together stuck."""
+    holds = pressed_by(model.system.springs.laws, model.static_force)
+    system = model.system if wave is None else as_wave(model.system, wave)
+    return stuck_modes(system, count, holds)
+
+
+def known_coordinates(model: Assembled) -> dict[str, Any]:
+    """Return positions and labels of what results keep of free motions: retained coordinates with that of the first output, and outputs."""
+    system = model.system
+    retained = np.union1d(system.retained, coordinate(system))
+    labels = system.structure.dofs.labels
+    return {
+        "retained": retained,
+        "retained_label": np.array([labels[i] for i in retained]),
+        "outputs": system.outputs,
+        "output_label": np.array(model.output_labels),
+    }
+
+
+KEPT = {  # labels of what `kept_motions` returns
+    "retained_label": ("coordinate", "1", "names of the retained coordinates"),
+    "output_label": ("reported", "1", "names of the outputs"),
+}
+
+
+def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what results keep of motions (..., harmonics, n, 2) of all coordinates: for other programs, which expand them to all nodes."""
+    if not coefficients.shape[-2]:  # none was found
+        return {}
+    return {
+        "retained_label": known["retained_label"],
+        "output_label": known["output_label"],
+        "retained_displacement": coefficients[..., known["retained"], :],
+        "output_displacement": coefficients[..., known["outputs"], :],
+    }
+
+
+def coordinate(system: System) -> int:
+    """Return the coordinate whose amplitude is told: that of the first output."""
+    return int(np.asarray(system.outputs)[0])

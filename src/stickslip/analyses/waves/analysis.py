@@ -1,0 +1,71 @@
+"""The common part of the analyses by waves."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import xarray as xr
+
+from stickslip.analyses.waves.records.dataset import Variables, dataset
+from stickslip.analyses.waves.solve import Question, each_wave
+from stickslip.analyses.waves.texts import of_cases
+from stickslip.assembly.model import Model
+from stickslip.study.analysis import Analysis, Case, Notes, Solved, TextTable
+from stickslip.study.verdict import Verdict
+
+Solve = Callable[[Any, Sequence[Any], Notes], Iterator[Any]]
+
+
+def wave_analysis(
+    name: str,
+    table: type[Any],
+    record: type[Any],
+    inputs: Callable[[Case, Model], Any],
+    solve: Solve,
+    variables: Callable[[Solved], tuple[Variables, list[Verdict]]],
+    tables: Callable[[xr.Dataset], Sequence[TextTable]],
+    *,
+    compared: frozenset[str] = frozenset(),
+) -> Analysis:
+    """Return an analysis of small vibrations, a record a wave.
+
+    Parameters
+    ----------
+    name, table, record, inputs, solve
+        As `Analysis` has them.
+    variables
+        Returns the variables of a case beside those of its model and waves, and what the user should know.
+    tables
+        Returns what the terminal prints of a case.
+    compared
+        Keys of the table that no record depends on: what the records are compared with.
+    """
+
+    def key(case: Case) -> str:
+        return str(getattr(case.settings, name).model_dump_json(exclude=set(compared)))
+
+    def check(case: Case, model: Model) -> tuple[str, ...]:
+        return (counted(name, inputs(case, model)),)
+
+    return Analysis(
+        name=name,
+        table=table,
+        record=record,
+        key=key,
+        inputs=inputs,
+        solve=solve,
+        dataset=partial(dataset, of_case=variables),
+        check=check,
+        summary=partial(of_cases, tables=tables),
+        linear=True,
+    )
+
+
+def solved_by(of_wave: Callable[[Question, int], Any]) -> Solve:
+    """Return what yields the record of each wave that is not done."""
+    return partial(each_wave, of_wave)
+
+
+def counted(name: str, asked: Any) -> str:
+    """Return the line of ``stickslip check`` that tells how many modes there will be."""
+    return f"{name}: {asked.n_modes} modes of each of {len(asked.numbers)} waves"

@@ -1,0 +1,1 @@
+"""What a page shows of waves: modes, Campbell diagrams, flutter, safe speeds."""

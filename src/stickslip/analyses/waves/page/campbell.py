@@ -1,0 +1,176 @@
+"""The Campbell diagram: frequencies over speed, engine-order lines, and where they meet."""
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.analyses.waves.page.waves import NEEDED, Waves
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.content import Table, Words
+from stickslip.report.plot import INK, MUTED, Plot, ring, styled
+from stickslip.report.quantities import counted, number
+from stickslip.report.section import Block, Card, Section
+
+_DASHES = ("solid", "dot", "dashdot", "longdash")
+# a wave has its own, so that a print without colours can be read
+_SYMBOLS = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
+_BAND = 0.02  # half the height of a label, and its distance from the line, as a share of the picture's height
+
+
+def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
+    """Return where each line (wave, mode) is labelled: index of the speed, and 1 above or -1 below.
+
+    It is the first speed at which neither another line nor another label is in the way.
+    """
+    speed, side = (np.zeros((hz.shape[0], hz.shape[2]), dtype=np.int64) for _ in range(2))
+    side += 1
+    taken: list[tuple[int, float]] = []
+    for w, mode in np.ndindex(*speed.shape):
+        for s, way in ((s, way) for s in range(hz.shape[1]) for way in (1, -1)):
+            middle = float(hz[w, s, mode]) + way * _BAND * top
+            others = np.delete(hz[:, s].ravel(), w * hz.shape[2] + mode)
+            placed = np.array([y for other, y in taken if other == s])
+            free = np.all(np.abs(others - middle) > _BAND * top)
+            if free and np.all(np.abs(placed - middle) > 2 * _BAND * top):
+                speed[w, mode], side[w, mode] = s, way
+                taken.append((s, middle))
+                break
+    return speed, side
+
+
+def _branches(view: Waves) -> list[go.Scatter]:
+    rpm, hz = view.floats("speed_rpm"), view.floats("frequency_hz")
+    pairs = zip(view.waves, view.colours, strict=True)
+    at, side = _label_places(hz, float(np.nanmax(hz)))
+    return [
+        go.Scatter(
+            x=rpm,
+            y=hz[w, :, mode],
+            mode="lines+markers+text",
+            name=name,
+            legendgroup=name,
+            showlegend=mode == 0,
+            text=[f"{name}, {mode + 1}" if s == at[w, mode] else "" for s in range(len(rpm))],
+            textposition=f"{'top' if side[w, mode] > 0 else 'bottom'} {'center' if at[w, mode] else 'right'}",
+            textfont={"size": 10, "color": colour},
+            # beyond eight waves colours come again, dashed
+            line={"color": colour, "width": 1.8, "dash": _DASHES[(w // 8) % len(_DASHES)]},
+            marker={"size": 6, "symbol": _SYMBOLS[w % len(_SYMBOLS)]},
+            hovertemplate=f"{name}, mode {mode + 1}: %{{y:.6g}} Hz at %{{x:.5g}} rpm<extra></extra>",
+        )
+        for w, (name, colour) in enumerate(pairs)
+        for mode in range(hz.shape[2])
+    ]
+
+
+def _orders(view: Waves, top: float) -> list[go.Scatter]:
+    """Engine-order lines, cut where they leave the picture, each with its name at the end."""
+    last, first = view.floats("speed_rpm").max(), view.floats("speed_rpm").min()
+    traces = []
+    for index, order in enumerate(view.numbers("engine_orders").astype(int)):
+        end = last if order == 0 else min(last, top * 60 / order)
+        if end <= first:
+            continue
+        x = np.array([first, end])
+        traces.append(
+            go.Scatter(
+                x=x,
+                y=order * x / 60,
+                mode="lines+text",
+                text=["", f"EO {order}"],
+                name="engine orders",
+                textposition="middle right" if end == last else "top center",
+                textfont={"size": 11, "color": MUTED},
+                legendgroup="orders",
+                showlegend=index == 0,
+                line={"color": MUTED, "width": 1, "dash": "dash"},
+                cliponaxis=False,
+                hovertemplate=f"EO {order}: %{{y:.6g}} Hz at %{{x:.5g}} rpm<extra></extra>",
+            )
+        )
+    return traces
+
+
+def _crossings(view: Waves) -> go.Scatter:
+    names = view.waves
+    each = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
+    found = zip(*each, strict=True)
+    text = [f"EO {order} meets {names[w]}, mode {mode + 1}" for order, w, mode in found]
+    return go.Scatter(
+        x=view.floats("crossing_speed_rpm"),
+        y=view.floats("crossing_frequency_hz"),
+        text=text,
+        mode="markers",
+        name="crossings",
+        marker=ring(INK, 12, 2),
+        hovertemplate="%{text}: %{y:.6g} Hz at %{x:.6g} rpm<extra></extra>",
+    )
+
+
+def _not_shown(view: Waves, top: float) -> str:
+    """Say which engine orders leave the picture, and from where on their crossings are not known."""
+    last, first = float(view.floats("speed_rpm").max()), float(view.floats("speed_rpm").min())
+    asked = [int(m) for m in view.numbers("engine_orders")]
+    cut = [f"EO {m}" for m in asked if first < top * 60 / m < last]
+    outside = [f"EO {m}" for m in asked if top * 60 / m <= first]
+    text = f" Cut at the upper edge of the picture: the lines of {', '.join(cut)}." if cut else ""
+    if outside:
+        text += f" Above the picture at all speeds: {', '.join(outside)}."
+    if view.has("unfollowed_engine_order", "unfollowed_from_rpm"):
+        orders, lowest = (view.numbers(f"unfollowed_{k}") for k in ("engine_order", "from_rpm"))
+        each = zip(orders, lowest, strict=True)
+        named = [f"EO {order:.0f} from {rpm:.4g} rpm" for order, rpm in each]
+        text += (
+            " **Not judged**, because they lie above the followed modes of the nodal diameters that they excite: "
+            f"{', '.join(named)}."
+        )
+    return text
+
+
+def campbell_diagram(view: Waves) -> Plot:
+    """Show frequencies against speed with engine-order lines and the crossings that can be excited."""
+    hz, rpm = view.floats("frequency_hz"), view.floats("speed_rpm")
+    top = 1.06 * float(hz[np.isfinite(hz)].max())
+    figure = go.Figure([*_orders(view, top), *_branches(view)])
+    n = int(view.data.sizes.get("crossing", 0))
+    if n:
+        figure.add_trace(_crossings(view))
+    styled(figure, 620)
+    span = float(np.ptp(rpm))
+    figure.update_xaxes(title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span])
+    figure.update_xaxes(exponentformat="none", separatethousands=True)
+    figure.update_yaxes(title_text="frequency (Hz), rotating frame", range=[0, 1.04 * top])
+    found = f"{counted(n, 'crossing')} marked" if n else "no crossing in the range"
+    caption = (
+        f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
+        f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, in the frame that turns with the wheel. "
+        f"Lines are labelled with wave and mode. Thin and dashed: engine orders. Circles: {found}; only those where the engine "
+        f"order excites the nodal diameter of the mode.{_not_shown(view, top)}"
+    )
+    return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
+
+
+def crossings(view: Waves) -> Table | Words:
+    """Return the crossings of a Campbell diagram in the order of speed."""
+    title = "Crossings"
+    if not view.has("crossing_speed_rpm"):
+        told = "No engine order meets a mode that it excites within the speeds."
+        return Words((told,), title)
+    rpm, hz = view.floats("crossing_speed_rpm"), view.floats("crossing_frequency_hz")
+    order, wave, mode = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
+    rows = []
+    for i in np.argsort(rpm, kind="stable"):
+        met = [number(float(v), 6) for v in (rpm[i], hz[i])]
+        rows.append([*met, f"{order[i]}", view.waves[wave[i]], str(mode[i] + 1)])
+    head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
+    return Table(head, rows, title)
+
+
+def _cards(view: Waves) -> list[Card]:
+    rpm = view.floats("speed_rpm")
+    note = f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm"
+    return [Card(str(view.data.sizes.get("crossing", 0)), "crossings with engine orders", note)]
+
+
+_NEEDS = (*NEEDED, "speed_rpm")
+_BLOCK = Block("campbell", "Frequencies against speed", (campbell_diagram, crossings))
+SECTION: Section = Section("campbell", _NEEDS, Waves, (_BLOCK,), by_case=True, cards=_cards)

@@ -1,0 +1,160 @@
+"""Natural frequencies and mode shapes on the page."""
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.analyses.waves.page.diameters import diameter_axes, mode_lines
+from stickslip.analyses.waves.page.mistuned_modes import modes_of_wheel
+from stickslip.analyses.waves.page.shapes import mode_shapes
+from stickslip.analyses.waves.page.waves import NEEDED, Waves
+from stickslip.report.content import Table, Words
+from stickslip.report.plot import INK, Plot, colour, ring, styled
+from stickslip.report.quantities import NONE, counted, number, percent
+from stickslip.report.section import Block, Card, Section
+
+
+def diameter_map(view: Waves) -> Plot:
+    """Show the frequencies over the nodal diameters."""
+    figure = go.Figure(mode_lines(view))
+    reference = ""
+    if view.has("reference_hz"):
+        known, mode = np.nonzero(np.isfinite(view.floats("reference_hz")))
+        figure.add_trace(
+            go.Scatter(
+                x=view.integers("nodal_diameter")[known],
+                y=view.floats("reference_hz")[known, mode],
+                mode="markers",
+                name="reference",
+                hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
+                marker=ring(INK, 12, 1.2),
+            )
+        )
+        reference = " Open circles are the frequencies to compare with."
+    styled(figure, 520)
+    diameter_axes(figure, view)
+    if view.sectors == 1:
+        figure.update_xaxes(title_text="", showticklabels=False)
+    hz = view.floats("frequency_hz")
+    caption = (
+        f"{counted(hz.shape[1], 'mode')} of {counted(len(hz), 'wave')}, {number(hz.min(), 5)} to {number(hz.max(), 5)} Hz, "
+        f"{view.text('rotation')}. Lines join the same mode number; modes of different families that come close repel each "
+        f"other instead of crossing (veering).{reference}"
+    )
+    return Plot(f"diameters{view.key}", "Nodal-diameter map", caption, figure)
+
+
+def frequencies(view: Waves) -> list[Table]:
+    """Return the natural frequencies: a row a wave, a column a mode."""
+    hz = view.floats("frequency_hz")
+    head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
+    # where nothing parts the directions, both have the frequencies
+    parted = len(set(view.integers("nodal_diameter"))) < len(hz)
+    kinds = [kind if parted or kind == "standing" else "both ways" for kind in view.kinds]
+    names = [f"{name}, {kind}" if view.sectors > 1 else name for name, kind in zip(view.waves, kinds, strict=True)]
+    rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]
+    found = [Table(head, rows, "Natural frequencies")]
+    if not view.has("stiffest_hz"):
+        return found
+    held = view.floats("stiffest_hz")
+    rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, held, strict=True)]
+    title = "All harmonics held that flanges do not couple"
+    told = "Flanges move freely in the harmonics that they do not couple, which makes them softer than they are; held there, they are stiffer."
+    return [*found, Table(head, rows, title, (told,))]
+
+
+def in_flow(view: Waves) -> Table | None:
+    """Return frequencies and damping ratios with aerodynamic forces, a row a wave."""
+    if not view.has("damped_hz", "damping"):
+        return None
+    hz, damping = view.floats("damped_hz"), 100 * view.floats("damping")
+    head = ["wave", *(f"mode {m + 1}" for m in range(hz.shape[1]))]
+    rows = [
+        [f"{name}, {kind}", *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
+        for name, kind, own in zip(view.waves, view.kinds, zip(hz, damping, strict=True), strict=True)
+    ]
+    text = "Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio."
+    return Table(head, rows, "In the flow", (text,))
+
+
+def stage_shares(view: Waves) -> Plot | None:
+    """Show which stage takes part in which mode, as bars that add up to one."""
+    if not view.has("stage_share"):
+        return None
+    share = view.floats("stage_share")
+    hz = view.floats("frequency_hz")
+    stages = [str(name) for name in view.data["stage_name"].values]
+    counts = view.integers("stage_sectors")
+    places = [
+        [name for name, row in zip(view.waves, hz, strict=True) for _ in row],
+        [f"{m + 1}" for row in hz for m in range(len(row))],
+    ]
+    bars = [
+        go.Bar(
+            x=places,
+            y=100 * share[:, :, i].ravel(),
+            name=f"{name} ({count} sectors)",
+            marker={"color": colour(i)},
+            customdata=hz.ravel(),
+            hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + name + "</extra>",
+        )
+        for i, (name, count) in enumerate(zip(stages, counts, strict=True))
+    ]
+    figure = styled(go.Figure(bars), 420)
+    figure.update_layout(barmode="stack", bargap=0.15)
+    figure.update_xaxes(title_text="mode", tickangle=0)
+    figure.update_yaxes(title_text="share of the kinetic energy (%)", range=[0, 100])
+    waves = "; ".join(f"{name}: {text}" for name, text in zip(view.waves, view.data["stage_waves"].values, strict=True))
+    caption = (
+        "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
+        f"exist in the assembly only. Waves that the flanges let vibrate together: {waves}. All else of the flanges moves freely."
+    )
+    return Plot(f"stages{view.key}", "Which stage vibrates", caption, figure)
+
+
+def comparison(view: Waves) -> Table | Words | None:
+    """Return the relative differences from the reference, a row a wave."""
+    if not view.has("difference"):
+        return None
+    title, off = "Against the reference", view.floats("difference")
+    known = int(np.isfinite(off).sum())
+    if not known:
+        return Words(("The reference has none of these frequencies.",), title)
+    rows = [
+        [name, *(_share(float(d)) for d in row)]
+        for name, row in zip(view.waves, off, strict=True)
+        if np.isfinite(row).any()
+    ]
+    worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
+    text = (
+        f"{known} {'frequency' if known == 1 else 'frequencies'} compared; the largest relative difference is "
+        f"{_share(float(off[worst]))}, at {view.waves[worst[0]]}, mode {worst[1] + 1}."
+    )
+    head = ["wave", *(f"mode {m + 1}" for m in range(off.shape[1]))]
+    return Table(head, rows, title, (text,))
+
+
+def _share(value: float) -> str:
+    """Write a relative difference, in parts of a million where it is small."""
+    if not np.isfinite(value):
+        return NONE
+    return f"{number(1e6 * value)} ppm" if abs(value) < 1e-4 else percent(100 * value, 3)
+
+
+def _cards(view: Waves) -> list[Card]:
+    hz = view.floats("frequency_hz")
+    over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
+    lowest = f"{number(float(np.nanmin(hz)), 5)} Hz"
+    found = [Card(lowest, "lowest natural frequency", f"{hz.size} modes, {over}")]
+    if view.has("difference") and np.isfinite(view.floats("difference")).any():
+        off = np.abs(view.floats("difference"))
+        note = f"of {np.count_nonzero(np.isfinite(off))} frequencies"
+        worst = percent(100 * float(np.nanmax(off)))
+        found.append(Card(worst, "largest difference from the reference", note))
+    return found
+
+
+_TITLE = "Natural frequencies and mode shapes"
+_BLOCK = Block(
+    "modes", _TITLE, (diameter_map, stage_shares, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
+)
+SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

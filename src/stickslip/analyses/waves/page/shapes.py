@@ -1,0 +1,142 @@
+"""Mode shapes that turn in the page: one sector or the wheel, at any phase, coloured by displacement.
+
+The page holds the complex shapes of one sector; the script of ``assets/shapes.js`` expands them to the wheel, sector n turned by
+n times the pitch and multiplied by exp(i n theta).
+"""
+
+import base64
+import json
+
+import numpy as np
+import numpy.typing as npt
+import plotly.graph_objects as go
+from markupsafe import Markup, escape
+
+from stickslip.analyses.pictures.skin import edges, segments, surface
+from stickslip.analyses.waves.page.coarse_skin import coarse_skin
+from stickslip.analyses.waves.page.waves import Waves
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.plot import FONT, MUTED, Plot, styled
+from stickslip.report.quantities import counted
+
+_SHAPE_BYTES = 600_000  # of all shapes of a page together, before they become text
+_POINT_BYTES = 12  # x, y, z, real and imaginary, 16 bits each
+_WHEEL_POINTS = 26_000  # of the whole wheel, so that it turns and moves without waiting
+_FEWEST_POINTS = 250
+_FULL = 32767  # largest 16-bit number
+_MM = 1e3
+
+
+def mode_shapes(view: Waves) -> Plot | None:
+    """Show the mode shapes on the skin, with controls for wave, mode, phase and size."""
+    if not view.has("shape", "skin_point", "skin_triangle"):
+        return None
+    waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
+    most_bytes = _SHAPE_BYTES // int(view.scalar("drawn_cases", 1))
+    room = most_bytes // (_POINT_BYTES * _FEWEST_POINTS * waves)
+    modes = max(1, min(there, room))
+    points, triangles = view.floats("skin_point") * _MM, view.integers("skin_triangle")
+    most = max(_FEWEST_POINTS, most_bytes // (_POINT_BYTES * waves * modes))
+    kept, faces = coarse_skin(points, triangles, most)
+    data = _payload(view, modes, kept, faces)
+    fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"
+    left_out = "" if modes == there else f"The first {modes} of {there} modes are in the page."
+    caption = (
+        f"Displacement over its largest value, on {counted(len(kept), 'point')} of the skin of a sector{fine}. Choose nodal "
+        f"diameter and mode, drag to turn, scroll to zoom; the camera button saves a PNG. Sector n moves as sector 0 turned by "
+        f"n pitches, n phase angles ahead: play shows which way the wave travels. {left_out}"
+    )
+    drawn, controls = _figure(points[kept], faces), _controls(view, modes, data)
+    return Plot(f"shapes{view.key}", "Mode shapes", caption, drawn, controls=controls)
+
+
+def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
+    """Return the sector at rest; the script puts the shape onto it."""
+    light = {"ambient": 0.78, "diffuse": 0.5, "specular": 0.08, "roughness": 0.9}
+    bar = {"title": {"text": "displacement<br>/ largest"}, "len": 0.55, "thickness": 14}
+    still = np.zeros(len(points), dtype=np.float32)
+    colours = {"intensity": still, "cmin": 0.0, "cmax": 1.0, "colorscale": "Viridis"}
+    skin = surface(points, triangles, colorbar=bar, lighting=light, **colours)
+    pairs, sharp = edges(points, triangles)
+    figure = styled(go.Figure([skin, segments(points, pairs[sharp], MUTED, 1.5)]), 640)
+    axis = {"visible": False, "showspikes": False}
+    figure.update_layout(
+        margin={"l": 0, "r": 0, "t": 44, "b": 0},
+        title={"text": "", "x": 0.02, "y": 0.97, "font": {"size": 15, "family": FONT}},
+        scene={
+            "xaxis": axis,
+            "yaxis": axis,
+            "zaxis": axis,
+            "aspectmode": "manual",
+            "dragmode": "orbit",
+            "camera": {"projection": {"type": "orthographic"}},
+        },
+    )
+    return figure
+
+
+def _payload(view: Waves, modes: int, kept: IntArray, faces: IntArray) -> dict[str, object]:
+    """Return what the script needs, arrays as text."""
+    points = view.floats("skin_point")[kept] * _MM
+    shape = view.data["shape"].values[:, :modes, kept]
+    largest = np.abs(shape).max(axis=(2, 3, 4), keepdims=True)
+    whole = np.round(shape / np.where(largest > 0, largest, 1.0) * _FULL).astype("<i2")
+    hz = view.floats("frequency_hz")
+    inside = _outside_of_wheel(view, faces)
+    wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
+    origin = view.numbers("axis_origin_m") * _MM
+    return {
+        "sectors": view.sectors,
+        "axis": _unit(view.numbers("axis_direction")).tolist(),
+        "origin": origin.tolist() if origin.size == 3 else [0.0, 0.0, 0.0],
+        "points": _text(points.astype("<f4")),
+        "faces": _text(faces.astype("<i4")),
+        "wheelPoints": _text(wheel.astype("<i4")),
+        "wheelFaces": _text(wheel_faces.astype("<i4")),
+        "waveNumbers": view.integers("wave_number").tolist(),
+        "waves": [
+            f"{name}, {kind} wave" if view.sectors > 1 else name
+            for name, kind in zip(view.waves, view.data["wave_kind"].values, strict=True)
+        ],
+        "hertz": [[f"{f:.6g}" for f in row[:modes]] for row in hz],
+        "shapes": [[_text(s) for s in row] for row in whole],
+    }
+
+
+def _outside_of_wheel(view: Waves, faces: IntArray) -> IntArray:
+    """Leave out the faces between neighbouring sectors, where the skin was not made coarser already."""
+    cut = view.integers("skin_cut") if view.has("skin_cut") else np.zeros(0, dtype=np.int64)
+    same = len(cut) == len(faces) and view.sectors > 1
+    return faces[cut == 0] if same else faces
+
+
+def _unit(direction: FloatArray) -> FloatArray:
+    length = float(np.linalg.norm(direction))
+    return direction / length if direction.size == 3 and length > 0 else np.array([0.0, 0.0, 1.0])
+
+
+def _text(values: npt.NDArray[np.generic]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _controls(view: Waves, modes: int, data: dict[str, object]) -> Markup:
+    """Return the form above the picture and the data behind it, as HTML."""
+    pairs = enumerate(zip(view.waves, view.kinds, strict=True))
+    waves = "".join(f'<option value="{k}">{escape(f"{name} ({kind})")}</option>' for k, (name, kind) in pairs)
+    numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
+    views = (
+        '<label>show <select name="view"><option value="wheel">whole wheel</option>'
+        '<option value="sector">one sector</option></select></label>'
+        if view.sectors > 1
+        else '<input type="hidden" name="view" value="sector">'
+    )
+    # "<" could end the script element early
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    return Markup(
+        f'<form class="shapes"><label>wave <select name="wave">{waves}</select></label>'
+        f'<label>mode <select name="mode">{numbers}</select></label>{views}'
+        '<label>phase <input type="range" name="phase" min="0" max="360" value="0" step="5"></label>'
+        '<label>deformation <input type="range" name="size" min="0" max="20" value="6" step="0.5"></label>'
+        '<button type="button" name="play">play</button></form>'
+        f'<script type="application/json">{text}</script>'
+    )

@@ -1,0 +1,241 @@
+"""The solution for one travelling wave: its modes at a speed, or its branches over speeds."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+import scipy
+
+from stickslip.analyses.waves.in_flow import wave_in_flow
+from stickslip.analyses.waves.records.about import ABOUT, about, skin_note
+from stickslip.analyses.waves.records.numbers import Wheel
+from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.build import holding_points
+from stickslip.assembly.fluid.aero_forces import own_dofs, phases
+from stickslip.assembly.model import ContactsAs, Model
+from stickslip.assembly.parts.reduced import stiffening
+from stickslip.errors import input_error
+from stickslip.model.gyroscopic import gyroscopic_modes
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.speed_basis import speed_basis
+from stickslip.reduction.wave_family import WaveFamily
+from stickslip.response.rotating.campbell import campbell
+from stickslip.study.analysis import Notes
+from stickslip.study.store.progress import advance
+from stickslip.study.verdict import Verdict
+
+FEW = 300  # dofs of a sector, of which all waves are solved in no time
+MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for
+
+W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What modes or branches are computed of; picklable.
+
+    Parameters
+    ----------
+    model
+        The model.
+    contacts
+        What its contacts do.
+    wheel
+        Its sectors and directions.
+    numbers
+        Wave numbers.
+    n_modes
+        Modes of each wave.
+    speeds
+        In rad/s; one for modes, ascending for branches.
+    rpm
+        What the result calls the speed; NaN for a range.
+    shapes
+        Whether mode shapes are kept.
+    engine_orders
+        Whose crossings are looked for.
+    left_out
+        What is said of what the frequencies leave out.
+    """
+
+    model: Model
+    contacts: ContactsAs
+    wheel: Wheel
+    numbers: tuple[int, ...]
+    n_modes: int
+    speeds: tuple[float, ...]
+    rpm: float = math.nan
+    shapes: bool = False
+    engine_orders: tuple[int, ...] = ()
+    left_out: tuple[Verdict, ...] = ()
+
+    @property
+    def turning(self) -> bool:
+        """Whether Coriolis forces act at the first speed; forces of a flow part the directions of waves as well."""
+        return self.model.coriolis and self.model.rotates and self.speeds[0] > 0
+
+    @property
+    def small(self) -> bool:
+        """Whether a wave may have fewer modes than are asked for, and is soon looked at."""
+        return own_dofs(self.model).size <= MANY
+
+    def require(self, place: str) -> None:
+        """Refuse more modes than a wave has."""
+        for number in self.numbers:
+            mass = self.at(self.speeds[0], number).mass.diagonal()
+            most = int(np.count_nonzero(mass))
+            if self.n_modes > most:
+                raise input_error(
+                    place,
+                    f"is {self.n_modes}, and the wave {number} has {most} modes",
+                    f"Ask for {most} at most." if most else "Free a part of it.",
+                )
+
+    def require_coefficients(self) -> None:
+        """Refuse aerodynamic coefficients that do not reach to the natural frequencies, where these are soon found."""
+        given = self.model.aerodynamics
+        if given is None or not given.influence.refuses or own_dofs(self.model).size > FEW:
+            return
+        waves = (self.at(self.speeds[0], number) for number in self.numbers)
+        squares = [normal_modes(moving, self.n_modes).squares for moving in waves]
+        omega = np.sqrt(np.maximum(squares, 0.0))
+        low, high = float(omega.min()), float(omega.max())
+        given.influence.require(low, high, f"the question for {self.n_modes} modes of each wave")
+
+    @cached_property
+    def holds(self) -> BoolArray:
+        """(p,) contact points that hold in these vibrations."""
+        return holding_points(self.model, self.contacts)
+
+    def at(self, speed: float, wave_number: int) -> Structure:
+        """Return the structure at a speed in rad/s as a wave."""
+        return self.model.at(speed, wave_number, self.holds)
+
+    @cached_property
+    def stiffening(self) -> Matrix:
+        """The derivative by Ω² of the stiffness at the first speed, on the dofs of all parts, the same for all waves."""
+        model, spin = self.model, self.model.spin(self.speeds[0])
+        own = [stiffening(part, spin, model.steady[name]) for name, part in model.parts.items()]
+        return scipy.sparse.block_diag(own, format="csr")
+
+    @cached_property
+    def family(self) -> WaveFamily:
+        """The waves at the first speed, which share what is alike in them."""
+        return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
+
+
+def each_wave(solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes) -> Iterator[W]:
+    """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
+    if notes.get(ABOUT) is None:
+        note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1], asked.left_out)
+        note |= {"parted": asked.wheel.parted}
+        notes.put(ABOUT, note | (skin_note(asked.model) if asked.shapes else {}))
+    known = {w.wave_number for w in done}
+    for i, number in enumerate(asked.numbers):
+        if number not in known:
+            found = solve(asked, number)
+            yield found
+            advance((i + 1) / len(asked.numbers), _progress(found))
+
+
+def _progress(wave: WaveModes | WaveBranches | WaveFlutter) -> str:
+    low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
+    basis = f", basis good to {wave.error:.0e}" if isinstance(wave, WaveBranches) else ""
+    return f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s{basis}"
+
+
+def solve_wave(asked: Question, wave_number: int) -> WaveModes:
+    """Return the lowest modes of a wave.
+
+    Raises
+    ------
+    InputError
+        If the wave has fewer modes.
+    """
+    began = perf_counter()
+    structure = asked.at(asked.speeds[0], wave_number)
+    shift, factors = asked.family.shifted(wave_number, structure)
+    if asked.turning:
+        turning = gyroscopic_modes(structure, asked.n_modes, shift=shift, factors=factors)
+        hertz, vectors = turning.frequencies_hz, turning.shapes
+    else:
+        modes = normal_modes(structure, asked.n_modes, shift=shift, factors=factors)
+        hertz, vectors = modes.frequencies_hz, np.asarray(modes.shapes, dtype=complex)
+    moved = np.zeros((asked.n_modes, 0, 3), dtype=complex)
+    if asked.shapes:
+        moved = asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex))
+        moved = unit_shapes(moved, _own_points(asked.model))
+    growth = _growth(asked, structure, hertz, vectors)
+    flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
+    found = WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
+    return found if flow is None else replace(found, in_flow=flow.damped)
+
+
+def _growth(asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix) -> FloatArray:
+    """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
+    x = asked.speeds[0] ** 2
+    if x == 0 or not asked.model.rotates:
+        return np.zeros(len(hertz))
+    # cyclic faces, joins and springs do not change with the speed: a mode feels what the parts do
+    by_x = _form(asked.stiffening, structure.expand(vectors))
+    mass, omega = _form(structure.mass, vectors), 2 * np.pi * hertz
+    if not asked.turning:
+        return np.asarray((by_x / mass).real)
+    # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
+    turning = -_form(structure.damping, vectors).imag
+    by_omega = 2 * omega * mass - turning
+    return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
+
+
+def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
+    """Return ``φᴴ A φ`` of each column."""
+    return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
+
+
+def _own_points(model: Model) -> IntArray:
+    """Return the points of the skin that do not follow the neighbour's, as those of the high cyclic face do."""
+    following = np.ones((model.places.n, 1))
+    following[own_dofs(model)] = 0.0
+    return np.flatnonzero(~model.on_skin(following).any(axis=(0, 2)))
+
+
+def unit_shapes(shapes: ComplexArray, own: IntArray) -> ComplexArray:
+    """Return shapes (m, n, 3) whose largest displacement has length 1; the largest component among the points `own` is real and positive."""
+    out = np.zeros_like(shapes)
+    components = (3 * own[:, None] + np.arange(3)).ravel()
+    for i, shape in enumerate(shapes):
+        if shape[own].any():
+            flat = shape.reshape(-1, 1)
+            out[i] = shape * (phases(flat, components) / np.linalg.norm(shape, axis=1).max())
+    return out
+
+
+def follow_wave(asked: Question, wave_number: int) -> WaveBranches:
+    """Return the branches of a wave over the speeds and their crossings with the engine orders that excite it."""
+    began = perf_counter()
+    orders = [m for m in asked.engine_orders if asked.wheel.diagram(m) == wave_number]
+    speeds, coriolis = np.array(asked.speeds), asked.wheel.parted
+    small = speed_basis(
+        lambda speed: asked.at(speed, wave_number),
+        (asked.speeds[0], asked.speeds[-1]),
+        asked.n_modes,
+        coriolis=coriolis,
+    )
+    found = campbell(small.at, speeds, asked.n_modes, orders, coriolis=coriolis)
+    crossings = found.crossings
+    return WaveBranches(
+        wave_number,
+        found.frequencies_hz,
+        np.array([c.engine_order for c in crossings], dtype=np.int64),
+        np.array([c.mode for c in crossings], dtype=np.int64),
+        np.array([c.speed for c in crossings]),
+        np.array([c.frequency_hz for c in crossings]),
+        small.error,
+        perf_counter() - began,
+    )

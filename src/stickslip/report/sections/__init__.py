@@ -1,1 +1,0 @@
-"""Sections of the analyses, one a file; `stickslip.report.page` lists them."""
