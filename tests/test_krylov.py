@@ -773,6 +773,30 @@ def test_what_costs_more_by_products_is_factorised_for_a_while(monkeypatch):
         assert automatic.krylov.counts.systems == tried
 
 
+def test_products_that_cost_much_less_again_are_soon_tried_again(monkeypatch):
+    """The pauses grow as long as products are dear; where they have paid since, the next one is as short as the first."""
+    balance, x = state("gross slip")
+    right = np.random.default_rng(0).standard_normal(balance.size)
+    automatic = Automatic(krylov=Krylov(tolerance=1e-13))
+
+    def tried(array: float, systems: int) -> list[bool]:
+        priced(monkeypatch, 1.0, array)
+        found = []
+        for _ in range(systems):
+            before = automatic.krylov.counts.systems
+            automatic.solve(balance.linearise(x, OMEGA).jac, right)
+            found.append(automatic.krylov.counts.systems > before)
+        return found
+
+    def pauses(systems: list[bool]) -> list[int]:
+        by_products = np.flatnonzero(systems)
+        return [int(n) for n in np.diff(by_products) - 1 if n]
+
+    assert pauses(tried(13.0, 18)) == [4, 8]
+    assert tried(1000.0, 24) == [False] * 16 + [True] * 8
+    assert pauses(tried(13.0, 40))[:1] == [4]
+
+
 def test_what_a_krylov_method_does_not_solve_is_factorised():
     balance, x = state("gross slip")
     at = balance.linearise(x, OMEGA)

@@ -178,6 +178,42 @@ def test_measured_blades_are_taken_from_a_file(tmp_path: Path, caplog: pytest.Lo
     assert f"{told} model, so the difference of the mean counts" in caplog.text
 
 
+SOLID = """
+schema_version = 2
+[material]
+young_modulus_pa = 2.1e11
+poisson_ratio = 0.3
+density_kg_per_m3 = 7850.0
+[part.wheel]
+shape = "bladed_sector"
+sectors = 6
+disk_size_m = 0.05
+platform_size_m = 0.03
+airfoil_size_m = 0.04
+[mistuning.b]
+of = "wheel"
+beyond_radius_m = {beyond}
+{how}
+[modes]
+number = 1
+[output]
+points = {{ tip = "wheel.tip" }}
+"""
+
+
+@pytest.mark.parametrize("how", ["deviations = [0.01, -0.01]", 'file = "one.csv"\nrelative_to = "model"'])
+def test_a_blade_begins_at_the_radius_that_a_study_gives(tmp_path: Path, how: str) -> None:
+    """In the model as in what a file is compared with: the shorter the blade, the higher its frequency."""
+    rows = [f"{n},1,{460 + n}" for n in range(6)]
+    (tmp_path / "one.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows]))
+    first = []
+    for beyond in (0.19, 0.21):
+        blade = study_of(tmp_path, SOLID.format(beyond=beyond, how=how)).model().mistuning.blades["b"]
+        assert blade.beyond_radius == beyond
+        first.append(blade.deviations.flat[0])
+    assert (first[1] < first[0]) == ("file" in how)
+
+
 SIX = """
 schema_version = 2
 [part.wheel]
