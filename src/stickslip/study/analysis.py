@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -172,11 +173,11 @@ class Pieces:
 
 def of_tables(*tables: str) -> Callable[[Case], str]:
     """Return what gives the key of a case whose records depend on some tables beside the model."""
+    return partial(_key, tables)  # which another process can be given
 
-    def key(case: Case) -> str:
-        return case.as_text(*tables)
 
-    return key
+def _key(tables: tuple[str, ...], case: Case) -> str:
+    return case.as_text(*tables)
 
 
 def judged_when_made(data: xr.Dataset) -> tuple[Verdict, ...]:
