@@ -42,7 +42,7 @@ def test_sentences_take_amplitudes_from_one_place():
     own = re.compile(r"\{1e3 \* [^{}]*:\.\d[eg]\} (mm|to \{)")
     found = [
         f"{path.relative_to(source)}: {line.strip()}"
-        for folder in ("response", "study")
+        for folder in ("response", "analyses", "study")
         for path in (source / folder).rglob("*.py")
         for line in path.read_text().splitlines()
         if own.search(line)

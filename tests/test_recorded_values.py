@@ -55,7 +55,7 @@ COORDINATES = {
     "output_label": np.array(["b.x"]),
     "concept": "extended energy balance",
 }
-SOURCES = Path(__file__).parents[1] / "src" / "stickslip" / "study"
+SOURCES = [Path(__file__).parents[1] / "src" / "stickslip" / folder for folder in ("analyses", "study")]
 
 
 def solved(records: Any, notes: Mapping[str, Any] | None = None, **settings: Any) -> Any:
@@ -816,7 +816,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
 def written() -> set[str]:
     """Return the names of all variables that analyses write: keys of tables, and of dictionaries whose values are variables."""
     names: set[str] = set()
-    for file in SOURCES.rglob("*.py"):
+    for file in (path for folder in SOURCES for path in folder.rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Dict):
                 names |= {

@@ -257,21 +257,26 @@ def test_job_without_a_solution_does_not_take_the_others_with_it(tmp_path: Path,
     assert np.isnan(value[0, 2:]).all()
 
 
+ENTERED: list[int] = []  # numbers of cases that were put together or judged
+
+
+def counted(solved: Sequence[Solved]) -> xr.Dataset:
+    ENTERED.append(len(solved))
+    return TOY.dataset(solved)
+
+
+def counted_again(data: xr.Dataset) -> tuple[Verdict, ...]:
+    ENTERED.append(data.sizes["case"])
+    return TOY.verdicts(data)
+
+
 @pytest.mark.parametrize("resumed", [False, True])
 def test_the_work_of_judging_grows_with_the_number_of_cases(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, resumed: bool
 ) -> None:
     """A case is judged when its job ends, all are put together at the end: three times as many cases are three times the work."""
-    entered: list[int] = []
-
-    def counted(solved: Sequence[Solved]) -> xr.Dataset:
-        entered.append(len(solved))
-        return TOY.dataset(solved)
-
-    def counted_again(data: xr.Dataset) -> tuple[Verdict, ...]:
-        entered.append(data.sizes["case"])
-        return TOY.verdicts(data)
-
+    entered = ENTERED
+    entered.clear()
     monkeypatch.setattr("toy_analysis.COUNTED", replace(TOY, dataset=counted, verdicts=counted_again), raising=False)
     monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:COUNTED")
     # what is not complete is written by the clock: here never

@@ -40,22 +40,15 @@ def wave_analysis(
     compared
         Keys of the table that no record depends on: what the records are compared with.
     """
-
-    def key(case: Case) -> str:
-        return str(getattr(case.settings, name).model_dump_json(exclude=set(compared)))
-
-    def check(case: Case, model: Model) -> tuple[str, ...]:
-        return (counted(name, inputs(case, model)),)
-
     return Analysis(
         name=name,
         table=table,
         record=record,
-        key=key,
+        key=partial(_key, name=name, left_out=compared),
         inputs=inputs,
         solve=solve,
         dataset=partial(dataset, of_case=variables),
-        check=check,
+        check=partial(_check, name=name, inputs=inputs),
         summary=partial(of_cases, tables=tables),
         linear=True,
     )
@@ -69,3 +62,11 @@ def solved_by(of_wave: Callable[[Question, int], Any]) -> Solve:
 def counted(name: str, asked: Any) -> str:
     """Return the line of ``stickslip check`` that tells how many modes there will be."""
     return f"{name}: {asked.n_modes} modes of each of {len(asked.numbers)} waves"
+
+
+def _key(case: Case, name: str, left_out: frozenset[str]) -> str:
+    return str(getattr(case.settings, name).model_dump_json(exclude=set(left_out)))
+
+
+def _check(case: Case, model: Model, name: str, inputs: Callable[[Case, Model], Any]) -> tuple[str, ...]:
+    return (counted(name, inputs(case, model)),)
