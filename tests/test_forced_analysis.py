@@ -569,6 +569,13 @@ def refused(asked: Model, checks: frozenset[str] = frozenset(), high: int | str 
     return str(error.value)
 
 
+def test_a_speed_of_rotation_is_told_in_rpm() -> None:
+    turning = model(speed=6000.0 * RPM, loads={"shaker": Load(on="blade.tip", newton=1.0)})
+    own = settings({"low": 1, "high": 3}, frequency_hz=[1.0, 2.0])
+    case = Case(0, "", {}, own, lambda: turning, "", Path(), frozenset())
+    assert question_of(case, turning).rpm == pytest.approx(6000.0)
+
+
 def test_what_cannot_be_answered_is_refused_by_key() -> None:
     third = Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0), harmonic=3)
     assert refused(model(loads={"third": third})) == (

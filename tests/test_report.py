@@ -17,12 +17,14 @@ from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, w
 from stickslip.analyses.forced_response.page.chapter import stability
 from stickslip.analyses.forced_response.page.choice import choice, flagged_ranges
 from stickslip.analyses.forced_response.page.contacts.bodies import body_motion, rigid_bodies
+from stickslip.analyses.forced_response.page.contacts.contact import hysteresis_t
 from stickslip.analyses.forced_response.page.curves import frequency_response, optimisation
 from stickslip.analyses.forced_response.page.errors import errors
 from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
 from stickslip.analyses.forced_response.page.head import cards
+from stickslip.analyses.forced_response.page.not_periodic import statistics_in_time
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
-from stickslip.analyses.forced_response.page.tables import peaks
+from stickslip.analyses.forced_response.page.tables import more_harmonics, peaks, time_integration
 from stickslip.analyses.inputs import Varied, as_run, told
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures.skin import edges, skin_picture
@@ -423,6 +425,26 @@ def test_checks_name_their_case_and_what_decided() -> None:
     assert table.items[1] == f"{KEY} = 5: 181.000 Hz: undecided: y"
 
 
+def test_every_table_of_checks_ends_with_what_they_said() -> None:
+    data = synthetic_result(ratios=(20, 5), n=10)
+    for name in ("reference_worst_percent", "reference_worst_hz", "reference_above"):
+        data[name] = "case", [1.0, 2.0]
+    for key in ("hz", "amplitude"):
+        data[f"not_periodic_line_{key}"] = ("not_periodic", "line"), [[100.0], [200.0]]
+    for key in ("largest", "least", "rms", "mean", "amplitudes"):
+        data[f"not_periodic_{key}"] = ("not_periodic", "output"), np.ones((2, data.sizes["output"]))
+    for key in ("case", "periods", "settled", "frequency_hz", "spread"):
+        data[f"not_periodic_{key}"] = "not_periodic", [0, 1]
+    checks = {"reference": more_harmonics, "verify": time_integration, "not_periodic": statistics_in_time}
+    for name, page_table in checks.items():
+        dimension = {"reference": "case", "verify": "check"}.get(name, name)
+        said = [f"{name} {k}" for k in range(data.sizes[dimension])]
+        data[f"{name}_sentence"] = dimension, said
+        table = page_table(Response(data))
+        assert isinstance(table, Table)
+        assert [item.rpartition(": ")[2] for item in table.items] == said
+
+
 def test_the_smallest_peak_is_one_of_resonance() -> None:
     data = synthetic_result(ratios=(50, 20, 5), n=24)
     view = Response(data)
@@ -723,6 +745,19 @@ def test_a_stuck_contact_dissipates_nothing_in_spite_of_rounding() -> None:
     assert text.count("No loop encloses an area: nothing is dissipated in this direction.") == 2
     assert "At the peak nothing is dissipated: every point sticks." in text
     assert "No point dissipates energy." in text
+
+
+def test_a_loop_is_wide_by_its_own_box_whatever_the_size_of_its_forces() -> None:
+    data = synthetic_result(ratios=(5,), n=6)
+    said = []
+    for size in (1.0, 1e-10, 1e10):
+        small = data.copy(deep=True)
+        small["peak_force"] *= size
+        drawn = hysteresis_t(Response(small))
+        assert drawn is not None
+        said.append([re.findall(r"(\d+) of \d+ points? enclose", text) for text in drawn.case_captions.values()])
+    assert all(said[0])
+    assert said == [said[0]] * 3
 
 
 def test_edges_of_a_cube() -> None:

@@ -119,6 +119,29 @@ def test_the_schema_lists_tables_and_keys():
     assert all("description" in p for p in described)
 
 
+# none is meant by an empty list, or what reads it refuses it
+MAY_BE_EMPTY = {
+    "Contact": {"along_t", "along_w", "along_n"},
+    "FileModel": {"clamped"},
+    "FirstLoading": {"displacement", "force"},
+    "Harmonics": {"low", "high", "alert_over"},
+    "Lumped": {"names", "springs_n_per_m", "dashpots_n_s_per_m"},
+    "ModalSynthesisTable": {"passage_hz_per_s"},
+    "PrismBlades": {"nodes_at"},
+    "Surface": {"normals", "names", "areas_m2"},
+}
+
+
+def test_a_list_holds_something_unless_nothing_has_a_meaning():
+    found = {}
+    for table, kind in json.loads(json_schema())["$defs"].items():
+        for key, given in kind.get("properties", {}).items():
+            lists = [one for one in given.get("anyOf", [given]) if one.get("type") == "array"]
+            if any(not one.get("minItems") for one in lists):
+                found.setdefault(table, set()).add(key)
+    assert found == MAY_BE_EMPTY
+
+
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
     folders = {"blades": "two_blades", "sector": "shrouded_sector", "wheel": "friction_ring", "masses": "four_masses"}
