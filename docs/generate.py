@@ -238,11 +238,18 @@ def variables_of_response() -> str:
 
 def variables_of_cycles() -> str:
     """Return the variables of limit cycles."""
-    from stickslip.analyses.limit_cycle.dataset import ABOUT
+    from stickslip.analyses.limit_cycle.records import LimitCycles
+
+    return _variables(LimitCycles)
+
+
+def _variables(kind: type) -> str:
+    """Return the table of the variables that a record of a case becomes."""
+    from stickslip.analyses.columns import described
 
     rows = [
-        f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
-        for name, (dims, units, about) in ABOUT.items()
+        f"| `{name}` | {', '.join(['case', *dims])} | {_escaped(about)} | {_unit(units)} |"
+        for name, dims, units, about in described(kind)
     ]
     return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
 

@@ -11,8 +11,10 @@ from small_v2 import EXAMPLES, changed
 from study_texts import JENKINS, answered, study_of
 
 import stickslip as ss
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
 from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
+from stickslip.analyses.limit_cycle.records import LimitCycles
 from stickslip.analyses.limit_cycle.solve import _without
 from stickslip.analyses.limit_cycle.time import compete
 from stickslip.analyses.limit_cycle.verdicts import case_verdicts
@@ -88,7 +90,7 @@ def test_python_gives_the_same_and_a_sealed_mode_is_not_solved_again(tmp_path: P
     question = LIMIT_CYCLE.inputs(case, model)
     with JobJournal(tmp_path / "a.part", LIMIT_CYCLE.record) as journal:
         records = list(LIMIT_CYCLE.solve(question, (), journal))
-        assert records[0].cycle_amplitude == pytest.approx(own["cycle_amplitude"].values, rel=1e-12)
+        assert [c.amplitude for c in records[0].cycles] == pytest.approx(own["cycle_amplitude"].values, rel=1e-12)
         assert list(LIMIT_CYCLE.solve(question, records, journal)) == []
 
 
@@ -141,16 +143,16 @@ def test_waves_compete_in_time_and_what_has_no_flutter_says_so(
     assert "the motion still grows, wave 1 most (wave 1 has 0.00" in mixed.why
     assert mixed.remedy == "limit_cycle.periods were too few to settle: raise it."
     own = case.assign(cycle_growing_wave=("cycle", [2, 1, 2, 2]))
-    told = [v.why for v in case_verdicts("", own.variables)]
+    told = [v.why for v in case_verdicts("", record_of(LimitCycles, own))]
     assert any("but a modulation of it, by wave 2 itself at 619." in why for why in told)
     words = ("cycle", ["stable", "unstable", "unstable", "unstable"])
     stable = case.assign(cycle_stability=words, outcome=case.attrs["outcome"])
-    told = [v.why for v in case_verdicts("", stable.variables) if "mixed start" in v.why]
+    told = [v.why for v in case_verdicts("", record_of(LimitCycles, stable)) if "mixed start" in v.why]
     assert "; its stable limit cycle 0.0231 mm)" in told[0]
     # that a mode was left out which grows is told
-    assert not any("not followed" in v.why for v in case_verdicts("", case.variables))
+    assert not any("not followed" in v.why for v in case_verdicts("", record_of(LimitCycles, case)))
     first = case.isel(branch=[0]).drop_dims("cycle")
-    assert "1 of 2 modes that grow" in case_verdicts("", first.variables)[0].why
+    assert "1 of 2 modes that grow" in case_verdicts("", record_of(LimitCycles, first))[0].why
     # with the ratio of the structure alone twice as large nothing grows
     text = changed(flutter_ring(tmp_path / "b"), {"part.blisk.damping.modal_ratio": "5e-3"})
     still = answered(text, tmp_path / "b")
@@ -168,7 +170,7 @@ def test_waves_without_a_found_cycle_compete_from_where_they_slip(tmp_path: Path
     lost = [_without(wave, mode, "") for wave, mode in found]
     assert "slips" in compete(question, lost)["left_out"]
     slip = {1: 1e-7, 2: 3e-7}
-    told = compete(question, [replace(b, slips=slip[b.wave_number]) for b in lost])
+    told = compete(question, [replace(b, slip_amplitude=slip[b.wave_number]) for b in lost])
     assert told["left_out"] == ""
     grown = told["amplitude"][0, [1, 2]] / [1e-7, 3e-7]
     # so small everything sticks: in the middle of the first window, eight periods on, each has grown by its damping
@@ -183,7 +185,7 @@ def test_what_friction_cannot_bound_is_told(tmp_path: Path) -> None:
     assert "cycle_amplitude" not in case
     assert any("friction cannot bound it" in v.why for v in outcome.verdicts)
     assert "Friction cannot bound" in str(cycle_table(Cycles(case)))
-    assert case_verdicts("", case.variables)
+    assert case_verdicts("", record_of(LimitCycles, case))
 
 
 def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:

@@ -18,9 +18,10 @@ import xarray as xr
 
 from stickslip.analyses.all_motions.dataset import dataset as of_motions
 from stickslip.analyses.all_motions.dataset import noted
+from stickslip.analyses.columns import described
 from stickslip.analyses.forced_response.measured_variables import with_measured
-from stickslip.analyses.limit_cycle.dataset import dataset as of_cycles
-from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis
 from stickslip.analyses.modal_synthesis.records import SynthesisLevel
 from stickslip.analyses.nonlinear_mode.dataset import dataset as of_modes
@@ -82,33 +83,38 @@ def pairs(*values: complex) -> np.ndarray:
 
 def cycle_branch(k: int, cycles: int, harmonics: int) -> CycleBranch:
     own = np.arange(1.0, cycles + 1) + 10 * k
+    moved = k + np.arange(cycles * harmonics * 3 * 2.0).reshape(cycles, harmonics, 3, 2)
     return CycleBranch(
         wave_number=k,
         mode=k + 1,
         omega=100.0 + k,
         ratio=-0.01 * (k + 1),
-        slips=1e-4 * (k + 1),
+        slip_amplitude=1e-4 * (k + 1),
         amplitude=1e-3 * np.arange(1.0, 3 + k),
         motion_omega=90.0 + np.arange(2.0 + k),
-        motion_ratio=0.1 * np.arange(2.0 + k),
-        largest_ratio=0.2 + k,
-        largest_at=5e-4 + k,
-        cycle_amplitude=1e-3 * own,
-        cycle_omega=200.0 + own,
-        slope=own,
-        order=2 * own.astype(int),
-        change=0.01 * own,
-        enough=np.ones(cycles, dtype=int),
-        coefficients=k + np.arange(cycles * harmonics * 3 * 2.0).reshape(cycles, harmonics, 3, 2),
-        stable=json.dumps(["stable"] * cycles),
-        reason=json.dumps([f"why {k}"] * cycles),
-        multiplier=0.5 * own,
-        error=0.05 * own,
-        along=0.02 * own,
-        grows_as=np.full(cycles, 3),
-        grows_omega=300.0 + own,
-        problem="",
-        lost=k,
+        damping_ratio=0.1 * np.arange(2.0 + k),
+        largest_damping_ratio=0.2 + k,
+        largest_damping_amplitude=5e-4 + k,
+        cycles=tuple(
+            Cycle(
+                amplitude=1e-3 * a,
+                omega=200.0 + a,
+                slope=a,
+                harmonics=int(2 * a),
+                change=0.01 * a,
+                enough=True,
+                coefficients=m,
+                stability="stable",
+                reason=f"why {k}",
+                multiplier=0.5 * a,
+                multiplier_error=0.05 * a,
+                along=0.02 * a,
+                growing_wave=3,
+                growing_omega=300.0 + a,
+            )
+            for a, m in zip(own.tolist(), moved, strict=True)
+        ),
+        lost_cycles=k,
     )
 
 
@@ -127,10 +133,10 @@ def test_limit_cycles() -> None:
             "left_out": "no",
         },
     }
-    data = of_cycles(solved([first, second], notes))
+    data = LIMIT_CYCLE.dataset(solved([first, second], notes))
     assert data.attrs["failed"] == 0
     moved = np.zeros((3, 3, 3, 2))
-    moved[0, :2], moved[1:] = first.coefficients[0], second.coefficients
+    moved[0, :2], moved[1:] = first.cycles[0].coefficients, [c.coefficients for c in second.cycles]
     check(
         data,
         output="b.x",
@@ -178,13 +184,13 @@ def test_limit_cycles() -> None:
 
 
 def test_amplitudes_without_a_motion_are_lost() -> None:
-    branch = replace(cycle_branch(0, 0, 1), motion_ratio=np.array([NAN, 0.1]))
+    branch = replace(cycle_branch(0, 0, 1), damping_ratio=np.array([NAN, 0.1]))
     alone = replace(branch, wave_number=-1)
-    data = of_cycles(solved([alone], {"linear": {"wave": [-1], "hertz": [[1.0]], "ratio": [[0.1]]}}))
+    data = LIMIT_CYCLE.dataset(solved([alone], {"linear": {"wave": [-1], "hertz": [[1.0]], "ratio": [[0.1]]}}))
     assert data.attrs["failed"] == 1
     check(data, nodal_diameter=[-1], wave_number=[-1])
     missing = solved([branch], {"in_time.0": {"amplitude": [], "omega": []}, "model": {"sectors": 3}})
-    assert "cycle_time_amplitude" not in of_cycles(missing)
+    assert "cycle_time_amplitude" not in LIMIT_CYCLE.dataset(missing)
 
 
 def mode_records() -> Iterator[ModeRecord]:
@@ -813,9 +819,12 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
+RECORDS = (LimitCycles,)  # of cases, whose fields are columns
+
+
 def written() -> set[str]:
-    """Return the names of all variables that analyses write: keys of tables, and of dictionaries whose values are variables."""
-    names: set[str] = set()
+    """Return the names of all variables that analyses write: columns, keys of tables, and of dictionaries whose values are variables."""
+    names = {name for kind in RECORDS for name, *_ in described(kind)}
     for file in (path for folder in SOURCES for path in folder.rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Dict):

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stickslip.analyses.columns import variables
 from stickslip.analyses.waves.records.about import told
 from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
@@ -40,6 +41,22 @@ def of_cases(
     found = [v for label, own in zip(labels, cases, strict=True) for v in verdicts(label, own)]
     failed = sum(lost(own) for own in cases)
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def of_answers(
+    solved: Sequence[Solved],
+    answer: Callable[[Solved], Any],
+    verdicts: Callable[[str, Any], Iterable[Verdict]],
+    lost: Callable[[Any], int] = lambda _: 0,
+) -> xr.Dataset:
+    """Return the node of all cases, as `of_cases`, from the record that `answer` makes of what the job of each case has found."""
+    answers = [answer(one) for one in solved]
+    labels = [one.case.label for one in solved]
+    models = [told(one.notes.get("model", {})) for one in solved]
+    cases = [model | variables(own) for model, own in zip(models, answers, strict=True)]
+    found = [v for label, own in zip(labels, answers, strict=True) for v in verdicts(label, own)]
+    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": sum(map(lost, answers))}
     return xr.Dataset(stacked(cases), attrs=attributes)
 
 

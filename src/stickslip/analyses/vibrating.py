@@ -1,7 +1,7 @@
 """Requests that several analyses share: waves that may vibrate, modes with stuck contacts, representation of motions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store
+from stickslip.column import column
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.response.parameter import Discretisation
@@ -107,10 +108,21 @@ def known_coordinates(model: Assembled) -> dict[str, Any]:
     }
 
 
-KEPT = {  # labels of what `kept_motions` returns
-    "retained_label": ("coordinate", "1", "names of the retained coordinates"),
-    "output_label": ("reported", "1", "names of the outputs"),
-}
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KeptMotions:
+    """Free motions as results keep them, for other programs, which expand them to all nodes."""
+
+    retained_label: Any = column("1", "names of the retained coordinates", along="coordinate", default=None)
+    output_label: Any = column("1", "names of the outputs", along="reported", default=None)
+    retained_displacement: FloatArray | None = column(
+        "m",
+        "its motion in each harmonic: the real and the imaginary part",
+        along="cycle harmonic coordinate part",
+        default=None,
+    )
+    output_displacement: FloatArray | None = column(
+        "m", "the same of the outputs", along="cycle harmonic reported part", default=None
+    )
 
 
 def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,15 +1,24 @@
 """Motions that nothing drives: unstable waves that friction bounds, where it does, and whether the machine stays there."""
 
+from functools import partial
+
+import numpy as np
+
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.forced_response.stability.examination import too_long
-from stickslip.analyses.limit_cycle.dataset import dataset
 from stickslip.analyses.limit_cycle.problem import IN_TIME, question_of
-from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.limit_cycle.records import CycleBranch, LimitCycles, answer
 from stickslip.analyses.limit_cycle.solve import solve
 from stickslip.analyses.limit_cycle.table import LimitCycleTable
-from stickslip.analyses.limit_cycle.verdicts import tables
+from stickslip.analyses.limit_cycle.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.study.analysis import Analysis, Case, of_tables
+
+
+def _lost(found: LimitCycles) -> int:
+    """Return how many amplitudes have no motion."""
+    return sum(int(np.count_nonzero(np.isfinite(b.amplitude) & ~np.isfinite(b.damping_ratio))) for b in found.branches)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
@@ -33,7 +42,7 @@ LIMIT_CYCLE = Analysis(
     key=of_tables("limit_cycle", "solver"),
     inputs=question_of,
     solve=solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
     checks=(IN_TIME,),

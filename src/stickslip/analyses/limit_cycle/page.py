@@ -2,16 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
+from stickslip.analyses.limit_cycle.verdicts import grows
+from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
+from stickslip.units import HZ
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _READING = (
@@ -29,61 +34,52 @@ _JOINED = (
 class Cycles(Node):
     """One case."""
 
-    @property
-    def names(self) -> list[str]:
-        """Of the modes that were followed."""
-        waves, modes = self.integers("wave_number"), self.integers("mode")
-        return [f"mode {m}" if k < 0 else f"wave {k}, mode {m}" for k, m in zip(waves, modes, strict=True)]
+    @cached_property
+    def found(self) -> LimitCycles:
+        """What was found."""
+        known: LimitCycles = record_of(LimitCycles, self.data)
+        return known
 
-    @property
-    def cycles(self) -> int:
-        """Number of limit cycles."""
-        return int(self.data.sizes.get("cycle", 0)) if self.has("cycle_amplitude") else 0
 
-    def of_branch(self, i: int, name: str, at_cycles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the amplitudes of a mode in their order, its limit cycles among them, and a variable there.
+def _with_cycles(branch: CycleBranch, motions: FloatArray, at_cycles: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Return the amplitudes of a mode in their order, its limit cycles among them, and a quantity of the motions there.
 
-        Parameters
-        ----------
-        i
-            The mode.
-        name
-            The variable.
-        at_cycles
-            (cycles,) the variable at all limit cycles.
-        """
-        amplitude = self.values("amplitude", "branch", "point")[i]
-        known = np.isfinite(amplitude)
-        own = self.values(name, "branch", "point")[i][known]
-        amplitude = amplitude[known]
-        if self.cycles:
-            mine = self.integers("cycle_branch") == i
-            amplitude = np.append(amplitude, self.floats("cycle_amplitude")[mine])
-            own = np.append(own, at_cycles[mine])
-        order = np.argsort(amplitude, kind="stable")
-        return amplitude[order], own[order]
+    Parameters
+    ----------
+    branch
+        The mode.
+    motions
+        (points,) the quantity at the amplitudes that were looked at.
+    at_cycles
+        The quantity at its limit cycles.
+    """
+    known = np.isfinite(branch.amplitude)
+    amplitude = np.append(branch.amplitude[known], [cycle.amplitude for cycle in branch.cycles])
+    own = np.append(motions[known], at_cycles)
+    order = np.argsort(amplitude, kind="stable")
+    return amplitude[order], own[order]
 
 
 def damping(view: Cycles) -> Plot | None:
     """Show the damping that each amplitude has; limit cycles are its zeros."""
-    if not view.has("amplitude"):
+    found = view.found
+    if not found.branches:
         return None
-    figure = _over_amplitude(view, "damping_ratio", 100.0, np.zeros(view.cycles))
-    for i, name in enumerate(view.names):
-        figure.data[i].name = name
+    figure = _over_amplitude(found, [(100.0 * b.damping_ratio, [0.0] * len(b.cycles)) for b in found.branches])
     figure.add_hline(y=0.0, line={"color": INK, "width": 1})
-    _mark(view, figure, np.zeros(view.cycles))
+    _mark(found, figure, [0.0] * len(found.cycles))
     figure.update_yaxes(title_text="damping ratio of the motion (%)")
-    return Plot(f"limit_cycles{view.key}", "Damping over the amplitude", _caption(view), figure)
+    return Plot(f"limit_cycles{view.key}", "Damping over the amplitude", _caption(found), figure)
 
 
 def frequencies(view: Cycles) -> Plot | None:
     """Show the frequency of the motions."""
-    if not view.has("amplitude"):
+    found = view.found
+    if not found.branches:
         return None
-    own = view.floats("cycle_frequency_hz") if view.cycles else np.zeros(0)
-    figure = _over_amplitude(view, "frequency_hz", 1.0, own)
-    _mark(view, figure, own)
+    own = [(b.motion_omega / HZ, [c.omega / HZ for c in b.cycles]) for b in found.branches]
+    figure = _over_amplitude(found, own)
+    _mark(found, figure, [cycle.omega / HZ for _, cycle in found.cycles])
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = (
         "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction. Limit cycles are "
@@ -94,10 +90,10 @@ def frequencies(view: Cycles) -> Plot | None:
 
 def waves_in_time(view: Cycles) -> Plot | None:
     """Show what becomes of all unstable waves together."""
-    if not view.has("wave_amplitude"):
+    time, amplitude = view.found.time, view.found.wave_amplitude
+    if time is None or amplitude is None or not amplitude.size:
         return None
     figure = go.Figure()
-    time, amplitude = view.floats("time"), view.values("wave_amplitude", "window", "wave")
     scale = scale_for(amplitude, "m")
     largest = amplitude.max(axis=0)
     shown = [k for k in range(amplitude.shape[1]) if largest[k] > 1e-3 * largest.max()]
@@ -117,7 +113,7 @@ def waves_in_time(view: Cycles) -> Plot | None:
     figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
     caption = (
         "All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave, or its mode where slip begins if none was "
-        f"found: **{view.text('outcome')}**. Waves are told apart by the motion of all sectors at "
+        f"found: **{view.found.outcome}**. Waves are told apart by the motion of all sectors at "
         "one time and by the direction in which they turn; another start may end elsewhere."
     )
     return Plot(f"competing_waves{view.key}", "Competing waves in time", caption, figure)
@@ -125,99 +121,86 @@ def waves_in_time(view: Cycles) -> Plot | None:
 
 def cycle_table(view: Cycles) -> Table | Words:
     """Return the limit cycles, and the modes that have none."""
-    if not view.has("wave_number"):
-        least = 100 * float(np.nanmin(view.floats("linear_damping_ratio")))
-        told = f"No mode that was looked at grows with contacts stuck: the least damping ratio is {number(least)} %."
+    found = view.found
+    if not found.branches:
+        told = f"No mode that was looked at grows with contacts stuck: the least damping ratio is {number(100 * found.least_damping)} %."
         return Words((told,))
-    names = view.names
-    rows = [_row(view, names, c) for c in range(view.cycles)]
     head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]
-    return Table(head, rows, "Limit cycles", items=_without(view, names))
+    lines = [_row(branch, cycle) for branch, cycle in found.cycles]
+    return Table(head, lines, "Limit cycles", items=_without(found))
 
 
-def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
-    def value(name: str) -> float:
-        return float(view.floats(f"cycle_{name}")[c])
-
-    word = view.labels_of("cycle_stability")[c]
-    wave = int(view.integers("cycle_growing_wave")[c])
-    grows = f", wave {wave} grows" if word == "unstable" and wave >= 0 else ""
-    multiplier = f"{number(value('multiplier'), 5)} ± {number(value('multiplier_error'), 2)}"
-    in_time = NONE
-    if view.has("cycle_time_amplitude") and np.isfinite(value("time_amplitude")):
-        off = 100 * (value("time_amplitude") / value("amplitude") - 1.0)
-        told = f"{number(off, 2)} % off"
-        if word == "unstable":  # to be near it after so many periods is no confirmation
-            told += "; unstable, no confirmation"
-        in_time = f"{quantity(value('time_amplitude'), 'm', 5)} ({told})"
-    few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
+def _row(branch: CycleBranch, cycle: Cycle) -> list[str]:
+    multiplier = f"{number(cycle.multiplier, 5)} ± {number(cycle.multiplier_error, 2)}"
+    grown = grows(cycle)
     return [
-        names[int(view.integers("cycle_branch")[c])],
-        quantity(value("amplitude"), "m", 5),
-        number(value("frequency_hz"), 7),
-        f"{int(view.integers('cycle_harmonics')[c])}{few}",
-        f"**{word}**{grows}",
-        multiplier if np.isfinite(value("multiplier")) else NONE,
-        in_time,
+        branch.name,
+        quantity(cycle.amplitude, "m", 5),
+        number(cycle.omega / HZ, 7),
+        f"{cycle.harmonics}{'' if cycle.enough else ' (not enough)'}",
+        f"**{cycle.stability}**{f'{grown} grows' if grown else ''}",
+        multiplier if np.isfinite(cycle.multiplier) else NONE,
+        _in_time(cycle),
     ]
 
 
-def _without(view: Cycles, names: Sequence[str]) -> list[str]:
+def _in_time(cycle: Cycle) -> str:
+    if cycle.time_amplitude is None or not np.isfinite(cycle.time_amplitude):
+        return NONE
+    off = 100 * (cycle.time_amplitude / cycle.amplitude - 1.0)
+    told = f"{number(off, 2)} % off"
+    if cycle.stability == "unstable":  # to be near it after so many periods is no confirmation
+        told += "; unstable, no confirmation"
+    return f"{quantity(cycle.time_amplitude, 'm', 5)} ({told})"
+
+
+def _without(found: LimitCycles) -> list[str]:
     """Say which modes friction cannot bound."""
-    most, lost = view.floats("largest_damping_ratio"), _unbounded(view)
-    if not lost:
+    said = [f"{b.name} (at most {number(100 * b.largest_damping_ratio)} %)" for b in found.branches if b.unbounded]
+    if not said:
         return []
-    said = [f"{names[i]} (at most {number(100 * most[i])} %)" for i in lost]
     return [f"**Friction cannot bound** {joined(said)}: the damping is negative at every amplitude."]
 
 
-def _unbounded(view: Cycles) -> list[int]:
-    """Return the modes that friction cannot bound."""
-    ratio, most = view.floats("mode_damping_ratio"), view.floats("largest_damping_ratio")
-    return [i for i in range(len(view.names)) if ratio[i] < 0 and not most[i] > 0]
-
-
-def _over_amplitude(view: Cycles, name: str, factor: float, at_cycles: FloatArray) -> go.Figure:
+def _over_amplitude(found: LimitCycles, own: Sequence[tuple[FloatArray, Sequence[float]]]) -> go.Figure:
+    """Draw a quantity of each mode over the amplitude, from its values at the motions and at the limit cycles."""
     figure = go.Figure()
-    every = view.values("amplitude", "branch", "point")
+    every = np.concatenate([branch.amplitude for branch in found.branches])
     scale = scale_for(np.array([np.nanmedian(every)]), "m")
-    for i, label in enumerate(view.names):
-        amplitude, own = view.of_branch(i, name, at_cycles)
+    for i, (branch, (motions, at_cycles)) in enumerate(zip(found.branches, own, strict=True)):
+        amplitude, values = _with_cycles(branch, motions, at_cycles)
         figure.add_trace(
             go.Scatter(
                 x=scale.factor * amplitude,
-                y=factor * own,
+                y=values,
                 mode="lines",
-                name=label,
+                name=branch.name,
                 line={"color": colour(i), "width": 2},
-                hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
+                hovertemplate=f"{branch.name}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
             )
         )
     styled(figure, 460)
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
-    output = view.text("output")
-    title = f"amplitude of {output} ({scale.unit})"
+    title = f"amplitude of {found.output} ({scale.unit})"
     figure.update_xaxes(type="log", title_text=title, **ticks)
     figure.update_layout(meta={"factor": scale.factor, "unit": scale.unit})
     return figure
 
 
-def _mark(view: Cycles, figure: go.Figure, heights: FloatArray) -> None:
+def _mark(found: LimitCycles, figure: go.Figure, heights: Sequence[float]) -> None:
     """Mark limit cycles by what their stability is."""
-    if not view.cycles:
-        return
-    amplitude, words = view.floats("cycle_amplitude"), np.array(view.labels_of("cycle_stability"))
     factor, unit = figure.layout.meta["factor"], figure.layout.meta["unit"]
-    which: IntArray = view.integers("cycle_branch")
+    of_branch = [i for i, branch in enumerate(found.branches) for _ in branch.cycles]
+    every = [(cycle, i, height) for (_, cycle), i, height in zip(found.cycles, of_branch, heights, strict=True)]
     for word, symbol in _SYMBOLS.items():
-        own = words == word
-        if not np.any(own):
+        own = [(c, i, height) for c, i, height in every if c.stability == word]
+        if not own:
             continue
-        lines = [colour(int(i)) for i in which[own]]
+        lines = [colour(i) for _, i, _ in own]
         figure.add_trace(
             go.Scatter(
-                x=factor * amplitude[own],
-                y=heights[own],
+                x=[factor * c.amplitude for c, _, _ in own],
+                y=[height for _, _, height in own],
                 mode="markers",
                 name=word,
                 marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
@@ -226,14 +209,17 @@ def _mark(view: Cycles, figure: go.Figure, heights: FloatArray) -> None:
         )
 
 
-def _caption(view: Cycles) -> str:
-    top = view.floats("largest_damping_ratio")
+def _caption(found: LimitCycles) -> str:
     parts = [_READING]
-    if view.cycles:
-        words = view.labels_of("cycle_stability")
+    if found.cycles:
+        words = [cycle.stability for _, cycle in found.cycles]
         counts = [counted(words.count(word), f"{word} limit cycle") for word in _SYMBOLS if word in words]
         parts.append(f"There are {joined(counts)} (marked).")
-    bounded = [f"{name} {number(100 * float(t))} %" for name, t in zip(view.names, top, strict=True) if np.isfinite(t)]
+    bounded = [
+        f"{b.name} {number(100 * b.largest_damping_ratio)} %"
+        for b in found.branches
+        if np.isfinite(b.largest_damping_ratio)
+    ]
     if bounded:
         parts.append(f"Most damping: {joined(bounded)}.")
     return " ".join(parts)
@@ -241,16 +227,15 @@ def _caption(view: Cycles) -> str:
 
 def linear_table(view: Cycles) -> Table | None:
     """Return the damping of all modes that were looked at, contacts stuck."""
-    if not view.has("linear_damping_ratio"):
+    waves, hertz, ratio = view.found.linear_wave, view.found.linear_frequency_hz, view.found.linear_damping_ratio
+    if waves is None or hertz is None or ratio is None:
         return None
-    waves = view.integers("linear_wave")
-    hertz, ratio = (view.values(f"linear_{n}", "linear", "mode") for n in ("frequency_hz", "damping_ratio"))
     head = ["wave", *(f"mode {m + 1}: Hz, damping %" for m in range(hertz.shape[1]))]
-    rows = [
+    lines = [
         ["–" if k < 0 else str(k), *(_small(float(f), float(z)) for f, z in zip(own, damped, strict=True))]
         for k, own, damped in zip(waves, hertz, ratio, strict=True)
     ]
-    return Table(head, rows, "Modes with contacts stuck")
+    return Table(head, lines, "Modes with contacts stuck")
 
 
 def _small(hertz: float, ratio: float) -> str:
@@ -261,11 +246,12 @@ def _small(hertz: float, ratio: float) -> str:
 
 
 def _cards(view: Cycles) -> list[Card]:
-    if not view.has("wave_number"):
+    found = view.found
+    if not found.branches:
         return [Card("0", "modes grow by themselves", "contacts stuck")]
-    words = view.labels_of("cycle_stability") if view.cycles else ()
-    note = f"{words.count('unstable')} unstable, {counted(len(view.names), 'mode')} followed"
-    lost = len(_unbounded(view))
+    words = [cycle.stability for _, cycle in found.cycles]
+    note = f"{words.count('unstable')} unstable, {counted(len(found.branches), 'mode')} followed"
+    lost = sum(branch.unbounded for branch in found.branches)
     if lost:
         note += f"; friction cannot bound {counted(lost, 'mode')}"
     return [Card(str(words.count("stable")), "stable limit cycles", note, lost > 0)]

@@ -1,6 +1,5 @@
 """Solves one mode of one wave: its damping over the amplitude, its limit cycles, and their stability."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -8,10 +7,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.stability.examination import too_long
 from stickslip.analyses.limit_cycle.problem import Question
-from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch
 from stickslip.analyses.limit_cycle.time import compete, settle_cycles
 from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates
-from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.self_excited.curve import AmplitudePoint, damping_over_amplitude, slip_amplitude
@@ -77,60 +75,57 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
     )
     every = sorted([p for p in points if not p.converged], key=lambda p: p.amplitude)
     branch = _branch(wave, problem, slips, [*solutions, *every], cycles)
-    return replace(branch, lost=max(len(crossings(solutions)) - len(cycles), 0))
+    return replace(branch, lost_cycles=max(len(crossings(solutions)) - len(cycles), 0))
 
 
 def _branch(
     wave: int, problem: SelfExcited, slips: float, points: Sequence[AmplitudePoint], cycles: Sequence[LimitCycle]
 ) -> CycleBranch:
-    mode = problem.mode
     known = [p for p in points if p.converged]
     top = max(known, key=lambda p: p.level, default=None)
-    examined = [_examined(problem.with_order(c.order), c) for c in cycles]
-    stable = [e.stability.verdict if isinstance(e, CycleStability) else NOT_EXAMINED for e in examined]
-    reason = [e.stability.reason if isinstance(e, CycleStability) else e for e in examined]
-
-    def of_each(function: object, missing: float) -> FloatArray:
-        told = [function(e) if isinstance(e, CycleStability) else missing for e in examined]  # type: ignore[operator]
-        return np.array([missing if v is None else v for v in told], dtype=float)
-
     return CycleBranch(
-        wave,
-        mode.number,
-        mode.omega,
-        mode.ratio,
-        slips,
-        np.array([p.amplitude for p in points]),
-        np.array([p.omega if p.converged else np.nan for p in points]),
-        np.array([p.level if p.converged else np.nan for p in points]),
-        np.nan if top is None else top.level,
-        np.nan if top is None else top.amplitude,
-        np.array([c.amplitude for c in cycles]),
-        np.array([c.omega for c in cycles]),
-        np.array([c.slope for c in cycles]),
-        np.array([c.order for c in cycles], dtype=np.int64),
-        np.array([c.change for c in cycles]),
-        np.array([c.enough for c in cycles], dtype=np.int64),
-        _motions(problem, cycles),
-        json.dumps(stable),
-        json.dumps(reason),
-        of_each(lambda e: e.stability.multiplier, np.nan),
-        of_each(lambda e: e.stability.multiplier_error, np.nan),
-        of_each(lambda e: abs(e.along - 1.0), np.nan),
-        of_each(lambda e: None if e.wave is None else e.wave.wave, NO_WAVE).astype(np.int64),
-        of_each(lambda e: None if e.wave is None else e.wave.omega, np.nan),
+        wave_number=wave,
+        mode=problem.mode.number,
+        omega=problem.mode.omega,
+        ratio=problem.mode.ratio,
+        slip_amplitude=slips,
+        largest_damping_ratio=np.nan if top is None else top.level,
+        largest_damping_amplitude=np.nan if top is None else top.amplitude,
+        amplitude=np.array([p.amplitude for p in points]),
+        motion_omega=np.array([p.omega if p.converged else np.nan for p in points]),
+        damping_ratio=np.array([p.level if p.converged else np.nan for p in points]),
+        cycles=tuple(_cycle(problem, cycle) for cycle in cycles),
     )
 
 
-def _motions(problem: SelfExcited, cycles: Sequence[LimitCycle]) -> FloatArray:
-    """Return (cycles, most harmonics + 1, n, 2) the motions of all coordinates."""
-    most = max((c.order for c in cycles), default=0)
-    out = np.zeros((len(cycles), most + 1, problem.system.structure.n, 2))
-    for own, cycle in zip(out, cycles, strict=True):
-        linear = problem.with_order(cycle.order).balance.linear
-        full = linear.recover(cycle.omega, cycle.coefficients)
-        own[: len(full), :, 0], own[: len(full), :, 1] = full.real, full.imag
-    return out
+def _cycle(problem: SelfExcited, cycle: LimitCycle) -> Cycle:
+    """Return the record of a limit cycle, its stability examined."""
+    own = problem.with_order(cycle.order)
+    examined = _examined(own, cycle)
+    known = examined if isinstance(examined, CycleStability) else None
+    full = own.balance.linear.recover(cycle.omega, cycle.coefficients)
+    stability = None if known is None else known.stability
+    grows = None if known is None else known.wave
+    return Cycle(
+        amplitude=cycle.amplitude,
+        omega=cycle.omega,
+        slope=cycle.slope,
+        harmonics=cycle.order,
+        change=cycle.change,
+        enough=cycle.enough,
+        stability=NOT_EXAMINED if stability is None else stability.verdict,
+        reason=str(examined) if stability is None else stability.reason,
+        multiplier=_number(None if stability is None else stability.multiplier),
+        multiplier_error=_number(None if stability is None else stability.multiplier_error),
+        along=np.nan if known is None else abs(known.along - 1.0),
+        growing_wave=NO_WAVE if grows is None else grows.wave,
+        growing_omega=np.nan if grows is None else grows.omega,
+        coefficients=np.stack([full.real, full.imag], axis=-1),
+    )
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
 
 
 def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
@@ -145,33 +140,19 @@ def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
 
 
 def _without(wave: int, mode: StuckMode, problem: str) -> CycleBranch:
-    none, no_numbers = np.zeros(0), np.zeros(0, dtype=np.int64)
+    none = np.zeros(0)
     return CycleBranch(
-        wave,
-        mode.number,
-        mode.omega,
-        mode.ratio,
-        np.nan,
-        none,
-        none,
-        none,
-        np.nan,
-        np.nan,
-        none,
-        none,
-        none,
-        no_numbers,
-        none,
-        no_numbers,
-        np.zeros((0, 1, 0, 2)),
-        "[]",
-        "[]",
-        none,
-        none,
-        none,
-        no_numbers,
-        none,
-        problem,
+        wave_number=wave,
+        mode=mode.number,
+        omega=mode.omega,
+        ratio=mode.ratio,
+        slip_amplitude=np.nan,
+        largest_damping_ratio=np.nan,
+        largest_damping_amplitude=np.nan,
+        problem=problem,
+        amplitude=none,
+        motion_omega=none,
+        damping_ratio=none,
     )
 
 
@@ -194,8 +175,5 @@ def _named(question: Question, wave: int, mode: StuckMode) -> str:
 def _told(branch: CycleBranch) -> str:
     if branch.problem:
         return branch.problem
-    each = [
-        f"{millimetres(a, 5)} at {w / HZ:.4f} Hz ({word})"
-        for a, w, word in zip(branch.cycle_amplitude, branch.cycle_omega, json.loads(branch.stable), strict=True)
-    ]
+    each = [f"{millimetres(c.amplitude, 5)} at {c.omega / HZ:.4f} Hz ({c.stability})" for c in branch.cycles]
     return f"limit cycles: {', '.join(each) or 'none'}"

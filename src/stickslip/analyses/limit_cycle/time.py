@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import MOST_IN_TIME
 from stickslip.analyses.limit_cycle.problem import Question
-from stickslip.analyses.limit_cycle.records import CycleBranch
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch
 from stickslip.analyses.vibrating import as_wave, coordinate
 from stickslip.arrays import ComplexArray, IntArray
 from stickslip.contact.interface import Interface
@@ -34,14 +34,13 @@ SHARE = 0.3  # of the attracting cycle of each wave, with which waves begin that
 
 def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
     """Return amplitude (m) and frequency (rad/s) that time integration goes to from beside each attracting cycle; NaN of others."""
-    cycles = len(branch.cycle_amplitude)
-    amplitude, omega = np.full((2, cycles), np.nan)
+    amplitude, omega = np.full((2, len(branch.cycles)), np.nan)
     said = ""
-    for i in range(cycles):
-        if not branch.slope[i] > 0.0:
+    for i, cycle in enumerate(branch.cycles):
+        if not cycle.attracting:
             continue
         try:
-            marched = _from_cycle(question, branch, i)
+            marched = _from_cycle(question, branch, cycle)
         except StickslipError as error:
             said = str(error)
             continue
@@ -49,14 +48,14 @@ def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
             amplitude[i], omega[i] = marched.amplitude[0], marched.frequency[0]
         LOG.info(
             f"time integration: {millimetres(amplitude[i], 5)} at {omega[i] / HZ:.4f} Hz where the balance has "
-            f"{millimetres(branch.cycle_amplitude[i], 5)} at {branch.cycle_omega[i] / HZ:.4f} Hz{_unconfirmed(branch, i, marched)}"
+            f"{millimetres(cycle.amplitude, 5)} at {cycle.omega / HZ:.4f} Hz{_unconfirmed(cycle, marched)}"
         )
     return {"amplitude": amplitude, "omega": omega, "said": said}
 
 
-def _unconfirmed(branch: CycleBranch, i: int, marched: Marched) -> str:
+def _unconfirmed(cycle: Cycle, marched: Marched) -> str:
     """Say that to stay near an unstable cycle for so many periods does not confirm it."""
-    if json.loads(branch.stable)[i] != "unstable":
+    if cycle.stability != "unstable":
         return ""
     return (
         f"; that confirms nothing: the cycle is unstable, and {len(marched.first)} periods may be too few to leave it"
@@ -65,7 +64,7 @@ def _unconfirmed(branch: CycleBranch, i: int, marched: Marched) -> str:
 
 def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
     """Return what becomes of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
-    there = [b for b in branches if b.wave_number != NO_WAVE and (b.ratio < 0.0 or _attracts(b))]
+    there = [b for b in branches if b.wave_number != NO_WAVE and (b.ratio < 0.0 or b.attracting)]
     own = {"waves": np.array([b.wave_number for b in there], dtype=np.int64)}
     nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}
     if len({b.wave_number for b in there}) < 2:
@@ -93,25 +92,21 @@ def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, An
     }
 
 
-def _attracts(branch: CycleBranch) -> bool:
-    return bool(np.any(branch.slope > 0.0))
-
-
 def _beginnings(question: Question, branches: Sequence[CycleBranch]) -> list[tuple[ComplexArray, float]]:
     """Return amplitudes (n,) of all sectors and frequencies, rad/s, with which waves begin: a share of their attracting cycle.
 
     Where none was found the mode itself begins, with the amplitude at which it slips; where it never does, with the least of the others.
     """
-    slips = [b.slips for b in branches if np.isfinite(b.slips)]
+    slips = [b.slip_amplitude for b in branches if np.isfinite(b.slip_amplitude)]
     found = []
     for branch in branches:
-        if _attracts(branch):
-            i = int(np.flatnonzero(branch.slope > 0.0)[0])
-            found.append((SHARE * _motion(question, branch, i)[1], float(branch.cycle_omega[i])))
+        if branch.attracting:
+            cycle = branch.attracting[0]
+            found.append((SHARE * _motion(question, branch, cycle)[1], cycle.omega))
             continue
         if not slips:
             raise StickslipError("no wave has an amplitude from which on it slips")
-        amplitude = branch.slips if np.isfinite(branch.slips) else min(slips)
+        amplitude = branch.slip_amplitude if np.isfinite(branch.slip_amplitude) else min(slips)
         system = as_wave(question.model.system, branch.wave_number)
         mode = next(m for m in question.modes(branch.wave_number) if m.number == branch.mode)
         shape = amplitude / abs(mode.shape[coordinate(system)]) * mode.shape
@@ -143,10 +138,10 @@ def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, 
     return whole.structure, whole.contacts, HarmonicLoad(static), places
 
 
-def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
+def _from_cycle(question: Question, branch: CycleBranch, cycle: Cycle) -> Marched:
     system = as_wave(question.model.system, branch.wave_number)
     structure, contacts, load, outputs = in_time(system, question)
-    motion, omega = _motion(question, branch, i), float(branch.cycle_omega[i])
+    motion, omega = _motion(question, branch, cycle), cycle.omega
     start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
     start = _kicked(start, [(motion[1], omega)])
     return march_periods(
@@ -154,9 +149,9 @@ def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
     )
 
 
-def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:
+def _motion(question: Question, branch: CycleBranch, cycle: Cycle) -> ComplexArray:
     """Return the (H+1, n) amplitudes of a cycle; of a wheel those of all sectors."""
-    full = branch.coefficients[i, ..., 0] + 1j * branch.coefficients[i, ..., 1]
+    full = cycle.coefficients[..., 0] + 1j * cycle.coefficients[..., 1]
     if branch.wave_number == NO_WAVE:
         return full
     return whole_wheel(as_wave(question.model.system, branch.wave_number)).spread(full)

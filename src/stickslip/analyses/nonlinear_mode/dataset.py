@@ -7,9 +7,10 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import Variables, described, each, of_cases, rows
+from stickslip.analyses.columns import described as described_columns
 from stickslip.analyses.nonlinear_mode.records import ModeBranch, branches_of
 from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts
-from stickslip.analyses.vibrating import KEPT, kept_motions
+from stickslip.analyses.vibrating import KeptMotions, kept_motions
 from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import NO_WAVE, wave
 from stickslip.study.analysis import Solved
@@ -50,7 +51,7 @@ ABOUT = {
         "1",
         "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone",
     ),
-    **KEPT,
+    **{name: (" ".join(dims), unit, about) for name, dims, unit, about in described_columns(KeptMotions)},
     "retained_displacement": (
         "branch point harmonic coordinate part",
         "m",

@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.limit_cycle.verdicts import branch_name
 from stickslip.response.nonlinear_modes.backbone import MEETS, OVER
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
@@ -22,6 +21,12 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     sound = [i for i, own in enumerate(each) if all(v.level == "trusted" for v in own)]
     found = [v for own in each for v in own]
     return [*found, Verdict("trusted", label, None, _followed(case, sound))] if sound else found
+
+
+def branch_name(case: Mapping[str, xr.Variable] | xr.Dataset, i: int) -> str:
+    """Return the name of a mode of a wave."""
+    wave, mode = (int(np.asarray(case[n].values)[i]) for n in ("wave_number", "mode"))
+    return f"mode {mode}" if wave < 0 else f"wave {wave}, mode {mode}"
 
 
 def _followed(case: Mapping[str, xr.Variable], sound: Sequence[int]) -> str:

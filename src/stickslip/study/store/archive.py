@@ -3,10 +3,10 @@
 import io
 import zipfile
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache, lru_cache
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -71,19 +71,53 @@ _hints = cache(get_type_hints)
 
 
 def encode_record(record: Any) -> bytes:
-    """Return a dataclass of arrays, numbers, texts, enumerations and None as a NumPy archive."""
-    found = {f.name: getattr(record, f.name) for f in fields(record) if f.init}
-    return encode({k: v.name if isinstance(v, Enum) else v for k, v in found.items()})
+    """Return a dataclass of arrays, numbers, texts, enumerations, None, and tuples of such dataclasses as a NumPy archive."""
+    return encode(_flat(record))
+
+
+def _flat(record: Any) -> dict[str, Any]:
+    """Return the fields of a record by name; those of the records that it holds as ``field/index/name`` beside their number."""
+    found: dict[str, Any] = {}
+    for own in (f for f in fields(record) if f.init):
+        value = getattr(record, own.name)
+        if _row_type(type(record), own.name) is None:
+            found[own.name] = value.name if isinstance(value, Enum) else value
+            continue
+        found[own.name] = len(value)
+        for i, row in enumerate(value):
+            found |= {f"{own.name}/{i}/{name}": entry for name, entry in _flat(row).items()}
+    return found
+
+
+def _row_type(kind: type[Any], name: str) -> type[Any] | None:
+    """Return the class of the records that a field holds, ``tuple[Class, ...]``; None where it holds none."""
+    hint = _hints(kind)[name]  # type: ignore[arg-type]  # a class has a hash
+    inner = get_args(hint)[0] if get_origin(hint) is tuple else None
+    return inner if is_dataclass(inner) and isinstance(inner, type) else None
 
 
 def decode_record(payload: bytes, kind: type[Any]) -> Any:
     """Return the dataclass of type `kind` that `encode_record` wrote."""
-    values, hints = decode(payload), _hints(kind)  # type: ignore[arg-type]  # a class has a hash
+    return _record(decode(payload), kind)
+
+
+def _record(values: dict[str, Any], kind: type[Any]) -> Any:
+    hints = _hints(kind)  # type: ignore[arg-type]  # a class has a hash
+    own: dict[str, Any] = {}
+    inner: dict[str, dict[int, dict[str, Any]]] = {}
     for name, value in values.items():
-        if name not in hints:
-            raise ValueError(f"a record has no {name!r}")
-        hint = hints[name]
-        if isinstance(hint, type) and issubclass(hint, Enum):
-            values[name] = hint[value]
-    missing = {f.name: None for f in fields(kind) if f.init and f.name not in values}
-    return kind(**values, **missing)
+        field, _, rest = name.partition("/")
+        if field not in hints:
+            raise ValueError(f"a record has no {field!r}")
+        if rest:
+            index, _, entry = rest.partition("/")
+            inner.setdefault(field, {}).setdefault(int(index), {})[entry] = value
+            continue
+        hint = hints[field]
+        own[field] = hint[value] if isinstance(hint, type) and issubclass(hint, Enum) else value
+    for field, count in own.items():
+        row = _row_type(kind, field)
+        if row is not None:
+            own[field] = tuple(_record(inner[field][i], row) for i in range(count))
+    missing = {f.name: None for f in fields(kind) if f.init and f.name not in own}
+    return kind(**own, **missing)

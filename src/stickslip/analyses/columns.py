@@ -1,0 +1,154 @@
+"""Variables of a result from the records of a case, and the records from the variables (`stickslip.column` describes the fields)."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+import xarray as xr
+
+from stickslip.column import Column, Rows, columns_of, rows_of
+from stickslip.study.store.netcdf import variable
+
+MISSING: Mapping[type, Any] = {float: np.nan, int: -1, str: "", bool: False}
+FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # where the records of a variable differ in length
+
+
+def variables(record: Any) -> dict[str, xr.Variable]:
+    """Return the variables of the record of a case; a field that is None, or empty, has none."""
+    kind = type(record)
+    found = {c.name or name: _stored(c, (), getattr(record, name)) for name, c in columns_of(kind).items()}
+    for name, inner in rows_of(kind).items():
+        found |= _of_rows(_row_type(kind, name), inner, getattr(record, name))
+    return {name: v for name, v in found.items() if v is not None and v.size}
+
+
+def record_of(kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable]) -> Any:
+    """Return the record of a case of a result: the inverse of `variables`, but for what fills up arrays of different lengths.
+
+    Parameters
+    ----------
+    kind
+        Class of the record.
+    case
+        The variables of the case, or its dataset, in which single numbers and texts may be attributes. What neither has is NaN, −1, an
+        empty text, or the default of its field.
+    """
+    values = {name: _value(c.name or name, c, kind, name, case) for name, c in columns_of(kind).items()}
+    for name, inner in rows_of(kind).items():
+        values[name] = tuple(_rows_read(_row_type(kind, name), inner, case))
+    return kind(**{name: value for name, value in values.items() if value is not None})
+
+
+def described(kind: type[Any], dim: str = "", prefix: str = "") -> Iterator[tuple[str, tuple[str, ...], str, str]]:
+    """Yield name, dimensions, unit and meaning of all variables of a class of records, for the documentation."""
+    own = (dim,) if dim else ()
+    for name, c in columns_of(kind).items():
+        yield prefix + (c.name or name), (*own, *c.along), c.unit, c.meaning
+    for name, inner in rows_of(kind).items():
+        if inner.owner:
+            yield inner.prefix + dim, (inner.dim,), "1", inner.owner
+        yield from described(_row_type(kind, name), inner.dim, inner.prefix)
+
+
+def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.Variable | None]:
+    found: dict[str, xr.Variable | None] = {}
+    if not records:
+        return found
+    for name, c in columns_of(kind).items():
+        each = [getattr(one, name) for one in records]
+        told = None if any(value is None for value in each) else each
+        found[of.prefix + (c.name or name)] = _stored(c, (of.dim,), told)
+    for name, inner in rows_of(kind).items():
+        own = [getattr(one, name) for one in records]
+        owner = np.repeat(np.arange(len(own)), [len(each) for each in own])
+        found[inner.prefix + of.dim] = variable(inner.dim, owner, "1", inner.owner)
+        found |= _of_rows(_row_type(kind, name), inner, [row for each in own for row in each])
+    return found
+
+
+def _stored(c: Column, own: tuple[str, ...], value: Any) -> xr.Variable | None:
+    if value is None:
+        return None
+    array = _filled(value) if own and c.along else np.asarray(value)
+    if array.dtype == bool:
+        array = array.astype(np.int64)
+    return variable(" ".join((*own, *c.along)), array if c.per == 1.0 else array / c.per, c.unit, c.meaning)
+
+
+def _filled(each: Sequence[Any]) -> Any:
+    """Return arrays of different lengths as rows of one array."""
+    arrays = [np.asarray(one) for one in each]
+    shape = np.max([one.shape for one in arrays], axis=0)
+    kind = np.result_type(*arrays)
+    out = np.full((len(arrays), *shape), FILLED[kind.kind], dtype=kind)
+    for row, own in zip(out, arrays, strict=True):
+        row[tuple(map(slice, own.shape))] = own
+    return out
+
+
+def _rows_read(kind: type[Any], of: Rows, case: xr.Dataset | Mapping[str, xr.Variable]) -> Iterator[Any]:
+    columns = columns_of(kind)
+    names = {name: of.prefix + (c.name or name) for name, c in columns.items()}
+    count = next((len(case[name]) for name in names.values() if name in case), 0)
+    within = {name: _owned(kind, name, inner, of, case) for name, inner in rows_of(kind).items()}
+    values = {name: _read(case[names[name]], c) if names[name] in case else None for name, c in columns.items()}
+    for i in range(count):
+        own = {n: _missing(kind, n) if v is None else _as(kind, n, v[i]) for n, v in values.items()}
+        own |= {name: tuple(row for at, row in found if at == i) for name, found in within.items()}
+        yield kind(**{name: value for name, value in own.items() if value is not None})
+
+
+def _owned(
+    kind: type[Any], name: str, inner: Rows, of: Rows, case: xr.Dataset | Mapping[str, xr.Variable]
+) -> list[tuple[int, Any]]:
+    """Return the rows within rows, each with the index of the row that holds it."""
+    found = list(_rows_read(_row_type(kind, name), inner, case))
+    return list(zip(np.asarray(case[inner.prefix + of.dim].values).tolist(), found, strict=True)) if found else []
+
+
+def _value(stored: str, c: Column, kind: type[Any], name: str, case: xr.Dataset | Mapping[str, xr.Variable]) -> Any:
+    if stored in case:
+        return _as(kind, name, _read(case[stored], c))
+    told = case.attrs if isinstance(case, xr.Dataset) else {}
+    if stored in told:
+        value = np.asarray(told[stored])
+        return _as(kind, name, value if c.per == 1.0 else c.per * value)
+    return _missing(kind, name)
+
+
+def _read(found: xr.Variable | xr.DataArray, c: Column) -> Any:
+    return found.values if c.per == 1.0 else c.per * found.values
+
+
+def _as(kind: type[Any], name: str, value: Any) -> Any:
+    """Return a stored value as what the field says; an empty text or array is the default of a field that may be None."""
+    own = _plain_type(kind, name)
+    told = own(value) if own in MISSING else np.asarray(value)
+    empty = not told if isinstance(told, str) else np.size(told) == 0
+    return None if empty and kind.__dataclass_fields__[name].default is None else told
+
+
+def _missing(kind: type[Any], name: str) -> Any:
+    """Return what stands for a value that a result does not hold; None: the default of the field."""
+    if kind.__dataclass_fields__[name].default is None:
+        return None
+    return MISSING.get(_plain_type(kind, name), np.zeros(0))
+
+
+def _plain_type(kind: type[Any], name: str) -> Any:
+    hint = _hints(kind)[name]
+    return next(a for a in get_args(hint) if a is not type(None)) if get_origin(hint) is UnionType else hint
+
+
+def _row_type(kind: type[Any], name: str) -> type[Any]:
+    own: type[Any] = get_args(_hints(kind)[name])[0]
+    return own
+
+
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    return _cached_hints(kind)  # type: ignore[arg-type]  # a class has a hash
+
+
+_cached_hints = cache(get_type_hints)

@@ -1,0 +1,75 @@
+"""What a field of a record says of itself: unit, meaning, and the dimensions under which a result stores it.
+
+A record is a dataclass that a solver yields or an analysis answers with. `stickslip.analyses.columns` makes the variables of a result
+from records, and records from the variables.
+"""
+
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Column:
+    """How a field is stored.
+
+    Parameters
+    ----------
+    unit
+        Of the stored variable, such as ``Hz``.
+    meaning
+        Its description in the result and in the documentation.
+    name
+        Of the variable behind the prefix of its rows; empty: the name of the field.
+    per
+        Value of the unit in the unit of the field: 2π for a field in rad/s that is stored in Hz.
+    along
+        Own dimensions of the field, behind that of its rows.
+    """
+
+    unit: str
+    meaning: str
+    name: str = ""
+    per: float = 1.0
+    along: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How a field that holds a tuple of records is stored: one behind the other along a dimension.
+
+    Parameters
+    ----------
+    dim
+        The dimension.
+    prefix
+        Of the names of the variables.
+    owner
+        Meaning of the variable ``prefix + dimension of the owner``, the index of the record that holds a row; empty where the rows
+        belong to the case itself.
+    """
+
+    dim: str
+    prefix: str = ""
+    owner: str = ""
+
+
+def column(
+    unit: str, meaning: str, name: str = "", *, per: float = 1.0, along: str = "", default: Any = MISSING
+) -> Any:
+    """Return a field that a result stores as a variable; see `Column`. Dimensions are separated by spaces."""
+    return field(default=default, metadata={"column": Column(unit, meaning, name, per, tuple(along.split()))})
+
+
+def rows(dim: str, prefix: str = "", owner: str = "") -> Any:
+    """Return a field that holds a tuple of records; see `Rows`."""
+    return field(default=(), metadata={"rows": Rows(dim, prefix, owner)})
+
+
+def columns_of(kind: type[Any]) -> dict[str, Column]:
+    """Return the columns of a class of records by the names of their fields."""
+    return {f.name: f.metadata["column"] for f in fields(kind) if "column" in f.metadata}
+
+
+def rows_of(kind: type[Any]) -> dict[str, Rows]:
+    """Return the rows of a class of records by the names of their fields."""
+    return {f.name: f.metadata["rows"] for f in fields(kind) if "rows" in f.metadata}
