@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 import stickslip as ss
 from stickslip.analyses.forced_response.verdicts.curve import Curve
-from stickslip.analyses.forced_response.verdicts.physics_rules import contact_stiffness, told_of_model
+from stickslip.analyses.forced_response.verdicts.rules import contact_stiffness, told_of_model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins

@@ -24,8 +24,7 @@ from stickslip.analyses.forced_response.physics.known import (
     nothing_pressed,
     off_engine_order,
 )
-from stickslip.analyses.forced_response.problem import Question, question_of
-from stickslip.analyses.forced_response.sweeps import sweep_of
+from stickslip.analyses.forced_response.problem import Question, question_of, sweep_of
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import twice_the_harmonics

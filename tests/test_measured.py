@@ -10,9 +10,9 @@ from synthetic_result import synthetic_result
 from typer.testing import CliRunner
 
 import stickslip as ss
-from stickslip.analyses.forced_response.measured_variables import with_measured
 from stickslip.analyses.forced_response.page.curves import optimisation
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.study.file.study import read_file

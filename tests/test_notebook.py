@@ -4,8 +4,7 @@ import logging
 
 import pytest
 
-from stickslip.api.notebook import NotebookScreen, in_notebook
-from stickslip.api.screen import on_screen
+from stickslip.api.screen import NotebookScreen, in_notebook, on_screen
 from stickslip.study.store.progress import LOG, advance, at_work, tell
 
 

@@ -19,7 +19,7 @@ import xarray as xr
 from stickslip.analyses.all_motions.dataset import dataset as of_motions
 from stickslip.analyses.all_motions.dataset import noted
 from stickslip.analyses.columns import described
-from stickslip.analyses.forced_response.measured_variables import with_measured
+from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis

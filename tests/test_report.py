@@ -15,12 +15,11 @@ from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
 from stickslip.analyses.forced_response.page.chapter import stability
-from stickslip.analyses.forced_response.page.choice import choice, flagged_ranges
 from stickslip.analyses.forced_response.page.contacts.bodies import body_motion, rigid_bodies
 from stickslip.analyses.forced_response.page.contacts.contact import hysteresis_t
 from stickslip.analyses.forced_response.page.curves import frequency_response, optimisation
 from stickslip.analyses.forced_response.page.errors import errors
-from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
+from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics
 from stickslip.analyses.forced_response.page.head import cards
 from stickslip.analyses.forced_response.page.not_periodic import statistics_in_time
 from stickslip.analyses.forced_response.page.response import NEEDED, Response

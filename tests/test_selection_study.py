@@ -13,11 +13,10 @@ import xarray as xr
 from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.analyses.forced_response import analysis
-from stickslip.analyses.forced_response.page.choice import choice
 from stickslip.analyses.forced_response.page.errors import errors
-from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
+from stickslip.analyses.forced_response.page.harmonics import choice, kept_harmonics
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.physics.retention import NO_SHIFT
+from stickslip.analyses.forced_response.physics.model_change import NO_SHIFT
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet

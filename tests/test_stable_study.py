@@ -17,7 +17,6 @@ from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import ALONE, Question
 from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.stability import examination, stable, with_stability
-from stickslip.analyses.forced_response.stability.comparison import Check
 from stickslip.analyses.forced_response.stability.examining import (
     CARRIED,
     examined_points,
@@ -27,6 +26,7 @@ from stickslip.analyses.forced_response.stability.examining import (
 )
 from stickslip.analyses.forced_response.stability.in_time import (
     MOST_TOLD,
+    Check,
     check_in_time,
     seconds_in_time,
     shows_after,
@@ -38,7 +38,7 @@ from stickslip.analyses.forced_response.stability.stable import (
     to_integrate,
     with_motion,
 )
-from stickslip.analyses.forced_response.verdicts.stable_rules import fewer
+from stickslip.analyses.forced_response.verdicts.rules import fewer
 from stickslip.cli import app
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error

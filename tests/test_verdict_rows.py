@@ -9,8 +9,10 @@ import xarray as xr
 from verdict_rows import INF, NAN, above, case_of, check
 
 from stickslip.analyses.all_motions import verdicts as motions
-from stickslip.analyses.forced_response.verdicts.jumps import jumps
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.forced_response.verdicts.curve import jumps
 from stickslip.analyses.limit_cycle import verdicts as cycles
+from stickslip.analyses.limit_cycle.records import LimitCycles
 from stickslip.analyses.modal_synthesis import verdicts as synthesis
 from stickslip.analyses.modal_synthesis.percents import percent
 from stickslip.analyses.modal_synthesis.solve import judged
@@ -190,7 +192,7 @@ CYCLE: dict[str, Any] = {
 CYCLE_ROWS: list[Row] = [
     ({"linear_damping_ratio": None}, []),
     (
-        {"wave_number": None, "linear_damping_ratio": [[1e-3, 2e-3]]},
+        {**dict.fromkeys(CYCLE), "linear_frequency_hz": [[100.0, 300.0]], "linear_damping_ratio": [[1e-3, 2e-3]]},
         [("note", "the least damping ratio is 0.1 %", "no limit cycle")],
     ),
     ({}, []),
@@ -451,6 +453,9 @@ PEAK_ROWS: list[tuple[dict[str, Any], dict[str, Any], list[tuple[str, ...]]]] = 
 ]
 
 
+RECORDS: dict[Any, type[Any]] = {cycles: LimitCycles}  # what the rules of an analysis are given
+
+
 @pytest.mark.parametrize(
     ("words", "base", "row"),
     [
@@ -468,7 +473,8 @@ PEAK_ROWS: list[tuple[dict[str, Any], dict[str, Any], list[tuple[str, ...]]]] = 
 )
 def test_a_case_is_told_as_it_is(words: Any, base: dict[str, Any], row: Row) -> None:
     changes, expected = row
-    check(words.case_verdicts("", case_of(base, changes)), expected)
+    case = case_of(base, changes)
+    check(words.case_verdicts("", record_of(RECORDS[words], case) if words in RECORDS else case), expected)
 
 
 @pytest.mark.parametrize("row", PEAK_ROWS)

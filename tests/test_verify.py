@@ -12,8 +12,7 @@ from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.stability import in_time, with_stability
-from stickslip.analyses.forced_response.stability.comparison import STEPS, Check
-from stickslip.analyses.forced_response.stability.in_time import check_in_time, chosen, refined
+from stickslip.analyses.forced_response.stability.in_time import STEPS, Check, check_in_time, chosen, refined
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult

@@ -12,7 +12,7 @@ from cyclic_models import unlike_wedge
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
-from stickslip.analyses.waves.records.numbers import Wheel
+from stickslip.analyses.waves.records.results import Wheel
 from stickslip.analyses.waves.solve import Question, solve_wave
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError

@@ -8,9 +8,8 @@ import pytest
 from synthetic_result import synthetic_result
 
 import stickslip as ss
-from stickslip.analyses.forced_response.page.curves import optimisation
+from stickslip.analyses.forced_response.page.curves import optimisation, where_friction_works
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.page.working import where_friction_works
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import not_periodic
 from stickslip.analyses.forced_response.verdicts.working_range import (
@@ -18,13 +17,14 @@ from stickslip.analyses.forced_response.verdicts.working_range import (
     ContactsAtPeak,
     CurvePeak,
     contacts_at_peak,
+    range_lines,
+    range_sentences,
     regimes_of,
     sticks_at,
     with_regimes,
     working_range,
     working_ranges,
 )
-from stickslip.analyses.forced_response.verdicts.working_words import range_lines, range_sentences
 
 MASS, SPRING, DASHPOT, STIFFNESS, LIMIT = 1.0, 4e4, 4.0, 2e4, 2.0  # kg, N/m, N s/m, N/m, N
 KEY = "load.shaker.force_n"

@@ -9,8 +9,17 @@ from typing import Annotated, Literal
 import typer
 
 from stickslip import __version__
-from stickslip.api.output import TRACEBACK, output_that_may_fail, unforeseen
-from stickslip.api.printed import console, say, say_answers, say_columns, say_lines, say_table
+from stickslip.api.printed import (
+    TRACEBACK,
+    console,
+    output_that_may_fail,
+    say,
+    say_answers,
+    say_columns,
+    say_lines,
+    say_table,
+    unforeseen,
+)
 from stickslip.api.reading import read
 from stickslip.api.screen import Screen, on_screen
 from stickslip.errors import InputError, StickslipError, input_error

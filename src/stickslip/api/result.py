@@ -13,9 +13,8 @@ import xarray as xr
 
 from stickslip.analyses.page import plots, write_report
 from stickslip.api.export import Format, Wanted, export_result
-from stickslip.api.frame_of import dataframe
 from stickslip.api.screen import by_default
-from stickslip.api.table import Table
+from stickslip.api.table import Table, dataframe
 from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
 from stickslip.report.result import RESULT, open_result

@@ -1,4 +1,4 @@
-"""A small table for Python and notebooks."""
+"""Tables for Python and notebooks: a small one that prints itself, and a dataset as a pandas DataFrame."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
+import xarray as xr
+
+from stickslip.errors import did_you_mean, input_error
+from stickslip.study.varied import varied_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,3 +61,60 @@ def _text(value: Any) -> str:
     if isinstance(value, float | np.floating):
         return f"{value:.6g}" if np.isfinite(value) else "–"
     return str(value)
+
+
+# what the rows of a table are of, the first that an analysis has, that with most dimensions
+_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")
+
+
+def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
+    """Return a variable and all that belongs to its entries, a row an entry; entries that are not there are left out, and verdicts and states are words.
+
+    Parameters
+    ----------
+    data
+        Of one analysis.
+    name
+        Of the analysis, for messages.
+    of
+        The variable; empty for the chief one.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable.
+    """
+    names = [str(v) for v in data.data_vars]
+    if of and of not in names:
+        raise input_error(f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names))
+    chief = of or next((v for v in _CHIEF if v in names), names[0] if names else "")
+    if not chief:
+        raise input_error(f"to_dataframe({name!r})", "holds no variables", "Look at result.data.")
+    dims = set(data[chief].dims)
+    at_case = data["point_case"].values if "point_case" in data and "point" in dims else None
+    per_case = {"case"} if dims != {"case"} else set()  # facts of a case stand in the dataset
+    kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
+    own = data[[chief, *(v for v in kept if v != chief)]]
+    frame = own.to_dataframe()
+    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may be called as its dimension
+    frame = frame.reset_index(places).reset_index(drop=True)
+    if frame[chief].dtype.kind == "f":
+        there = np.isfinite(frame[chief])
+        if "status" in own and "frequency_hz" in own:  # a point without a solution has its frequency
+            there |= np.isfinite(frame["frequency_hz"])
+        frame = frame[there].reset_index(drop=True)
+    case = frame["case"].to_numpy() if "case" in dims else None
+    if at_case is not None:
+        case = at_case[frame["point"].to_numpy()]
+    if case is not None and "vary" in data.coords:
+        keys, values = varied_values(data)
+        for k, key in reversed(list(enumerate(keys))):
+            frame.insert(0, key, values[case, k])
+    for v in own.data_vars:  # numbers that stand for words
+        told = own[v].attrs
+        if "flag_meanings" in told:
+            words = dict(zip(np.ravel(told["flag_values"]).tolist(), str(told["flag_meanings"]).split(), strict=True))
+            frame[str(v)] = [words.get(x, x) for x in frame[str(v)].tolist()]
+    frame = frame.infer_objects()
+    frame.attrs["units"] = {str(v): str(own[v].attrs["units"]) for v in own if "units" in own[v].attrs}
+    return frame

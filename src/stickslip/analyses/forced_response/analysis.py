@@ -7,9 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.estimate import estimate
-from stickslip.analyses.forced_response.measured_variables import with_measured
 from stickslip.analyses.forced_response.more_harmonics import check_harmonics
-from stickslip.analyses.forced_response.physics.kinematics import motion_at_peak
 from stickslip.analyses.forced_response.physics.known import (
     doubts_of_model,
     inside,
@@ -23,11 +21,11 @@ from stickslip.analyses.forced_response.physics.limits import (
     PHYSICS,
     beforehand,
     driven_line,
+    motion_at_peak,
     of_physics,
     physics_of,
 )
-from stickslip.analyses.forced_response.physics.model_change import model_changes, stiffness_changes
-from stickslip.analyses.forced_response.physics.retention import peak_shift
+from stickslip.analyses.forced_response.physics.model_change import model_changes, peak_shift, stiffness_changes
 from stickslip.analyses.forced_response.problem import (
     HARMONICS,
     IN_TIME,
@@ -37,7 +35,7 @@ from stickslip.analyses.forced_response.problem import (
     with_comparisons,
 )
 from stickslip.analyses.forced_response.records.blades import of_blades
-from stickslip.analyses.forced_response.records.dataset import put_together
+from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
 from stickslip.analyses.forced_response.records.points import Response, lost_point
 from stickslip.analyses.forced_response.records.pressures import pressure_lines
 from stickslip.analyses.forced_response.records.values import (
@@ -54,10 +52,9 @@ from stickslip.analyses.forced_response.stability.bifurcating import (
     located,
     of_bifurcations,
 )
-from stickslip.analyses.forced_response.stability.comparison import Check
 from stickslip.analyses.forced_response.stability.elsewhere import motions_elsewhere
 from stickslip.analyses.forced_response.stability.examining import neighbours_of
-from stickslip.analyses.forced_response.stability.in_time import FLOPS, chosen
+from stickslip.analyses.forced_response.stability.in_time import FLOPS, Check, chosen
 from stickslip.analyses.forced_response.stability.not_periodic import (
     in_time_instead,
     of_answers,

@@ -6,7 +6,7 @@ import xarray as xr
 from stickslip.analyses.forced_response.records.bounds import BOUND
 from stickslip.analyses.forced_response.stability.stable_words import all_lines, said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
-from stickslip.analyses.forced_response.verdicts.working_words import TITLE, range_lines
+from stickslip.analyses.forced_response.verdicts.working_range import TITLE, range_lines
 from stickslip.harmonic.harmonic_set import named
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import LEVELS, said

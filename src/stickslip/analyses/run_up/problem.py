@@ -9,8 +9,7 @@ import numpy as np
 
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
-from stickslip.analyses.forced_response.problem import peak_first
-from stickslip.analyses.forced_response.sweeps import measured
+from stickslip.analyses.forced_response.problem import measured, peak_first
 from stickslip.analyses.run_up.sweeps import sweep_along
 from stickslip.analyses.run_up.table import RunUpTable
 from stickslip.arrays import FloatArray

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from stickslip.analyses.forced_response.sweeps import sweep_through
+from stickslip.analyses.forced_response.problem import sweep_through
 from stickslip.response.forced.response import Sweep
 
 

@@ -8,10 +8,8 @@ import numpy as np
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
 from stickslip.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
 from stickslip.analyses.waves.records.dataset import Variables, frequencies
-from stickslip.analyses.waves.records.left_out import in_still_fluid
-from stickslip.analyses.waves.records.numbers import Wheel
-from stickslip.analyses.waves.records.results import WaveBranches
-from stickslip.analyses.waves.solve import Question, follow_wave
+from stickslip.analyses.waves.records.results import WaveBranches, Wheel
+from stickslip.analyses.waves.solve import Question, follow_wave, in_still_fluid
 from stickslip.analyses.waves.tables import CampbellTable
 from stickslip.analyses.waves.texts import campbell_tables
 from stickslip.assembly.model import Model

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyses.waves.analysis import wave_analysis
-from stickslip.analyses.waves.in_flow import wave_in_flow
 from stickslip.analyses.waves.records.dataset import Variables
-from stickslip.analyses.waves.records.numbers import Wheel, label
-from stickslip.analyses.waves.records.results import WaveFlutter
-from stickslip.analyses.waves.solve import Question, each_wave
+from stickslip.analyses.waves.records.results import WaveFlutter, Wheel, label
+from stickslip.analyses.waves.solve import Question, each_wave, wave_in_flow
 from stickslip.analyses.waves.tables import FlutterTable
 from stickslip.analyses.waves.texts import flutter_tables
 from stickslip.arrays import ComplexArray, FloatArray

@@ -10,8 +10,7 @@ from stickslip.analyses.waves.analysis import counted, wave_analysis
 from stickslip.analyses.waves.of_wheel import NOTE, variables
 from stickslip.analyses.waves.of_wheel import solved as solved_wheel
 from stickslip.analyses.waves.records.dataset import Variables, frequencies, growth
-from stickslip.analyses.waves.records.numbers import Wheel
-from stickslip.analyses.waves.records.results import WaveModes
+from stickslip.analyses.waves.records.results import WaveModes, Wheel
 from stickslip.analyses.waves.reference import Reference, read_reference
 from stickslip.analyses.waves.solve import Question, each_wave, solve_wave
 from stickslip.analyses.waves.stages import (

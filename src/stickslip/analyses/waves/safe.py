@@ -7,10 +7,8 @@ import numpy as np
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
 from stickslip.analyses.waves.doubts import safe_doubts
 from stickslip.analyses.waves.records.dataset import Variables, frequencies, growth
-from stickslip.analyses.waves.records.left_out import in_still_fluid
-from stickslip.analyses.waves.records.numbers import Wheel
-from stickslip.analyses.waves.records.results import WaveModes
-from stickslip.analyses.waves.solve import Question, solve_wave
+from stickslip.analyses.waves.records.results import WaveModes, Wheel
+from stickslip.analyses.waves.solve import Question, in_still_fluid, solve_wave
 from stickslip.analyses.waves.tables import SafeTable
 from stickslip.analyses.waves.texts import safe_tables
 from stickslip.arrays import FloatArray

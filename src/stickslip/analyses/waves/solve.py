@@ -1,4 +1,4 @@
-"""The solution for one travelling wave: its modes at a speed, or its branches over speeds."""
+"""The solution for one travelling wave: its modes at a speed, its branches over speeds, its flutter."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -10,25 +10,74 @@ from typing import TypeVar
 import numpy as np
 import scipy
 
-from stickslip.analyses.waves.in_flow import wave_in_flow
 from stickslip.analyses.waves.records.about import ABOUT, about, skin_note
-from stickslip.analyses.waves.records.numbers import Wheel
-from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes
+from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes, Wheel
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.build import holding_points
+from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.fluid.aero_forces import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.parts.reduced import stiffening
+from stickslip.assembly.sides.waves import damping_by_modes
 from stickslip.errors import input_error
+from stickslip.model.damping import Damping
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
+from stickslip.response.rotating.flutter import FlutterOfWave, flutter_of_wave
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import advance
 from stickslip.study.verdict import Verdict
+
+FLUID = "the aerodynamic coefficients play no part: frequencies are those in still fluid"
+ALIKE = "mistuning plays no part: frequencies are those of the wheel with all sectors alike"
+
+
+def in_still_fluid(model: Model) -> tuple[Model, tuple[Verdict, ...]]:
+    """Return the model of a diagram of tuned waves in still fluid, and what that leaves out."""
+    found = []
+    if model.aerodynamics is not None:
+        remedy = "[modes] has the frequencies in the flow at one speed, [flutter] the damping."
+        found.append(Verdict("trusted", why=FLUID, remedy=remedy))
+    if model.mistuning is not None:
+        remedy = "[modes] has the frequencies of the wheel as it is at one speed."
+        found.append(Verdict("trusted", why=ALIKE, remedy=remedy))
+    return model.without_aerodynamics(), tuple(found)
+
+
+def wave_in_flow(
+    model: Model, contacts: ContactsAs, speed: float, wave_number: int, n_modes: int
+) -> FlutterOfWave | None:
+    """Return the modes of a wave with the aerodynamic forces of the model; None where it has none.
+
+    Parameters
+    ----------
+    model, contacts
+        The model and what its contacts do.
+    speed
+        In rad/s.
+    wave_number
+        Of the wave.
+    n_modes
+        Number of modes.
+    """
+    flow = flow_around(model, speed=speed)
+    if flow is None:
+        return None
+    moving = model.at(speed, wave_number, holding_points(model, contacts), with_damping=True)
+    parts = {k: p for k, p in model.parts.items() if p.body is None}
+    reduced = any(part.reduction is not None for part in parts.values())
+    damping = damping_by_modes(parts, reduced=reduced)
+    ratios: float | tuple[float, ...] = 0.0
+    if isinstance(damping, Damping):
+        ratios = damping.modal or 0.0
+    elif damping is not None:
+        moving = damping.of_modes(moving)
+    feedback = flow.on_structure(wave_number, moving)
+    return flutter_of_wave(moving, feedback, n_modes, ratios=ratios)
+
 
 FEW = 300  # dofs of a sector, of which all waves are solved in no time
 MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for

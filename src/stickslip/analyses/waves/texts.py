@@ -7,7 +7,7 @@ import xarray as xr
 
 from stickslip.analyses.collected import told_apart
 from stickslip.analyses.waves.of_wheel import table as of_wheel
-from stickslip.analyses.waves.records.numbers import label, wave_name
+from stickslip.analyses.waves.records.results import label, wave_name
 from stickslip.study.analysis import TextTable
 
 LEAST = 5  # modes of a mistuned wheel that are shown

@@ -5,19 +5,30 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page import tables
 from stickslip.analyses.forced_response.page.bifurcations import bifurcations
-from stickslip.analyses.forced_response.page.choice import choice
 from stickslip.analyses.forced_response.page.contacts.bodies import bodies, energy
 from stickslip.analyses.forced_response.page.contacts.contact import chosen_case, hysteresis_t, hysteresis_w, state_map
 from stickslip.analyses.forced_response.page.contacts.surface import surface_map
-from stickslip.analyses.forced_response.page.curves import abscissa, frequency_response, low_order, most, optimisation
+from stickslip.analyses.forced_response.page.curves import (
+    abscissa,
+    frequency_response,
+    low_order,
+    most,
+    optimisation,
+    what_is_needed,
+    where_friction_works,
+)
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
-from stickslip.analyses.forced_response.page.harmonics import kept_harmonics
+from stickslip.analyses.forced_response.page.harmonics import choice, kept_harmonics
 from stickslip.analyses.forced_response.page.head import cards
 from stickslip.analyses.forced_response.page.not_periodic import amplitudes_in_time, statistics_in_time
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
-from stickslip.analyses.forced_response.page.wheel import blades, peaks_of_blades, statistics, wheel_at_peak
-from stickslip.analyses.forced_response.page.wheel_motion import wheel_in_motion
-from stickslip.analyses.forced_response.page.working import what_is_needed, where_friction_works
+from stickslip.analyses.forced_response.page.wheel import (
+    blades,
+    peaks_of_blades,
+    statistics,
+    wheel_at_peak,
+    wheel_in_motion,
+)
 from stickslip.analyses.forced_response.stability.stable_words import FEW, all_lines
 from stickslip.analyses.forced_response.summary import orders_sentence, several_orders
 from stickslip.report.content import Table, Words

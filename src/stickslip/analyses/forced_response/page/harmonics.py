@@ -1,14 +1,20 @@
-"""Harmonics kept over frequency, one row of panels a case."""
+"""Harmonics kept over frequency, and the frequencies that needed more, with the reasons."""
+
+from collections import Counter
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from stickslip.analyses.forced_response.page.contacts.contact import states
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.summary import cost_sentence
 from stickslip.arrays import IntArray
+from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase
+from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, Plot, styled
-from stickslip.report.quantities import counted, runs
+from stickslip.report.quantities import NONE, counted, number, predicted, runs
 
 _SHOWN = 12  # cases that stay legible below one another
 _EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
@@ -82,3 +88,150 @@ def _caption(response: Response, cases: list[ShownCase]) -> str:
     if len(cases) < len(response.cases):
         text += f" The last {len(cases)} of {len(response.cases)} cases are drawn."
     return text
+
+
+_NAMED = 4  # sets of harmonics that a cell names
+
+
+def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, float]]:
+    """Ranges of frequency in which the alert asked for more harmonics.
+
+    Returns
+    -------
+    ranges
+        (first Hz, last Hz) of each run of neighbouring points.
+    """
+    at = np.flatnonzero(response.alert.case == case.index)
+    hz, error = response.alert.hz[at], response.alert.error[at]
+    above = np.concatenate([[False], error > response.threshold, [False]])
+    starts = np.flatnonzero(~above[:-1] & above[1:])
+    ends = np.flatnonzero(above[:-1] & ~above[1:])
+    return [(float(hz[a:b].min()), float(hz[a:b].max())) for a, b in zip(starts, ends, strict=True)]
+
+
+def _harmonic_share(response: Response, case: ShownCase) -> float:
+    """Largest share of the contact forces' vibration that harmonics beyond the first passage's carry, in percent."""
+    at = np.flatnonzero((response.point_case == case.index) & response.converged & response.more)
+    if not at.size or not response.has("contact_force"):
+        return float("nan")
+    force = response.data["contact_force"].isel(point=at)
+    parts = np.asarray(force.transpose("point", "harmonic", "contact", "direction", "part").values)
+    power = np.nansum(np.square(parts, dtype=np.float64), axis=(2, 3, 4))
+    moving = power[:, 1:].sum(axis=1)
+    beyond = ~np.isin(np.arange(power.shape[1]), response.low_harmonics)
+    share = np.sqrt(power[:, beyond].sum(axis=1) / np.where(moving > 0, moving, 1.0))
+    return float(100 * share.max())
+
+
+def _why(response: Response, case: ShownCase) -> str:
+    """Say what the contact does at the peak of a case and what the higher harmonics carry."""
+    reasons = []
+    if response.has("peak_state") and response.peak(case) >= 0:
+        state = states(response, case)
+        slipping, open_ = (int((state == k).any(axis=(1, 2)).sum()) for k in (1, 2))
+        said = f"{slipping} of {len(state)} contacts slip, {open_} lift off"
+        still = "all contacts stick: the system is linear"
+        reasons.append(f"at the peak {said if slipping or open_ else still}")
+    share = _harmonic_share(response, case)
+    if np.isfinite(share):
+        reasons.append(
+            f"harmonics beyond H = {response.low_name} carry up to {number(share, 2)} % of the contact force"
+        )
+    return "; ".join(reasons) or "–"
+
+
+def choice(response: Response) -> list[Table | Words]:
+    """Where more harmonics were needed, what chose them, and why, in plain words."""
+    if not response.decides:
+        kept = _kept_where(response)
+        return [Words((f"The same harmonics everywhere (`{response.selection}`): {kept}.",))]
+    if not response.alert.error.size:
+        return []
+    alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
+    if response.auto:
+        alert, text = _auto_row, _auto_text
+        middle = ("harmonics kept", "largest error predicted of what was accepted; found by audits, which overrule it")
+    elif response.is_error:
+        middle = (f"{response.more_name} asked for", "largest predicted error")
+        alert, text = _alert_row, _alert_text
+    rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
+    told = [text(response)]
+    if response.has("unknowns_solved", "retained_displacement"):
+        told.append(cost_sentence(response.data))
+    found = response.table("", told, [*middle, "why"], rows, numeric=False)
+    said = response.text("alert_explanation")
+    return [found, Words((said,), folded="As the run put it")] if said else [found]
+
+
+_REASON = (
+    "A contact that slips or lifts off makes forces at multiples of the excitation frequency, which a solution with few "
+    "harmonics cannot see."
+)
+
+
+def _alert_text(response: Response) -> str:
+    over = response.text("error_over") or "the output"
+    first = "Each point is first solved"
+    if response.text("passages") == "single":
+        first = "Each frequency is settled before the next one, beginning"
+    return (
+        f"{first} with H = {response.low_name}. `{response.selection}` then predicts how far the motion of {over} would "
+        f"change with H = {response.high_name}; where that exceeds {response.shown(response.threshold)}, the point is solved again "
+        f"with more harmonics. {_REASON}"
+    )
+
+
+def _auto_text(response: Response) -> str:
+    over = response.text("error_over") or "the output"
+    return (
+        f"Harmonics are raised along the branch, from H = {response.low_name} up to {response.high_harmonics[-1]}, until "
+        f"`{response.selection}` predicts that more would change the motion of {over} by well below "
+        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, to compare: audits. {_REASON}"
+    )
+
+
+def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
+    mine = response.converged & (response.point_case == case.index)
+    each = [response.floats(f"{name}_error_percent")[mine] for name in ("own", "audit")]
+    told = [predicted(float(np.nanmax(e))) if np.isfinite(e).any() else NONE for e in each]
+    return _kept_where(response, case), "; ".join(told)
+
+
+def _other_text(response: Response) -> str:
+    return (
+        f"`{response.selection}` chooses among the harmonics of H = {response.high_name}, never fewer than "
+        f"H = {response.low_name}, one frequency after the other: it compares an indicator of its own, which is no error, with "
+        f"{response.shown(response.threshold)}. How good the solution is, it does not say; `--verify-harmonics` does. "
+        f"{_REASON}"
+    )
+
+
+def _alert_row(response: Response, case: ShownCase) -> tuple[str, str]:
+    """Say in which ranges a case was flagged, and how large its predicted error is at most."""
+    ranges = (
+        number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz" for a, b in flagged_ranges(response, case)
+    )
+    own = np.flatnonzero(response.alert.case == case.index)
+    if not own.size:
+        return "nowhere", "–"
+    worst = own[int(np.argmax(response.alert.error[own]))]
+    largest = f"{response.shown(float(response.alert.error[worst]))} at {number(float(response.alert.hz[worst]), 5)} Hz"
+    return "\n".join(ranges) or "nowhere", largest
+
+
+def _other_row(response: Response, case: ShownCase) -> tuple[str, str]:
+    own = response.alert.error[response.alert.case == case.index]
+    return _kept_where(response, case), response.shown(float(own.max())) if own.size else "–"
+
+
+def _kept_where(response: Response, case: ShownCase | None = None) -> str:
+    """Say which harmonics were kept how often, the most frequent ones first."""
+    mine = response.converged
+    if case is not None:
+        mine = mine & (response.point_case == case.index)
+    counts = Counter(named(np.flatnonzero(row)) for row in response.kept[mine])
+    each = [f"H = {own} at {n}" for own, n in counts.most_common(_NAMED)]
+    rest = sum(counts.values()) - sum(n for _, n in counts.most_common(_NAMED))
+    if rest:
+        each.append(f"others at {rest}")
+    return "; ".join(each) + f" of {sum(counts.values())} points" if each else "–"

@@ -1,4 +1,4 @@
-"""The responses of all cases as one labelled dataset."""
+"""The responses of all cases as one labelled dataset, with the measured peaks."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,8 @@ import xarray as xr
 from stickslip.analyses.forced_response.records.quantities import QUANTITIES, flags
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.analyses.forced_response.verdicts.cases import with_levels
+from stickslip.study.models.measured import MeasuredPeaks, Quantity
+from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import said
 
 LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
@@ -67,9 +69,9 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     coordinates |= {name: values for name, values in AXES.items() if name in used}
     data = xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
     data = data.assign(with_levels(data, labels))
-    for name, variable in data.data_vars.items():
+    for name, own in data.data_vars.items():
         quantity = QUANTITIES[str(name)]
-        variable.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(str(name))
+        own.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(str(name))
     return data
 
 
@@ -138,3 +140,37 @@ def _filled(data: xr.Dataset, labels: Mapping[str, Any]) -> xr.Dataset:
 
 def _blank(kind: np.dtype[Any]) -> Any:
     return {"f": np.nan, "i": -1, "O": ""}[kind.kind]
+
+
+DIM = "measured"
+
+
+def with_measured(data: xr.Dataset, found: MeasuredPeaks | None) -> xr.Dataset:
+    """Return the dataset of a forced response with what was measured, along the dimension ``measured``."""
+    if found is None:
+        return data
+    variables: dict[str, Any] = {
+        "measured_value": variable(DIM, found.values, "1", f"value of {found.key} in the test"),
+        "measured_others": variable(
+            DIM, list(found.others), "1", "values of other varied keys in the test; empty where not told"
+        ),
+        "measured_excitation_n": variable(
+            DIM, found.excitation, "N", "amplitude of the force that measured amplitudes belong to"
+        ),
+        **_of("measured_amplitude", found.amplitude, "peak amplitude"),
+        **_of("measured_frequency_hz", found.frequency, "peak frequency"),
+    }
+    own = {"measured_key": found.key, "measured_file": found.file, "measured_source": found.source}
+    return data.assign(variables).assign_attrs(own)
+
+
+def _of(name: str, found: Quantity, about: str) -> dict[str, Any]:
+    """Return the variables of a quantity and of its error bars; none where it was not measured."""
+    if not found.unit:
+        return {}
+    own = {name: variable(DIM, found.values, found.unit, f"measured {about}")}
+    if found.bar:
+        long_name = f"{found.bar} of the measured {about}"
+        own[f"{name}_error"] = variable(DIM, found.errors, found.unit, long_name)
+        own[f"{name}_error"].attrs["error"] = found.bar
+    return own

@@ -11,7 +11,7 @@ from stickslip.analyses.forced_response.more_harmonics import ReferenceDoubt
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.records.quantities import MOTION, STAGES
-from stickslip.analyses.forced_response.stability.comparison import Check
+from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.analyses.forced_response.stability.stable_words import BASES
 from stickslip.arrays import ComplexArray, FloatArray, IntArray

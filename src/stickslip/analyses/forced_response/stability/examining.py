@@ -12,8 +12,7 @@ from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.stability.examination import by_hill
 from stickslip.analyses.forced_response.stability.stable import Examined, why_not
-from stickslip.analyses.forced_response.verdicts.curve import branch_length
-from stickslip.analyses.forced_response.verdicts.jumps import jumps, stored_energy
+from stickslip.analyses.forced_response.verdicts.curve import branch_length, jumps, stored_energy
 from stickslip.arrays import IntArray
 from stickslip.model.structure import Structure
 from stickslip.response.stability.course import Course, course_of

@@ -8,7 +8,6 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question, too_large
 from stickslip.analyses.forced_response.records.points import Accepted, Response
-from stickslip.analyses.forced_response.stability.comparison import Check
 from stickslip.analyses.forced_response.stability.examination import (
     FLOPS,
     by_hill,
@@ -16,7 +15,7 @@ from stickslip.analyses.forced_response.stability.examination import (
     hill_work,
     too_long,
 )
-from stickslip.analyses.forced_response.stability.in_time import seconds_in_time
+from stickslip.analyses.forced_response.stability.in_time import Check, seconds_in_time
 from stickslip.arrays import ComplexArray
 from stickslip.errors import InputError, StickslipError
 from stickslip.response.forced.choices import Stage

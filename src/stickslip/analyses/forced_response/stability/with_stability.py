@@ -7,13 +7,12 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import IN_TIME, STABLE, Question
 from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
-from stickslip.analyses.forced_response.stability.comparison import Check
 from stickslip.analyses.forced_response.stability.examining import (
     examined_points,
     neighbours_of,
     with_stable_peak,
 )
-from stickslip.analyses.forced_response.stability.in_time import check_in_time, seconds_in_time
+from stickslip.analyses.forced_response.stability.in_time import Check, check_in_time, seconds_in_time
 from stickslip.analyses.forced_response.stability.stable import (
     Examined,
     as_note,

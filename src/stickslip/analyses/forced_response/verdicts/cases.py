@@ -10,10 +10,14 @@ import xarray as xr
 from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.stability.stable_words import said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
-from stickslip.analyses.forced_response.verdicts.finding import Finding, without_place
-from stickslip.analyses.forced_response.verdicts.physics_rules import PHYSICS_RULES, told_of_model
-from stickslip.analyses.forced_response.verdicts.rules import RULES
-from stickslip.analyses.forced_response.verdicts.stable_rules import LEFT
+from stickslip.analyses.forced_response.verdicts.rules import (
+    LEFT,
+    PHYSICS_RULES,
+    RULES,
+    Finding,
+    told_of_model,
+    without_place,
+)
 from stickslip.arrays import IntArray
 from stickslip.harmonic.judging import REACH
 from stickslip.study.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level, Verdict, of_all_cases, worst

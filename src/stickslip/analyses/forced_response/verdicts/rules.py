@@ -1,27 +1,245 @@
-"""Rules of the verdicts on a forced response, each a function of the finished dataset."""
+"""Rules of the verdicts on a forced response, each a function of the finished dataset: accuracy, stability, physics and model."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from stickslip.analyses.forced_response.chooser import error_text
-from stickslip.analyses.forced_response.problem import MORE_THAN_LOW
-from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, motion_of
-from stickslip.analyses.forced_response.verdicts.finding import Finding, Rule, in_time_there, without_place
-from stickslip.analyses.forced_response.verdicts.jumps import jumps
-from stickslip.analyses.forced_response.verdicts.stable_rules import (
-    bifurcated,
-    fewer,
-    stability,
-    unstable_stretches,
-)
+from stickslip.analyses.forced_response.problem import ALONE, MORE_THAN_LOW, MOST_IN_TIME, TOO_MANY
+from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
-from stickslip.study.verdict import from_json
+from stickslip.study.verdict import Level, from_json
 from stickslip.units import LARGEST_PERCENT, millimetres
+
+IN_TIME = "--verify integrates in time at the peak"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule finds.
+
+    Parameters
+    ----------
+    level, why, remedy
+        As of a `Verdict`; ``trusted`` is told without doubt.
+    points
+        Positions of its points within the case; none: the case as a whole.
+    size
+        Of several findings of a rule the largest stands for all.
+    value
+        Its size as text, where a sentence about several points tells the largest.
+    """
+
+    level: Level
+    why: str
+    remedy: str
+    points: tuple[int, ...] = ()
+    size: float = 0.0
+    value: str = ""
+
+
+Rule = Callable[[Curve], Iterator[Finding]]
+
+
+def in_time_there(case: Curve, point: int) -> str:
+    """Say how a point is integrated in time: of a sweep it is the peak that is."""
+    if point == case.peak or case.range_key == "speed_rpm":
+        return IN_TIME
+    return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
+
+
+def without_place(sentence: str) -> str:
+    """Return the sentence of a check without the frequency at its head, which a verdict names itself, and without its full stop."""
+    head, found, rest = sentence.partition(" Hz: ")
+    return (rest if found and head.replace(".", "").isdigit() else sentence).removesuffix(".")
+
+
+UNDECIDED = MOTION["undecided"]
+LEFT = "unstable: a machine does not stay there"
+LEAVING = dict.fromkeys(
+    ("period doubling", "branch point"), 'forced_response.bifurcations = "branches" follows what leaves there.'
+)
+FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
+OPEN = "No more time helps, and no fewer modes: it stays open. More harmonics make the errors of multipliers smaller."
+IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
+
+
+def stability(case: Curve) -> Iterator[Finding]:
+    """Doubt what the multipliers leave open, and take no unstable motion for a peak; an unstable stretch of the branch is an answer."""
+    for point, said in case.examined("stability_verdict"):
+        word, why = said["stability_verdict"], without_place(said["stability_sentence"])
+        why = why.removesuffix(IN_TIME_TELLS)
+        if word == "unstable" and point == case.peak:
+            why = f"a machine does not stay there: {why}"
+            remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."
+            yield Finding("wrong", why, remedy, (point,))
+        elif word == "neutral" and point == case.peak:
+            remedy = "Damping decides whether a machine keeps this motion: give [damping], or a contact that slips."
+            yield Finding("trusted", f"the peak is {why}", remedy, (point,))
+        elif word == "undecided" and not case.attained[point] and point not in case.known:
+            why = f"whether it is stable: {why}"
+            told = [why, *(str(s["not_periodic_sentence"]) for s in case.rows("not_periodic"))]
+            known = next(filter(None, map(fewer, told)), "")
+            remedy = known or f"{in_time_there(case, point)}, and sees whether the motion stays."
+            yield Finding("doubtful", why, remedy, (point,))
+
+
+def unstable_stretches(case: Curve) -> Iterator[Finding]:
+    """Tell where the branch is unstable, and what larger motion is: neither marks the case."""
+    off = case.unstable
+    larger, hz = case.number("unstable_peak_amplitude"), case.number("unstable_peak_frequency_hz")
+    if np.isfinite(larger):
+        there = [
+            without_place(str(said["not_periodic_sentence"]))
+            for said in case.rows("not_periodic")
+            if abs(float(said["not_periodic_frequency_hz"]) / hz - 1.0) < ATTAINED / 100
+        ]
+        why = f"the largest motion, {millimetres(larger)} at {hz:.4g} Hz, is unstable; the peak is the largest motion that a machine keeps"
+        yield Finding("trusted", "; ".join([why, *there[:1]]), "See the stability of the points.")
+    elif off.size:
+        low, high = case.hz[off].min(), case.hz[off].max()
+        why = f"{off.size} of {case.hz.size} points, {low:.4g} to {high:.4g} Hz, are unstable: a machine does not stay there"
+        yield Finding("trusted", why, 'forced_response.bifurcations = "all" locates where that begins.')
+
+
+def bifurcated(case: Curve) -> Iterator[Finding]:
+    """Tell where the branch loses its stability."""
+    unjudged = case.floats("motion_stability") == UNDECIDED
+    if unjudged.any() and case.has("bifurcations_limits"):
+        judged = np.isin(case.floats("motion_stability"), (0, 1, UNDECIDED))
+        hz = case.hz[unjudged]
+        why = (
+            f"bifurcations may be missed: {hz.size} of {judged.sum()} motions along the branch could not be judged, between "
+            f"{hz.min():.2f} and {hz.max():.2f} Hz"
+        )
+        remedy = "More harmonics make the errors of multipliers smaller; --verify integrates in time at the peak."
+        yield Finding("trusted", why, remedy)
+    left = {float(said["side_branch_frequency_hz"]) for said in case.rows("side_branch")}
+    for said in case.rows("bifurcation"):
+        if said["bifurcation_kind"] == "fold":  # the rule of folds tells of these
+            continue
+        remedy = LEAVING.get(str(said["bifurcation_kind"]), "")
+        if float(said["bifurcation_frequency_hz"]) in left:
+            remedy = "The branch that leaves there is drawn with the response."
+        yield Finding("trusted", str(said["bifurcation_sentence"]), remedy)
+
+
+def fewer(sentence: str) -> str:
+    """Return what to do where a model has too many coordinates to be integrated in time, which no more time helps; empty where it has not."""
+    if f"coordinates {TOO_MANY} {MOST_IN_TIME}" not in sentence:
+        return ""
+    return OPEN if ALONE in sentence else FEWER
+
+
+LARGEST_ROTATION_RAD = 0.1  # that linear kinematics describes
+LARGEST_STRAIN = 3e-3
+LARGER = 0.01  # relative, than the peak
+SOFTER = 0.1  # relative change of the contact stiffness that sentences are about
+DECIDED = 0.05  # relative change of a peak by it above which a note says so
+LEAST_PERCENT, LEAST_HZ = 1e-3, 1e-6  # changes of a peak that are told as numbers
+LARGEST_SLIP_FACETS = 0.5  # of a facet: contact points stay opposite each other
+
+
+def physics(case: Curve) -> Iterator[Finding]:
+    """Return what the modes say of the physics of the case."""
+    for v in from_json(case.text("physics_verdicts") or "[]"):
+        yield Finding(v.level, v.why, v.remedy)
+
+
+def small_motions(case: Curve) -> Iterator[Finding]:
+    """Doubt motions that linear kinematics does not describe."""
+    rotation, strain, slip = (case.number(f"peak_{name}") for name in ("rotation_rad", "strain_rms", "slip_facets"))
+    told = [f"a part turns by {rotation:.2g} rad, more than {LARGEST_ROTATION_RAD:g}"] * bool(
+        rotation > LARGEST_ROTATION_RAD
+    )
+    told += [
+        f"the root mean square of the strain is {100 * strain:.2g} %, more than {100 * LARGEST_STRAIN:g} %"
+    ] * bool(strain > LARGEST_STRAIN)
+    told += [f"a contact slips by {slip:.2g} of a facet, more than {LARGEST_SLIP_FACETS:g}"] * bool(
+        slip > LARGEST_SLIP_FACETS
+    )
+    if told:
+        why = f"the motion at the peak is too large for linear kinematics: {'; '.join(told)}"
+        remedy = (
+            "Check units, the size of the loads and the damping; if they are right, a model of large motions is needed."
+        )
+        yield Finding("doubtful", why, remedy)
+
+
+def model_itself(case: Curve) -> Iterator[Finding]:
+    """Doubt a peak that more modes, or fewer contact points, would move by more than the threshold."""
+    for name, what, remedy in (
+        ("modes", "with half again as many modes in the reduction", "Keep more modes ([reduction] modes)."),
+        (
+            "points",
+            f"with half the points of its contacts ({case.number('points_left_out'):.0f} left out)",
+            "Mesh the contacts more finely, and compare.",
+        ),
+    ):
+        change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))
+        if abs(change) > case.limit:
+            why = f"the peak changes by {100 * change:+.2g} % and {hertz:+.3g} Hz {what}"
+            yield Finding("doubtful", why, remedy)
+
+
+def other_motions(case: Curve) -> Iterator[Finding]:
+    """Tell of motions beside that of the response; doubt a peak that one of them is larger than."""
+    for said in case.rows("another"):
+        size, hz = float(said["another_amplitude"]), float(said["another_frequency_hz"])
+        larger = size > (1.0 + LARGER) * float(np.nan_to_num(case.number("peak_amplitude")))
+        word = str(said["another_stability"])
+        state = {
+            "stable": ", which is stable",
+            "undecided": ", of which nobody knows whether it is stable",
+            "neutral": ", which is neutral",
+        }.get(word, ", whose stability was not examined")
+        why = (
+            f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said['another_known']))}: "
+            f"found from {said['another_start']}{state}"
+        )
+        remedy = "Which one a machine takes depends on its history: [all_motions] looks for all of them."
+        yield Finding("doubtful" if larger else "trusted", why, remedy, size=size)
+
+
+def contact_stiffness(case: Curve) -> Iterator[Finding]:
+    """Tell of a peak that contacts a tenth softer would move by more than `DECIDED`: no doubt, the number is only as good as its stiffness."""
+    if abs(SOFTER * case.number("stiffness_peak_slope")) > DECIDED:
+        yield Finding(
+            "trusted",
+            f"the contact stiffness decides the peak: {_softer(case)}",
+            "Know it to a few per cent, from a measured stuck frequency for example, or vary it ([vary]).",
+        )
+
+
+def _softer(case: Curve) -> str:
+    """Return what softer contacts do to a peak, to first order; empty where that is not known."""
+    slope, hertz = (case.number(f"stiffness_{own}") for own in ("peak_slope", "frequency_slope_hz"))
+    if not np.isfinite(slope):
+        return ""
+    percent = -100 * SOFTER * slope
+    size = f"{percent:+.2g} %" if abs(percent) >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
+    moved = f" and {-SOFTER * hertz:+.2g} Hz" if abs(hertz) >= LEAST_HZ else ""
+    return f"contacts {100 * SOFTER:g} % softer change it by {size}{moved}"
+
+
+def told_of_model(case: Curve) -> list[str]:
+    """Return what the modes, the contact points and the contact stiffness of a model change at a peak that is trusted."""
+    told = []
+    for name, what in (("modes", "half again as many modes"), ("points", "half the contact points")):
+        change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))
+        if np.isfinite(change):
+            told.append(f"{what} change it by {100 * change:+.2g} % and {hertz:+.2g} Hz")
+    return told + [said for said in (_softer(case),) if said]
+
+
+PHYSICS_RULES: tuple[Rule, ...] = (physics, small_motions, model_itself, contact_stiffness, other_motions)
+
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held

@@ -3,8 +3,7 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.waves.page.diameters import diameter_axes, mode_lines
-from stickslip.analyses.waves.page.waves import NEEDED, Waves
+from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled

@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.waves.records.about import ABOUT, told
-from stickslip.analyses.waves.records.numbers import wave_name
-from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes
+from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes, wave_name
 from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
 from stickslip.study.store.netcdf import stacked, variable
