@@ -133,3 +133,17 @@ def test_as_many_points_are_marched_as_the_study_says() -> None:
         question = SimpleNamespace(not_periodic_points=most)
         found = without_periodic(question, response, [])  # type: ignore[arg-type]
         assert sorted(omega for omega, _, _ in found) == wanted
+
+
+@pytest.mark.parametrize(("beside", "marched"), [("stable", []), ("unstable", [1.0, 2.0, 3.0]), ("undecided", [2.0])])
+def test_an_unstable_motion_is_marched_unless_a_stable_one_stands_at_its_frequency(beside: str, marched: list) -> None:
+    hertz = (1.0, 3.0, 2.0)  # the last one lies on the branch that folds back
+    points = [SimpleNamespace(point=SimpleNamespace(omega=w, converged=True)) for w in hertz]
+    response = SimpleNamespace(accepted=points, top=points[1], unstable_peak=None)
+    examined = [
+        SimpleNamespace(position=i, omega=w, verdict=verdict, multiplier=1.5, motion="left", error=0.0)
+        for i, (w, verdict) in enumerate(zip(hertz, (beside, beside, "unstable"), strict=True))
+    ]
+    question = SimpleNamespace(not_periodic_points=9)
+    found = without_periodic(question, response, examined)  # type: ignore[arg-type]
+    assert sorted(omega for omega, _, _ in found) == marched
