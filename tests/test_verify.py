@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
@@ -20,6 +21,15 @@ from stickslip.study.models.study import read_study
 from stickslip.study.store.journal import JobJournal
 
 CHECK = Check(frequency_hz=180.0, balance=1.02e-3, transient=1.0e-3, settled=True, periods=90, order=5)
+
+
+def test_a_motion_in_time_that_stands_still_is_off_by_no_finite_amount() -> None:
+    """A slider so far away that rounding swallows its motion: some BLAS kernels put a body there that nothing else holds."""
+    still = replace(CHECK, transient=0.0, refined_order=9, refined=1e-3, motion="left")
+    assert still.difference_percent == np.inf
+    assert replace(still, balance=0.0).difference_percent == 0.0
+    assert "(H = 5), time integration 0.00000e+00 m; periodic after" in still.sentence
+    assert "the balance with 9 harmonics gives 1.00000e-03 m; left:" in still.sentence
 
 
 @pytest.fixture(scope="module")

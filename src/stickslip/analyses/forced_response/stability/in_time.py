@@ -34,6 +34,13 @@ TOLD: dict[str, str] = {
 }
 
 
+def off_percent(value: float, true: float) -> float:
+    """Return how far an amplitude is off a true one, in percent of it; infinite where that is zero and the amplitude is not."""
+    if true == 0.0:
+        return 0.0 if value == 0.0 else float("inf")
+    return 100 * (value - true) / true
+
+
 @dataclass(frozen=True)
 class Check:
     """Amplitude of the report output, of the harmonics that the load drives, by balance and by time integration.
@@ -87,8 +94,8 @@ class Check:
 
     @property
     def difference_percent(self) -> float:
-        """Of the balance against the integration."""
-        return 100 * (self.balance - self.transient) / self.transient
+        """Of the balance against the integration; see `off_percent`."""
+        return off_percent(self.balance, self.transient)
 
     @property
     def wanders_near(self) -> bool:
@@ -144,8 +151,9 @@ class Check:
             return ""
         if not np.isfinite(self.refined):
             return f"; the balance with {self.refined_order} harmonics does not converge"
-        left = 100 * (self.refined - self.transient) / self.transient
-        return f"; the balance with {self.refined_order} harmonics gives {metres(self.refined)} ({left:+.2f} %)"
+        left = off_percent(self.refined, self.transient)
+        difference = f" ({left:+.2f} %)" if isfinite(left) else ""
+        return f"; the balance with {self.refined_order} harmonics gives {metres(self.refined)}{difference}"
 
     @property
     def _became(self) -> str:
@@ -325,7 +333,8 @@ def _with_steps_enough(
         steps *= 2
         finer = integrated(question.problem, point, question.model.load, begin=found.final, steps=steps)
         fine = _compared(question, response, point, finer, steps)
-        moved = 100 * (fine.transient / coarse.transient - 1.0)
+        before = coarse.transient
+        moved = 100 * (fine.transient / before - 1.0) if before else off_percent(fine.transient, before)
         if abs(moved) <= LARGE and coarse.steps == STEPS:
             return coarse, found
         coarse, found = replace(fine, step_percent=moved), finer
