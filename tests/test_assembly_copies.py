@@ -164,6 +164,15 @@ def test_copies_share_one_reduction_and_answer_as_parts_of_their_own():
     assert sum(1 for key in first.memo if isinstance(key, tuple)) == 1
 
 
+@pytest.mark.parametrize("how", PLACES)
+def test_copies_at_rest_share_one_reduction_wherever_they_are(how):
+    first = solid_part(bar(), STEEL, reduction=Reduction(4), damping=DAMPING)
+    other = copy_of(first, PLACES[how])
+    assemble(pair(first, other), 3)
+    made = [sum(isinstance(key, tuple) for key in part.memo) for part in (first, other)]
+    assert made == [1, 0]
+
+
 def test_a_turned_rigid_body_has_its_points_and_inertia_turned():
     place = place_of(turn=0.9, axis=OBLIQUE)
     body = RigidBody(mass=2.0, inertia=(0.1, 0.2, 0.25), centre=(0.1, 0.0, 0.2))

@@ -361,3 +361,19 @@ def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():
         ]
         for a, b in pairs:
             assert np.abs(a - b).max() < 1e-9 * np.abs(b).max()
+
+
+def test_a_wheel_whose_springs_are_elsewhere_is_condensed_as_a_whole():
+    """Wave by wave springs are added to the retained coordinates: none may be left out."""
+    model = sector_model(shrouded_sector())
+    one = BladeMistuning(of="blade.shroud_high", deviations=DEVIATIONS, modes=2)
+    found = assemble(replace(model, mistuning=Mistuning(blades={"high": one})), H)
+    wheel, retained = found.bare.structure, found.bare.retained
+    springs = np.zeros(wheel.n)
+    springs[[retained[0], np.setdiff1d(np.arange(wheel.n), retained)[0]]] = 3e5
+    held = wheel.grounded(scipy.sparse.diags_array(springs).tocsr())
+    omega = 2 * math.pi * 2150
+    mine = condense_side(held, retained, found.load, H).condensed(omega, H)
+    theirs = condense(held.structure, retained, found.load).condensed(omega, H)
+    for a, b in zip(mine.stiffness, theirs.stiffness, strict=True):
+        assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max()

@@ -62,7 +62,9 @@ def test_a_motion_that_is_weakly_unstable_is_not_told_as_another_one() -> None:
     short, long = (model.forced_response(hz, not_periodic_s=s)["forced_response"] for s in (0.05, 30.0))
     assert "has not left the motion that it started on" in str(short["not_periodic_sentence"].values.flat[0])
     for data in (short, long):
-        for text, periods in zip(data["not_periodic_sentence"].values, data["not_periodic_periods"].values, strict=True):
+        for text, periods in zip(
+            data["not_periodic_sentence"].values, data["not_periodic_periods"].values, strict=True
+        ):
             (told,) = re.findall(r"over (\d+) periods after (\d+)", str(text))
             assert sum(map(int, told)) == periods
     assert not short["not_periodic_settled"].values.any()

@@ -1,5 +1,6 @@
 """The three correctors: equal roots of piecewise linear systems, units, singular Jacobians, and why each of them stopped."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,6 +131,18 @@ def test_a_kink_is_crossed_where_every_shortened_step_goes_uphill():
     assert solution.status is Status.CONVERGED
     assert solution.rung is Rung.DAMPED_STEP
     assert np.allclose(solution.x, [1.0, 1e-4 - 100.0])
+
+
+def test_a_step_that_hardly_helped_is_taken_where_no_kink_leads_on(monkeypatch):
+    """The residual falls by a hundredth: better than to stay, as long as nothing else helps more."""
+    monkeypatch.setattr(Kinks, "cross", lambda *_: Status.STALLED)
+
+    def floor(x):
+        return At(np.array([x[0], 10.0 + 0.1 * math.tanh(x[1])]), np.diag([1.0, 0.1 / math.cosh(x[1]) ** 2]))
+
+    solution = newton(floor, np.zeros(2), Newton(globalisation="levenberg_marquardt"))
+    assert not solution.status.converged
+    assert floor(solution.x).residual[1] < 9.95
 
 
 def test_crossing_kinks_ends_where_it_gains_nothing():
