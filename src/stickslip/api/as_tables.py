@@ -18,14 +18,14 @@ MANY = 20  # numbers of a list, above which its ends are told
 
 
 def as_tables(model: Model, name: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of a model and of what it is asked; values that are left out and their defaults are not in them.
+    """Return the study tables of a model and of its analysis. Keys at their defaults are left out.
 
     Parameters
     ----------
     model
-        What is asked.
+        The model.
     name, keys
-        Of the analysis, and what was given for its table.
+        Name of the analysis, and the keys given for its table.
     """
     found: dict[str, Any] = {
         "part": {n: _part(p) for n, p in model.parts.items()},

@@ -24,12 +24,12 @@ _FOLDER = "results"  # of a study that names no other
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Designs held against each other.
+    """Designs compared with each other.
 
     Parameters
     ----------
     designs
-        In the order given; the others are held against the first.
+        In the order given; the first is the reference of the others.
     curves
         Responses of measurements or of other programs.
     """
@@ -38,7 +38,7 @@ class Comparison:
     curves: tuple[MeasuredCurve, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be compared."""
+        """Refuse results that cannot be compared."""
         per_force(self.designs, self.curves)
 
     @cached_property
@@ -56,7 +56,7 @@ class Comparison:
         return tuple(self._figures)
 
     def plot(self, name: str) -> go.Figure:
-        """Return a figure; an `InputError` tells the names where there is none of that."""
+        """Return a figure; for an unknown name an `InputError` lists the names."""
         if name not in self._figures:
             remedy = did_you_mean(name, list(self._figures))
             raise input_error(f"plot({name!r})", "is no figure of this comparison", remedy)
@@ -64,7 +64,7 @@ class Comparison:
 
     @property
     def peaks(self) -> Table:
-        """A row for each case of each design: its peak, and how far it is from that of the first design; NaN where that has no such case."""
+        """One row a case and design: the peak and its difference from the first design; NaN if that lacks the case."""
         divided = per_force(self.designs, self.curves)
         found = peak_rows(self.designs, divided=divided)
         if not found:
@@ -82,13 +82,13 @@ class Comparison:
 
     @property
     def inputs(self) -> Table:
-        """What differs between the study files: a row a key, a column a design."""
+        """Keys of the study files that differ: one row a key, one column a design."""
         head, rows = ["key", *(d.name for d in self.designs)], differences(self.designs)
         columns = zip(*rows, strict=True) if rows else [() for _ in head]
         return Table({n: np.array(own) for n, own in zip(head, columns, strict=True)})
 
     def report(self, path: str | Path = "comparison.html") -> Path:
-        """Write the page; return it."""
+        """Write the page; return its path."""
         target = Path(path)
         write_page(comparison_html(self.designs, self.curves), target)
         return target
@@ -107,12 +107,12 @@ def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
         Results; or result files, folders or study files whose results are there; or CSV files with the columns ``frequency_hz`` and
         ``amplitude_um`` (``_mm``, ``_m``; ``_um_per_n`` …) of a measurement or another program. At least two, one of them a result.
     names
-        Of all of them, for legends and tables; left out: by their folders, files or titles.
+        Names for legends and tables, one for each of `compared`; left out: their folders, files or titles.
 
     Raises
     ------
     InputError
-        If something cannot be read, there is nothing to compare, or two have the same name.
+        If something cannot be read, nothing can be compared, or two names are equal.
     """
     given = [_opened(own) for own in compared]
     results = [own for own in given if isinstance(own, Result)]

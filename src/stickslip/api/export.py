@@ -1,4 +1,4 @@
-"""A result written for other programs: which motion of which case, and the model that it was computed of."""
+"""A result written for other programs: the motion to write, and the model that expands it to all nodes."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +27,7 @@ MOST_STEPS = 1000
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is written of a result; see `Result.export`."""
+    """Choice of the motion and of the format; see `Result.export`."""
 
     to: Format = "vtu"
     case: int = 0
@@ -55,7 +55,7 @@ class Wanted:
 def export_result(
     tree: xr.DataTree, path: Path | None, folder: Path | None, wanted: Wanted, of: Model | Path | None
 ) -> tuple[Path, ...]:
-    """Write a motion of a result, which lies at `path`; return the files."""
+    """Write a motion of the result at `path`; return the files."""
     case, units = wanted.case, Units.named(wanted.units)
     picked = chosen(tree, wanted.analysis, case, number=wanted.number, hz=wanted.hz, amplitude_mm=wanted.amplitude_mm)
     LOG.info(f"[{picked.analysis}] {picked.told}")

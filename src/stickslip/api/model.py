@@ -52,7 +52,7 @@ class Model(Assembly):
     """
 
     def assembled(self, harmonics: int, *, every_wave: bool = False) -> Assembled:
-        """Return what the functions of the lower layers take; `assemble` of `stickslip.assembly` says of what."""
+        """Return the assembled model, the input of the lower layers; see `assemble` of `stickslip.assembly`."""
         return assemble(self, harmonics, every_wave=every_wave)
 
     def forced_response(
@@ -69,18 +69,18 @@ class Model(Assembly):
         Parameters
         ----------
         hz
-            The range (lowest, highest) in Hz; more than two frequencies are taken as they are.
+            (lowest, highest) frequency in Hz; more than two values are a list of frequencies.
         verify, verify_harmonics
             Compare with time integration, and with twice as many harmonics.
         folder
-            Where to write ``result.nc``; left out: the result stays in memory.
+            Folder for ``result.nc``; left out: the result stays in memory.
         keys
-            Of the tables, such as ``low=1, high=5, points=60, selection="guarded_alert", direction="down"``.
+            Keys of the tables, such as ``low=1, high=5, points=60, selection="guarded_alert", direction="down"``.
 
         Raises
         ------
         InputError
-            If a key is none, or the model does not allow the answer.
+            If a key is unknown, or the model does not allow the analysis.
         """
         if hz is not None:
             own = [float(f) for f in hz]
@@ -106,21 +106,21 @@ class Model(Assembly):
         return self._answer("safe", keys, folder)
 
     def limit_cycle(self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any) -> Result:
-        """Find motions that nothing drives; keys such as ``wave_numbers=[3], points=40, in_time=True``.
+        """Find self-excited motions; keys such as ``wave_numbers=[3], points=40, in_time=True``.
 
         Parameters
         ----------
         verify
-            Compare with time integration, as the key ``in_time`` does.
+            Compare with time integration; same as the key ``in_time``.
         folder
-            Where to write ``result.nc``; left out: the result stays in memory.
+            Folder for ``result.nc``; left out: the result stays in memory.
         keys
-            Of the table [limit_cycle].
+            Keys of the table [limit_cycle].
 
         Raises
         ------
         InputError
-            If a key is none, or the model does not allow the answer.
+            If a key is unknown, or the model does not allow the analysis.
         """
         checks = frozenset({"verify"} if verify else ())
         return self._answer("limit_cycle", keys, folder, checks)
@@ -137,23 +137,23 @@ class Model(Assembly):
         Parameters
         ----------
         of
-            The model of each value of the parameter. Left out: `parameter` is a factor on the loads, ``"excitation"`` or ``"static_load"``, or a field of the
-            contact laws, as ``"mu"``.
+            Function that returns the model for a value of the parameter. Left out: `parameter` is a factor on the loads, ``"excitation"``
+            or ``"static_load"``, or a field of the contact laws, as ``"mu"``.
         folder
-            Where to write ``result.nc``; left out: the result stays in memory.
+            Folder for ``result.nc``; left out: the result stays in memory.
         keys
-            Of the table [resonance], such as ``frequency_hz=(80, 160), parameter="excitation", values=[1, 2, 5]``.
+            Keys of the table [resonance], such as ``frequency_hz=(80, 160), parameter="excitation", values=[1, 2, 5]``.
 
         Raises
         ------
         InputError
-            If a key is none, or the model does not allow the answer.
+            If a key is unknown, or the model does not allow the analysis.
         """
         at = None if of is None else lambda _, value: of(value)
         return self._answer("resonance", {"parameter": "value", **keys}, folder, at=at)
 
     def residual_tractions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
-        """Bound the response over the tractions that sticking contacts may have kept; keys such as ``frequency_hz=(150, 170), points=25``."""
+        """Bound the response over all possible residual tractions of sticking contacts; keys such as ``frequency_hz=(150, 170), points=25``."""
         return self._answer("residual_tractions", keys, folder)
 
     def modal_synthesis(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
@@ -161,14 +161,14 @@ class Model(Assembly):
         return self._answer("modal_synthesis", keys, folder)
 
     def all_motions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
-        """Search for motions that a sweep does not meet; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, solves=2000``."""
+        """Search for motions that the sweep misses; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, solves=2000``."""
         return self._answer("all_motions", keys, folder)
 
     def quasi_periodic(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Compute motions with two frequencies; keys such as ``frequencies_hz=[150.0, 160.0], second_hz=212.0, accuracy_percent=0.5``.
 
-        A load with a frequency of its own (`Load.omega`, `Load.omega_ratio`) gives the second one; without any a second tone that
-        grows by itself is looked for.
+        A load with a frequency of its own (`Load.omega`, `Load.omega_ratio`) gives the second frequency. Without one, a self-excited second
+        tone is searched for.
         """
         return self._answer("quasi_periodic", keys, folder)
 

@@ -1,4 +1,4 @@
-"""Lines and tables on the terminal, and the one line when output, memory or disk fail."""
+"""Output on the terminal: lines, tables, and the single line of a failure of output, memory or disk."""
 
 import errno
 import math
@@ -22,7 +22,7 @@ PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 
 
 def console() -> Console:
-    """Return the screen, or a wide page where the output goes to a file."""
+    """Return the console; its lines are wide where the output goes to a file."""
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
@@ -32,13 +32,13 @@ def say(text: str) -> None:
 
 
 def say_lines(title: str, texts: Sequence[str]) -> None:
-    """Print lines under a title; nothing where there are none."""
+    """Print lines under a title; nothing for no lines."""
     for text in [f"\n{title}", *(f"  {text}" for text in texts)] if texts else []:
         say(text)
 
 
 def aligned(cells: Sequence[str]) -> list[str]:
-    """Return the cells of a column of numbers with the same decimals: those of the largest, more where the smallest needs them for two digits."""
+    """Return the cells of a numeric column with equal decimals, enough for two digits of the smallest number."""
     numbers = [c for c in cells if c]
     if not numbers or not all(_NUMBER.fullmatch(c) for c in numbers):
         return list(cells)
@@ -52,7 +52,7 @@ def aligned(cells: Sequence[str]) -> list[str]:
 
 
 def say_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[str]) -> None:
-    """Print a table without its empty columns, and lines below it."""
+    """Print a table without its empty columns, then the lines below it."""
     if not rows:
         say_lines(title, lines)
         return
@@ -70,7 +70,7 @@ def say_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], li
 
 
 def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table whose cells fold."""
+    """Print a table whose cells wrap."""
     say(f"\n{title}")
     table = Table()
     for name in names:
@@ -81,7 +81,7 @@ def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]])
 
 
 def say_answers(verdicts: Sequence[str], failed: int, files: Sequence[Path], last: str) -> None:
-    """Print the verdicts, how many points have no solution, which files there are, and last whether to trust it."""
+    """Print verdicts, number of unconverged points, files, and last the conclusion."""
     say_lines("Verdicts", verdicts)
     if failed:
         told = f"{failed} of the points: marked in the result and in the report, not filled in"
@@ -98,12 +98,12 @@ _NO_MEMORY = ("cannot allocate", "failed to map segment", "out of memory", "can'
 
 @contextmanager
 def output_that_may_fail() -> Iterator[None]:
-    """Run a command with an output that may be closed, full or of few letters, and end with an exit code.
+    """Run a command and end with its exit code, also if the output is closed, full or limited to few characters.
 
     Raises
     ------
     SystemExit
-        If the output cannot be written, or as the command ends.
+        At the end of the command, and if the output cannot be written.
     """
     if sys.stdout is None:  # closed: the first file that is opened would get its number
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115
@@ -123,7 +123,7 @@ def output_that_may_fail() -> Iterator[None]:
 
 
 def unforeseen(error: BaseException) -> str:
-    """Return the line that an error of the system, or one that we should not have, is told with."""
+    """Return the line that reports an error of the system or an internal error."""
     said = " ".join(str(error).split())[:_LONGEST]
     if _lacks_memory(error):
         return (

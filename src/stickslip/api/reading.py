@@ -1,4 +1,4 @@
-"""Study files read step by step: errors are reported before heavy libraries are imported."""
+"""Reading of study files in steps: errors are reported before heavy libraries are imported."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 
 def read(path: Path) -> "Study":
-    """Read a study file for the command line; BLAS has one thread from here on, unless the user said how many.
+    """Read a study file for the command line, and set BLAS to one thread unless the user chose a number.
 
     Raises
     ------

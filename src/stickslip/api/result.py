@@ -33,15 +33,15 @@ class Result:
     data
         A DataTree with a dataset for each analysis, in Hz and SI units; provenance in the attributes of the root.
     path
-        The file that holds it; None for a result in memory.
+        The file; None for a result in memory.
     files
         All files that the run wrote.
     failed
         Number of points without a solution.
     summaries
-        Of each analysis, what the terminal prints; empty for a result that was read from a file.
+        Tables of the terminal for each analysis; empty for a result read from a file.
     waits
-        For what it waits, of a shard that was not the last to end; empty: it is whole.
+        Shards still missing, in words; empty for a complete result.
     """
 
     data: xr.DataTree
@@ -53,13 +53,13 @@ class Result:
 
     @classmethod
     def open(cls, path: str | Path) -> "Result":
-        """Read a result file, or the one in a folder."""
+        """Read a result file, or the result in a folder."""
         path = Path(path)
         return cls(open_result(path), path / RESULT if path.is_dir() else path)
 
     @classmethod
     def of(cls, outcome: Outcome) -> "Result":
-        """Return what a run has found."""
+        """Return the result of a run."""
         path = outcome.files[0] if outcome.files and not outcome.waits else None
         found = (outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
         return cls(*found, outcome.waits)
@@ -86,9 +86,10 @@ class Result:
         Parameters
         ----------
         name
-            Of the analysis; left out: the first of the result.
+            Name of the analysis; left out: the first of the result.
         of
-            Variable that has an entry in each row, with all that belongs to it; left out: amplitude, damping or frequency.
+            Variable with one entry a row; variables over the same dimensions become further columns. Left out: amplitude, damping or
+            frequency.
 
         Raises
         ------
@@ -137,7 +138,7 @@ class Result:
         number: int = 0,
         amplitude_mm: float | None = None,
     ) -> tuple[Path, ...]:
-        """Write how every node moves at the peak of a forced response, in a nonlinear mode or a limit cycle, for another program; return the files.
+        """Write the motion of every node for another program; return the files.
 
         Parameters
         ----------
@@ -146,31 +147,31 @@ class Result:
             ``harmonics.vtu``; ``frd``: harmonics for CalculiX's viewer; ``uff``: deflection shapes and response functions for test
             software.
         folder
-            Made where it is not there; left out: a folder such as ``vtu_0`` or ``vtu_0_wheel`` beside the result's file.
+            Created if missing; left out: a folder such as ``vtu_0`` or ``vtu_0_wheel`` beside the result's file.
         case
             Position among the cases of [vary].
         hz
             The converged point of the response nearest to this frequency; None: the peak.
         steps
-            Instants of the period.
+            Number of instants in the period.
         wheel
-            Whether all sectors of a tuned wheel are written, not one; a wheel whose sectors differ is always written whole.
+            Whether all sectors of a tuned wheel are written instead of one. A mistuned wheel is always written whole.
         units
-            Of an ``frd`` file, such as ``mm-t-s``.
+            Unit system of an ``frd`` file, such as ``mm-t-s``.
         of
-            The model that was asked, where it was made in Python; of a study it is made again from the study's text and files: the
-            folder of these, where the result has been moved away from it.
+            The model, if it was made in Python. The model of a study is built again from the study's text and files; give their folder if
+            the result has been moved.
         analysis
-            ``forced_response``, ``nonlinear_mode`` or ``limit_cycle``; left out: the first of these that the result has.
+            ``forced_response``, ``nonlinear_mode`` or ``limit_cycle``; left out: the first of these in the result.
         number
-            Which nonlinear mode or limit cycle of the case, from 0 in the order of the result.
+            Index of the nonlinear mode or limit cycle in the case, from 0 in the order of the result.
         amplitude_mm
-            The motion of the nonlinear mode nearest to this amplitude of its output; None: the most damped one.
+            The motion of the nonlinear mode nearest to this amplitude of its output; None: the motion with the highest damping.
 
         Raises
         ------
         InputError
-            If there is no such motion, or the model is no longer the one that was asked.
+            If there is no such motion, or the model has changed since the run.
         """
         place = None if folder is None else Path(folder)
         source = Path(of) if isinstance(of, str) else of
@@ -179,12 +180,12 @@ class Result:
             return export_result(self.data, self.path, place, wanted, source)
 
     def report(self, path: str | Path | None = None) -> Path:
-        """Write the page of all figures and tables; return it.
+        """Write the page of all figures and tables; return its path.
 
         Parameters
         ----------
         path
-            The page; left out: ``report.html`` beside the result's file, or here.
+            The page; left out: ``report.html`` beside the result's file, or in the current folder.
         """
         folder = Path() if self.path is None else self.path.parent
         target = folder / "report.html" if path is None else Path(path)
@@ -215,7 +216,7 @@ class Result:
 
     @property
     def peaks(self) -> Table:
-        """The peak of each case of the forced response, or the frequencies of all modes where there is none."""
+        """The peak of each case of the forced response; without one, the natural frequencies."""
         if "forced_response" in self.data.children:
             return _peaks(self.data["forced_response"].to_dataset())
         name = next((n for n in ("modes", "safe") if n in self.data.children), None)
@@ -223,27 +224,27 @@ class Result:
 
     @property
     def measured(self) -> Table:
-        """The measured peaks that the study names, as they were read, in SI units and Hz; empty where it names none."""
+        """The measured peaks named by the study, in SI units and Hz; empty if the study names none."""
         name = "forced_response"
         return _measured(self.data[name].to_dataset()) if name in self.data.children else Table({})
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """What is to be trusted, and what not, why, and what to do: of each case, and of its points where they differ from it."""
+        """Verdicts on each case, and on points whose verdict differs: level, reason and remedy."""
         return of_tree(self.data)
 
     @property
     def not_trusted(self) -> str:
-        """A line that says which cases are doubtful or wrong; empty where all are trusted."""
+        """A line that names the doubtful and wrong cases; empty if all are trusted."""
         return not_trusted(self.data)
 
     @property
     def conclusion(self) -> str:
-        """The last line of a run: `not_trusted`, or that every answer is trusted and how many single points are not."""
+        """The last line of a run: `not_trusted`, or the statement that every answer is trusted, with the number of single points that are not."""
         return conclusion(self.data)
 
     def saved(self, folder: Path) -> "Result":
-        """Return the result with a file in a folder, which is made."""
+        """Write the result into a folder, which is created if missing; return the result with its file."""
         folder.mkdir(parents=True, exist_ok=True)
         return replace(self, path=self.save(folder))
 

@@ -1,4 +1,4 @@
-"""Progress: on the terminal a bar, or plain lines where there is none; in a notebook one output with a line for each job."""
+"""Progress display: bars on a terminal, plain lines without one, and one output with a line a job in a notebook."""
 
 import logging
 import sys
@@ -24,18 +24,18 @@ _WIDTH = 24  # characters of a bar
 
 
 def in_notebook() -> bool:
-    """Whether a kernel with a display of its own runs this: Jupyter, not IPython on a terminal."""
+    """Whether the code runs in Jupyter; false for IPython on a terminal."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return shell is not None and hasattr(shell, "kernel")
 
 
 class NotebookScreen(logging.Handler):
-    """Draws records of progress as bars in one output, with warnings below; all other lines are passed over.
+    """Draws progress records as bars in one output, with warnings below; ignores all other lines.
 
     Parameters
     ----------
     handle
-        Of IPython, with ``update``; a test gives its own.
+        Display handle of IPython, with ``update``; tests pass their own.
     """
 
     def __init__(self, handle: Any = None) -> None:
@@ -46,7 +46,7 @@ class NotebookScreen(logging.Handler):
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """Draw while the block runs, and the last state after it."""
+        """Draw while the block runs, and once more at its end."""
         yield
         self._draw()
 
@@ -88,18 +88,18 @@ class NotebookScreen(logging.Handler):
 
 
 class Screen(logging.Handler):
-    """Draws a bar for each job at work and leaves a line of it when it is done; writes all that belongs to no job as lines.
+    """Draws a bar for each running job and one line for each finished job; prints lines that belong to no job.
 
     Parameters
     ----------
     console
-        Where to write; where it is no terminal, lines stand in place of bars.
+        Where to write. If it is no terminal, lines replace bars.
     bars
-        Most bars at a time: one a worker.
+        Largest number of bars, one a worker.
     warnings
-        Whether to write warnings and verdicts: not where they are listed at the end.
+        Whether to print warnings and verdicts; false if they are listed at the end.
     verbose
-        Whether to write what jobs say on their way, too, as the log of a run has it.
+        Whether to print the messages of running jobs too, as the log file does.
     """
 
     def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False) -> None:
@@ -186,7 +186,7 @@ class Screen(logging.Handler):
 
 @contextmanager
 def on_screen(screen: Screen | NotebookScreen) -> Iterator[None]:
-    """Send what the package says to a screen while the block runs."""
+    """Show the log messages of the package on a screen while the block runs."""
     level = LOG.level
     LOG.addHandler(screen)
     if level == logging.NOTSET:
@@ -202,7 +202,7 @@ def on_screen(screen: Screen | NotebookScreen) -> Iterator[None]:
 
 @contextmanager
 def by_default(workers: int = 1) -> Iterator[None]:
-    """Show progress on stderr, or in the output of a notebook, unless the user has said where it goes: a handler of the root or of this package's logger."""
+    """Show progress on stderr or in the notebook, unless the user has given a log handler to the root or to this package."""
     if logging.getLogger().handlers or LOG.handlers:
         yield
         return

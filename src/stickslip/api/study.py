@@ -40,7 +40,7 @@ class Study:
     Parameters
     ----------
     content
-        What the file says, read and found good.
+        The validated content of the file.
     """
 
     content: Content
@@ -58,12 +58,12 @@ class Study:
 
     @property
     def folder(self) -> Path:
-        """Where results go."""
+        """Folder of the results."""
         return self.content.folder
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Labels of what [vary] spans; one empty label without it."""
+        """Labels of the cases of [vary]; one empty label without it."""
         return tuple(case.label for case in self.content.file.cases)
 
     def run(
@@ -78,10 +78,10 @@ class Study:
         executor: str | Executor = "",
         shard: str | None = None,
     ) -> Result:
-        """Answer the questions of the study, going on from what an interrupted run has finished.
+        """Answer the questions of the study. An interrupted run continues with the unfinished jobs.
 
-        BLAS takes one thread meanwhile, as in the command, so that the bits are the same: that of the wheels of NumPy and SciPy,
-        where no environment variable says otherwise. For another BLAS say OMP_NUM_THREADS=1 before NumPy is imported.
+        During the run BLAS uses one thread, as on the command line, so that results agree to the last bit. This works for the BLAS in the wheels
+        of NumPy and SciPy, unless an environment variable sets a number. For another BLAS set OMP_NUM_THREADS=1 before NumPy is imported.
 
         Parameters
         ----------
@@ -90,22 +90,21 @@ class Study:
         only
             Names of the analyses to answer; all of the study if empty.
         fresh
-            Forget what the results folder holds.
+            Delete earlier results and start again.
         verify, verify_harmonics
             Compare with time integration, and with twice as many harmonics.
         folder
-            Where results go; left out: where the study says.
+            Folder of the results; left out: as the study says.
         executor
-            What the jobs are given to: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or any
-            executor like those of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask client. Machines
-            share the folder.
+            Executor of the jobs: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or any executor like those
+            of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask client. All machines use the same folder.
         shard
-            ``"2/5"``: the second of five runs that share the jobs, each started by itself.
+            ``"2/5"``: the second of five runs that share the jobs. Each run is started by itself.
 
         Raises
         ------
         InputError
-            If the study, its files or its folder do not allow a run; before anything long is computed.
+            If the study, its files or its folder do not allow a run; raised before any long computation.
         """
         asked = {IN_TIME: verify, HARMONICS: verify_harmonics}
         checks = [name for name, wanted in asked.items() if wanted]
@@ -132,7 +131,7 @@ class Study:
             return tuple(check_study(self.content))
 
     def replace(self, values: Mapping[str, Any]) -> "Study":
-        """Return the study with other values of some keys; its results go to a folder of their own.
+        """Return the study with other values of some keys. Its results go to a folder of their own.
 
         Parameters
         ----------
@@ -142,7 +141,7 @@ class Study:
         Raises
         ------
         InputError
-            If there is no such key, its value is refused, or it is varied: then replace ``vary``.
+            If a key is unknown, a value is refused, or the key is varied; then replace ``vary``.
         """
         said = [f"{key} = {value!r}" for key, value in sorted(values.items())]
         mark = sha256("\n".join(said).encode()).hexdigest()[:8]
@@ -152,7 +151,7 @@ class Study:
         return Study(replace(changed, file=replace(changed.file, text=text)))
 
     def model(self, case: int = 0) -> Model:
-        """Return the model of a case, which answers questions itself."""
+        """Return the model of a case, with a method for each analysis."""
         made = self.content.model(case)
         return Model(**{f.name: getattr(made, f.name) for f in fields(made)})
 

@@ -21,7 +21,7 @@ class Table:
     Parameters
     ----------
     columns
-        By name; units stand in the names.
+        Name -> values (n,); the unit is part of the name.
     """
 
     columns: Mapping[str, npt.NDArray[Any]]
@@ -68,16 +68,16 @@ _CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_
 
 
 def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
-    """Return a variable and all that belongs to its entries, a row an entry; entries that are not there are left out, and verdicts and states are words.
+    """Return a variable and those over its dimensions, one row an entry. Missing entries are left out; verdicts and states become words.
 
     Parameters
     ----------
     data
-        Of one analysis.
+        Dataset of one analysis.
     name
-        Of the analysis, for messages.
+        Name of the analysis, for messages.
     of
-        The variable; empty for the chief one.
+        The variable; empty: the main variable of the analysis.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The cases that [vary] spans, as pages name and colour them."""
+"""Cases of [vary]: their names and colours on the page."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,11 @@ class ShownCase:
     index
         Position along ``case`` in the dataset.
     label
-        What is varied, with its values; empty for a study without [vary].
+        Varied keys with their values; empty for a study without [vary].
     short
         The values alone, for legends and columns.
     value
-        That of the first varied key that has numbers; NaN without one.
+        Value of the first varied key whose values are numbers; NaN without one.
     excitation
         Amplitude of the harmonic force in N; NaN for none.
     colour
@@ -44,7 +44,7 @@ class ShownCase:
 
     @property
     def named(self) -> str:
-        """The beginning of one: ``key = value``, or ``the response``."""
+        """The subject of a sentence about this case: ``key = value``, or ``the response``."""
         return self.label or "the response"
 
 
@@ -54,7 +54,7 @@ def varied(data: xr.Dataset) -> str:
 
 
 def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
-    """Return the first varied key whose values are numbers, and its values (case,); NaN without one."""
+    """Return the first varied key whose values are numbers, and its values (case,); NaN if there is none."""
     key, values = first_varied_number(data)
     return key, values
 

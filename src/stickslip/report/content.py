@@ -15,11 +15,11 @@ class Table:
     Parameters
     ----------
     head
-        Of the columns; empty for a list of facts.
+        Headings of the columns; empty for a list of facts.
     rows
-        As many cells each.
+        One cell a column in each row.
     heading
-        Above it; empty for none.
+        Heading above the table; empty for none.
     told
         Paragraphs between the heading and the table.
     numeric
@@ -29,7 +29,7 @@ class Table:
     items
         Sentences listed below it.
     folded
-        What is said while the table is folded away; empty where it is open.
+        Line shown while the table is folded away; empty for an open table.
     """
 
     head: Sequence[str]
@@ -51,13 +51,13 @@ class Words:
     told
         Paragraphs.
     heading
-        Above them; empty for none.
+        Heading above the paragraphs; empty for none.
     items
         Sentences listed below them.
     folded
-        What is said while all of it is folded away; empty where it is open.
+        Line shown while all of it is folded away; empty for an open text.
     preformatted
-        Lines below all else that are shown as they are.
+        Lines below the list, shown as they are.
     """
 
     told: Sequence[str] = ()
@@ -69,7 +69,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Chooser:
-    """Buttons that choose the case of what stands below."""
+    """Buttons that choose the case shown below them."""
 
     heading: str
     cases: tuple[ShownCase, ...]
@@ -77,5 +77,5 @@ class Chooser:
 
 
 def chooser(heading: str, cases: tuple[ShownCase, ...], chosen: int) -> Chooser | None:
-    """Return buttons that choose a case; None where there is no choice."""
+    """Return buttons that choose a case; None for a single case."""
     return Chooser(heading, cases, chosen) if len(cases) > 1 else None

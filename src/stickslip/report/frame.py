@@ -36,7 +36,7 @@ Kind = Literal["figure", "table", "words", "chooser"]
 
 @dataclass(frozen=True)
 class Placed:
-    """Something in its place on the page; a figure has its number, its drawing, and whether it scrolls on a narrow screen."""
+    """One element of the page. A figure has a number, a drawing, and a mark whether it scrolls on a narrow screen."""
 
     own: Content
     kind: Kind
@@ -47,7 +47,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class CaseBody:
-    """What a chapter shows while a case is chosen."""
+    """Content of a chapter while one case is chosen."""
 
     index: int
     label: str
@@ -56,7 +56,7 @@ class CaseBody:
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter of the page: what it shows of all cases, then of each."""
+    """A chapter of the page: the content common to all cases, then the content of each case."""
 
     key: str
     title: str
@@ -67,7 +67,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Told:
-    """A verdict, and where others of its kind are, which follow after the first of each kind."""
+    """A verdict; the first of its kind also names the places of the others."""
 
     verdict: Verdict
     likewise: str = ""
@@ -75,7 +75,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What is not trusted, why, and what to do, the worst first; and what is trusted."""
+    """Head of the page: verdicts with a doubt, a warning or a remedy, the worst first; then the trusted answers."""
 
     told: str
     kind: Literal["good", "some", "bad"]
@@ -85,12 +85,12 @@ class Conclusion:
 
 @dataclass
 class Placing:
-    """Numbers the figures of a page."""
+    """Numbers the figures of a page in their order."""
 
     figures: int = field(default=0)
 
     def __call__(self, contents: Iterable[Content]) -> list[Placed]:
-        """Return the contents in their places."""
+        """Return the contents as elements of the page, figures with number and drawing."""
         return [self._placed(own) for own in contents]
 
     def _placed(self, own: Content) -> Placed:
@@ -134,9 +134,9 @@ def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusio
     Parameters
     ----------
     verdicts
-        All of a result.
+        All verdicts of the result.
     told
-        The conclusion, as the last line of a run says it.
+        The conclusion: last line of a run on the terminal.
     bad
         Whether a case or an analysis is not trusted.
     """
@@ -151,7 +151,7 @@ def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusio
 
 
 def anchor(key: str) -> str:
-    """Return a name as part of an anchor: names of bodies may hold anything."""
+    """Return a name as part of an anchor; names of bodies may contain any character."""
     return re.sub(r"[^\w-]", "_", key)
 
 
@@ -189,13 +189,13 @@ def page_html(
     Parameters
     ----------
     title, made
-        Its heading and the line below it.
+        Heading of the page, and the line below it.
     chapters
-        In their order.
+        Chapters in the order of the page.
     cards
         Boxes at the top.
     conclusion
-        What is trusted and what is not, above all else.
+        Verdicts above all else; None for a page without verdicts.
     """
     return (
         _templates()
@@ -218,5 +218,5 @@ def _asset(name: str) -> Markup:
 
 
 def write_page(page: str, path: Path) -> None:
-    """Write a page whole or not at all; an `InputError` says why it cannot be."""
+    """Write a page atomically; an `InputError` names the reason if the file cannot be written."""
     write_whole(path, page.encode("utf-8", errors="replace"))

@@ -65,7 +65,7 @@ def write_loop_page(fit: LoopFit, source: Path, target: Path, estimates: Sequenc
     target
         The page; its folder must exist.
     estimates, lines
-        Estimates, and lines for a study file, as the terminal has them.
+        Estimates, and lines for a study file, as shown on the terminal.
     """
     n = counted(sum(x.size for x, _ in fit.loops), "sample")
     caption = f"Left: the measured loop and the law walked along its displacements. Right: what is left, {number(fit.residual)} N as a standard deviation over {n}."

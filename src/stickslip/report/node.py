@@ -1,4 +1,4 @@
-"""An analysis of a result as figures and tables see it: a dataset, and the few things that each of them asks of it."""
+"""The dataset of one analysis, with the accesses that figures and tables need."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,16 +16,16 @@ class Node:
     Parameters
     ----------
     data
-        Its variables, and the attributes of the whole result with its own over them.
+        Variables of the analysis. Its attributes are those of the whole result, overridden by its own.
     key
-        Added to the names of its figures where each case has its own: empty for the first case.
+        Suffix of figure names where each case has figures of its own; empty for the first case.
     """
 
     data: xr.Dataset
     key: str = ""
 
     def has(self, *names: str) -> bool:
-        """Say whether all the variables are there and none is empty."""
+        """Say whether all the variables exist and none is empty."""
         return all(name in self.data and self.data[name].size > 0 for name in names)
 
     def values(self, name: str, *dimensions: str) -> FloatArray:
@@ -42,7 +42,7 @@ class Node:
         return np.asarray(self.data[name].values).astype(np.int64)
 
     def labels(self, dimension: str) -> tuple[str, ...]:
-        """Return the labels of a dimension; numbers where it has none."""
+        """Return the labels of a dimension; running numbers if it has none."""
         if dimension in self.data.coords:
             return tuple(str(v) for v in self.data[dimension].values)
         return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
@@ -52,16 +52,16 @@ class Node:
         return tuple(str(v) for v in self.data[name].values)
 
     def stored(self, name: str) -> Any:
-        """Return a number, list or text that stands as a variable or as an attribute; None where there is none."""
+        """Return a number, list or text stored as a variable or as an attribute; None if there is none."""
         return self.data[name].values if name in self.data else self.data.attrs.get(name)
 
     def text(self, name: str, default: str = "") -> str:
-        """Return what is stored under a name as text."""
+        """Return a stored value as text."""
         value = self.stored(name)
         return default if value is None else str(value)
 
     def numbers(self, name: str) -> FloatArray:
-        """Return what is stored under a name as numbers, empty where it is missing or has none."""
+        """Return a stored value as numbers (n,); empty if it is missing or not numeric."""
         try:
             value = self.stored(name)
             return np.atleast_1d(np.asarray([] if value is None else value, dtype=np.float64))
@@ -69,6 +69,6 @@ class Node:
             return np.zeros(0)
 
     def scalar(self, name: str, default: float = float("nan")) -> float:
-        """Return what is stored under a name as a number, the default where it is missing or no number."""
+        """Return a stored value as a number; the default if it is missing or not numeric."""
         found = self.numbers(name)
         return float(found[0]) if found.size else default

@@ -71,12 +71,12 @@ class Plot:
     figure
         The figure.
     case_captions
-        Case -> words added to the caption while that case is chosen; empty if the figure does not depend
-        on the choice. Traces of such a figure carry the case in ``meta``.
+        Case -> words added to the caption while that case is chosen; empty if the figure does not depend on the choice. Traces of such a
+        figure carry the case in ``meta``.
     chosen
         The case shown first.
     controls
-        HTML above the figure, for scripts that change it; safe to be put into a page as it is.
+        HTML above the figure for scripts that change it; already escaped.
     """
 
     key: str

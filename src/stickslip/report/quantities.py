@@ -61,7 +61,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Write `value` in `unit` with an engineering prefix, e.g. ``12.3 µm``; lengths that no motion of a machine has in words."""
+    """Write `value` in `unit` with an engineering prefix, e.g. ``12.3 µm``; implausibly large lengths as words."""
     if _beyond(value, unit):
         return BEYOND
     scale = scale_for(np.array([value]), unit)
@@ -69,7 +69,7 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def amplitude(value: float, unit: str, digits: int = 4) -> str:
-    """Write an amplitude of an output: a length in mm, as verdicts and the terminal have it; another unit with a prefix."""
+    """Write an amplitude of an output: lengths in mm, as in verdicts and on the terminal; other units with a prefix."""
     if unit != "m" or not math.isfinite(value):
         return quantity(value, unit, digits)
     return BEYOND if _beyond(value, unit) else f"{number(value / MM, digits)} mm"
@@ -81,9 +81,9 @@ def column(values: FloatArray, unit: str, digits: int = 4, *, millimetres: bool 
     Parameters
     ----------
     values, unit, digits
-        In `unit`, which gets the prefix that suits the largest.
+        Values in `unit`; the unit gets the prefix that suits the largest value.
     millimetres
-        Whether lengths are in mm, as verdicts and the terminal have amplitudes.
+        Whether lengths are in mm, as amplitudes are in verdicts and on the terminal.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def _beyond(value: float, unit: str) -> bool:
 
 
 def aligned(values: FloatArray, digits: int = 4) -> list[str]:
-    """Write numbers of one column with the same decimals; the smallest keeps two digits where five decimals do."""
+    """Write numbers of one column with the same decimals, at most five; the smallest keeps two digits if these suffice."""
     sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not sizes.size:
         return [fixed(float(v), 0) for v in values]
@@ -112,7 +112,7 @@ def aligned(values: FloatArray, digits: int = 4) -> list[str]:
 
 
 def percent(value: float, digits: int = 2) -> str:
-    """Write a value in percent; what is below a ten thousandth, or beyond any use, is said to be so."""
+    """Write a value in percent; values below 0.0001 % and very large ones become bounds, as ``< 0.0001 %``."""
     if math.isfinite(value) and 0 < abs(value) < 1e-4:
         return "< 0.0001 %"
     if math.isfinite(value) and value > LARGEST_PERCENT:
@@ -121,7 +121,7 @@ def percent(value: float, digits: int = 2) -> str:
 
 
 def predicted(error: float) -> str:
-    """Write a predicted change in percent: a linear prediction beyond the motion itself has no digits worth telling."""
+    """Write a predicted change in percent; above 100 % as ``over 100 %``, since the prediction is linear."""
     return "over 100 %" if error > 100.0 else percent(error)
 
 
@@ -133,7 +133,7 @@ def joined(words: list[str]) -> str:
 
 
 def runs(numbers: list[int]) -> str:
-    """Write rising whole numbers, three and more in a row as a range: ``2, 4, 10 to 41``."""
+    """Write ascending whole numbers; three or more in a row become a range: ``2, 4, 10 to 41``."""
     found: list[list[int]] = []
     for n in numbers:
         if found and n == found[-1][-1] + 1:

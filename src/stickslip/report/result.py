@@ -32,13 +32,13 @@ def open_result(path: Path) -> xr.DataTree:
 
 
 def analysis(tree: xr.DataTree, name: str) -> xr.Dataset:
-    """Return the dataset of an analysis, with the attributes of the result where it has none of its own."""
+    """Return the dataset of an analysis; attributes that it lacks come from the root of the result."""
     node = tree[name]
     return node.to_dataset().assign_attrs({**tree.attrs, **node.attrs})
 
 
 def versions(stored: str) -> dict[str, str]:
-    """Return the versions of libraries from the JSON that results hold."""
+    """Return library versions from the JSON text in the result."""
     try:
         found = json.loads(stored)
     except json.JSONDecodeError:

@@ -16,7 +16,7 @@ Part = Callable[[Any], Shown]  # of a view of the dataset
 
 @dataclass(frozen=True)
 class Card:
-    """A box at the top of the page: one number, what it is, and more about it; red where it tells of danger."""
+    """A box at the top of the page: a number, its name and a remark; red for danger."""
 
     value: str
     label: str
@@ -31,11 +31,11 @@ class Block:
     Parameters
     ----------
     key
-        Its anchor.
+        Anchor of the chapter.
     title
-        Its heading.
+        Heading of the chapter.
     parts
-        In their order.
+        Figures, tables and texts in the order of the page.
     folded
         Whether only the heading is shown at first.
     """
@@ -52,20 +52,20 @@ def _nothing(_: Any) -> Sequence[Any]:
 
 @dataclass(frozen=True)
 class Section:
-    """All that the page shows of an analysis.
+    """The figures, tables and texts of one analysis on the page.
 
     Parameters
     ----------
     name
-        Of the analysis, its node in the result.
+        Name of the analysis and of its node in the result.
     needs
-        Variables without which there is nothing to show.
+        Variables without which the section is left out.
     view
-        Makes of the dataset what the parts take.
+        Function that turns the dataset into the view; every part takes this view.
     blocks
         Chapters of the page.
     by_case
-        Whether `view` sees one case at a time, so that the blocks are drawn for each.
+        Whether `view` takes one case at a time; the blocks are then drawn once a case.
     cards
         Boxes for the top of the page.
     """

@@ -17,18 +17,18 @@ _BEHIND = 0.2  # cosine of normals below which a neighbour is of another face
 
 
 def patches(position: FloatArray, frame: FloatArray, area: FloatArray, members: Sequence[int]) -> dict[int, FloatArray]:
-    """Return the corners (k, 3) of the patch of each contact point of one contact that has a place and an area.
+    """Return corners (k, 3) of the patch of each contact point with a position and an area, for the points of one contact.
 
     Parameters
     ----------
     position
-        (p, 3).
+        (p, 3) positions.
     frame
         (p, 3, 3) columns t, w, n.
     area
-        (p,) in the square of the unit of the positions; NaN where nothing tells.
+        (p,) areas in the squared unit of the positions; NaN if unknown.
     members
-        The points of the contact.
+        Indices of the contact's points.
     """
     known = np.isfinite(area) & (area > 0) & np.isfinite(position).all(axis=1) & np.isfinite(frame).all(axis=(1, 2))
     own = np.array([k for k in members if known[k]], dtype=np.int64)
@@ -93,6 +93,6 @@ def triangulated(each: Iterable[FloatArray]) -> tuple[FloatArray, IntArray]:
 
 
 def outlines(each: Iterable[FloatArray]) -> FloatArray:
-    """Return the closed rims of all patches as one path with gaps of NaN between them."""
+    """Return the closed outlines of all patches as one path, separated by NaN."""
     rims = [np.vstack([own, own[:1], np.full((1, own.shape[1]), np.nan)]) for own in each]
     return np.vstack(rims) if rims else np.zeros((0, 3))
