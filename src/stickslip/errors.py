@@ -22,13 +22,13 @@ class InputError(StickslipError):
     place
         File, field or object, e.g. ``study.toml: damper.mass_kg``.
     problem
-        What is wrong and the value got, e.g. ``must be positive, got -0.1``.
+        Error and value, e.g. ``must be positive, got -0.1``.
     remedy
-        What to do about it. ``$name`` in it stands for an argument that callers know by names of their own.
+        Advice. ``$name`` stands for an argument whose name depends on the caller.
     words
-        How each of these arguments is called here: ``{"mesh": "mesh=…"}``.
+        Name of each such argument at this caller: ``{"mesh": "mesh=…"}``.
     others
-        Further errors of the same input, each told on a line of its own.
+        Further errors of the same input, one line each in the message.
     """
 
     def __init__(
@@ -45,12 +45,12 @@ class InputError(StickslipError):
 
     @property
     def remedy(self) -> str:
-        """What to do about it, arguments by their names."""
+        """Advice, with the caller's names of arguments."""
         return Template(self.advice).safe_substitute(self.words) if self.words else self.advice
 
     @property
     def argument(self) -> str:
-        """What of an object is wrong, where the place is ``Object.argument``; empty for the object as a whole."""
+        """Wrong argument of an object where the place is ``Object.argument``; empty for the object as a whole."""
         return self.place.partition(".")[2]
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ class InputError(StickslipError):
         return InputError(place, self.problem, self.advice, self.words, self.others)
 
     def inside(self, place: str) -> "InputError":
-        """Return the same errors with `place` before the places they have."""
+        """Return the same errors, each place prefixed by `place`."""
         others = tuple(other.inside(place) for other in self.others)
         return InputError(f"{place}: {self.place}", self.problem, self.advice, self.words, others)
 
@@ -82,12 +82,12 @@ class SingularError(StickslipError):
 
 
 def input_error(place: str, problem: str, remedy: str, **words: str) -> InputError:
-    """Build an `InputError`; `words` are the names of the arguments that the remedy calls ``$name``."""
+    """Build an `InputError`; `words` name the arguments that the remedy calls ``$name``."""
     return InputError(place, problem, remedy, words)
 
 
 def check_choice(place: str, value: object, choices: Collection[str], hint: str = "") -> None:
-    """Raise an `InputError` unless `value` is one of the `choices`; a `hint` takes the place of the list as remedy."""
+    """Raise an `InputError` unless `value` is one of the `choices`; a `hint` replaces the list of choices as remedy."""
     if value in choices:
         return
     known = ", ".join(choices)
@@ -123,7 +123,7 @@ def _capped(lines: list[str]) -> list[str]:
 
 
 def together(errors: Iterable[InputError]) -> InputError:
-    """Return one error that tells of all `errors`, a line each; there is at least one."""
+    """Return one error that lists all `errors` (at least one), a line each."""
     first, *rest = errors
     others = (*first.others, *rest)
     return InputError(first.place, first.problem, first.advice, first.words, others)
@@ -133,9 +133,9 @@ SHORT = 2  # letters of a word of which no other is a slip
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """Return the known word that is nearest to another, whatever its capitals; empty where none is near.
+    """Return the known word nearest to `word`, ignoring case; empty where none is near.
 
-    Of words as short as x, y, z none is nearer than another.
+    Known words of one or two letters are never returned.
     """
     from difflib import get_close_matches
 
@@ -156,7 +156,7 @@ MOST_NAMES = 12  # of sets that a message lists
 
 
 def nearest_and_known(word: str, known: list[str]) -> str:
-    """Return ``did you mean 'word'?`` where a known word is near, and in any case the known ones, or how many more there are."""
+    """Return ``did you mean 'word'?`` where a known word is near, then the list of known words, shortened where it is long."""
     near = did_you_mean(word, known)
     if not near.startswith("Did"):
         near = ""
@@ -177,7 +177,7 @@ def missing_package(package: str, error: Exception, extra: str) -> StickslipErro
     package
         Its name.
     error
-        What the import raised; an `OSError` means that a library of the system is missing.
+        Exception of the import; an `OSError` means that a system library is missing.
     extra
         The extra of this package that installs it.
     """

@@ -37,7 +37,7 @@ class Costs:
     factors
         A new preconditioner.
     array
-        The matrix put together and factorised, or what is left of it without the unknowns that are easily solved for.
+        The assembled matrix and its factors, or its Schur complement where some unknowns are eliminated.
     """
 
     product: float
@@ -63,15 +63,15 @@ class Inverse(Protocol):
 
 
 class Elimination(Protocol):
-    """What is left of a square matrix J of some unknowns after those are eliminated that are easily solved for.
+    """Schur complement S of a square matrix J, after cheap unknowns R are eliminated.
 
-    With these R and the others A it is ``S = J_AA - J_AR J_RR⁻¹ J_RA``. ``J x = b`` is solved by ``S x_A = b_A - J_AR J_RR⁻¹ b_R``. A transposed
-    system is eliminated alike, in the same unknowns.
+    With the remaining unknowns A it is ``S = J_AA - J_AR J_RR⁻¹ J_RA``. ``J x = b`` is solved by ``S x_A = b_A - J_AR J_RR⁻¹ b_R``. For a
+    transposed system the same unknowns are eliminated.
     """
 
     @property
     def size(self) -> int:
-        """Unknowns that are left."""
+        """Number of remaining unknowns A."""
         ...
 
     @property
@@ -84,11 +84,11 @@ class Elimination(Protocol):
         ...
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the right sides (size, j) that are left of `right` (n, j), and ``J_RR⁻¹ b_R`` (n, j), zero at what is left."""
+        """Return the right sides of S (size, j) from `right` (n, j), and ``J_RR⁻¹ b_R`` (n, j), zero in A."""
         ...
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Return ``x_A`` and ``-J_RR⁻¹ J_RA x_A``, (n, j), of what is left, (size, j)."""
+        """Return the (n, j) vectors with ``x_A`` in A and ``-J_RR⁻¹ J_RA x_A`` in R, from x_A (size, j)."""
         ...
 
 
@@ -99,7 +99,7 @@ class Bordered:
     Parameters
     ----------
     jac
-        (n, n) what is inside, which may be bordered itself.
+        (n, n) inner matrix, which may be bordered itself.
     column, row, corner
         (n,), (n,) and a number, or (n, m), (m, n) and (m, m).
     """
@@ -125,13 +125,13 @@ class Bordered:
 
     @property
     def transposed(self) -> "Bordered":
-        """Its transpose."""
+        """Transpose of the bordered matrix."""
         columns, rows, corner = self.borders
         return Bordered(transpose_of(self.jac), rows.T, columns.T, corner.T)
 
     @property
     def flat(self) -> "Bordered":
-        """The same with all borders around the innermost Jacobian."""
+        """The same matrix, nested borders merged into one around the innermost Jacobian."""
         if not isinstance(self.jac, Bordered):
             return self
         inner = self.jac.flat
@@ -145,7 +145,7 @@ class Bordered:
         )
 
     def matvec(self, v: FloatArray) -> FloatArray:
-        """Return its product with `v` (n + m,)."""
+        """Return the product of the matrix with `v` (n + m,)."""
         columns, rows, corner = self.borders
         x, z = np.split(v, [columns.shape[0]])
         return np.append(times(self.jac, x) + columns @ z, rows @ x + corner @ z)
@@ -157,7 +157,7 @@ class Bordered:
         return np.append(transposed_times(self.jac, x) + z @ rows, x @ columns + z @ corner)
 
     def array(self) -> FloatArray | None:
-        """Return it as a new array, in the order LAPACK likes; None if what is inside is known by its products only."""
+        """Return the matrix as a new array in Fortran order; None if the inner matrix is known by its products only."""
         flat = self.flat
         if not isinstance(flat.jac, np.ndarray):
             return None
@@ -185,7 +185,7 @@ def transpose_of(jac: Jacobian) -> Jacobian:
 
 
 def array_of(jac: Jacobian) -> FloatArray | None:
-    """Return a Jacobian that is an array, borders included; None for one that is known by its products only."""
+    """Return a Jacobian as an array, borders included; None if it is known by its products only."""
     if isinstance(jac, Bordered):
         return jac.array()
     return jac if isinstance(jac, np.ndarray) else None

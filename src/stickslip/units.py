@@ -19,26 +19,26 @@ _METADATA = "quantity"
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """What a study file says of a field of a dataclass: its key, its unit, what it may be.
+    """Key, unit and allowed values of a dataclass field in a study file.
 
     Parameters
     ----------
     about
-        What it is, without unit and range.
+        Description of the quantity, without unit and range.
     unit
-        Suffix of its key, e.g. ``m``, ``deg``, ``n_per_m``; empty for numbers without one.
+        Suffix of the key, e.g. ``m``, ``deg``, ``n_per_m``; empty for numbers without one.
     key
-        Its key without the unit, where that differs from the field's name.
+        Key without the unit, where it differs from the field's name.
     above, least, below, most
-        What the values, in the key's unit, must exceed, not fall short of, not reach, not exceed.
+        Bounds of the values, in the key's unit: ``> above``, ``>= least``, ``< below``, ``<= most``.
     usual
-        Largest size that a study file takes, in the key's unit: more is a slip of the unit. Python takes more.
+        Largest size that a study file accepts, in the key's unit; larger values are wrong units. Python accepts more.
     entries
         Least and largest number of entries of a list; zeros for any.
     choices
-        The words it may be.
+        Allowed words.
     shared
-        Whether it is shared among the points of an interface: stiffnesses and forces of laws.
+        Whether the value is divided among the points of an interface, as stiffnesses and forces of laws are.
     """
 
     about: str
@@ -60,12 +60,12 @@ class Quantity:
 
     @property
     def factor(self) -> float:
-        """What makes SI of a value in the key's unit."""
+        """Factor from the key's unit to SI."""
         return TO_SI.get(self.unit, 1.0)
 
     @property
     def in_files(self) -> tuple[float | None, float | None]:
-        """Least and largest value that a study file takes, in the key's unit."""
+        """Least and largest value that a study file accepts, in the key's unit."""
         if self.usual is None:
             return self.least, self.most
         lowest = -self.usual if self.above is None and self.least is None else self.least
@@ -73,7 +73,7 @@ class Quantity:
 
     @property
     def limits(self) -> str:
-        """What becomes of "must ...", in SI: ``be positive``, ``lie in [0, 1)``."""
+        """Limits in SI as a phrase after "must": ``be positive``, ``lie in [0, 1)``."""
         if self.choices:
             return f"be one of {', '.join(self.choices)}"
         few, many = self.entries
@@ -96,7 +96,7 @@ class Quantity:
         return "finite" if low is None else f"at least {low:.4g}"
 
     def allows(self, value: Any) -> bool:
-        """Whether a value, in SI, or all entries of a list of them keep the limits."""
+        """Whether a value in SI, or each entry of a list, is within the limits."""
         entries = value if isinstance(value, (tuple, list)) else (value,)
         few, many = self.entries
         return (not many or few <= len(entries) <= many) and all(map(self._allows_one, entries))
@@ -123,7 +123,7 @@ _ANY = Quantity(about="")
 
 
 def millimetres(size: float, digits: int = 4) -> str:
-    """Return an amplitude (m) in millimetres for a sentence; in words where it is no number, or none that a machine can have."""
+    """Return an amplitude (m) in millimetres for a sentence; in words where it is NaN or implausibly large."""
     return _beyond(size) or f"{1e3 * size:.{digits}g} mm"
 
 
@@ -146,7 +146,7 @@ def _beyond(size: float) -> str:
 
 
 def quantity(about: str, unit: str = "", *, default: Any = MISSING, **limits: Any) -> Any:
-    """Return a dataclass field that a study file can make a key of; `limits` are further fields of `Quantity`."""
+    """Return a dataclass field that becomes a key of the study file; `limits` are further fields of `Quantity`."""
     return field(default=default, metadata={_METADATA: Quantity(about=about, unit=unit, **limits)})
 
 
@@ -156,7 +156,7 @@ def length(about: str, default: Any = MISSING, *, usual: float = 100, **limits: 
 
 
 def angle(about: str, degrees: float, **limits: Any) -> Any:
-    """Return the field of an angle in rad, with its default in degrees; so are the limits."""
+    """Return the field of an angle in rad, its default and limits in degrees."""
     return quantity(about, "deg", default=math.radians(degrees), **limits)
 
 
@@ -166,17 +166,17 @@ def table(about: str) -> dict[str, Quantity]:
 
 
 def quantity_of(entry: Field[Any]) -> Quantity | None:
-    """Return what `quantity` put down of a dataclass's field; None for other fields."""
+    """Return the `Quantity` of a dataclass field; None for other fields."""
     return entry.metadata.get(_METADATA)
 
 
 def check_quantities(given: Any) -> None:
-    """Check the numbers of a dataclass: what its quantities allow; others are to be finite.
+    """Check that the numbers of a dataclass are within the limits of their quantities; other numbers must be finite.
 
     Raises
     ------
     InputError
-        For the first field that is not.
+        For the first field that fails.
     """
     for entry in fields(given):
         known, value = quantity_of(entry) or _ANY, getattr(given, entry.name)

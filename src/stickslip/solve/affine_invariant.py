@@ -19,10 +19,10 @@ class NaturalLevel:
 
     A step is measured by the correction that the same factors give at its end, and not by the residual there. A contact that changes its
     state raises the residual by the stiffness of the contact times the motion, however near the solution is; a correction is the
-    distance to the solution itself. It costs a back substitution a trial. Where even the shortest step fails the test it ends beyond
-    a kink, whose far side has a Jacobian of its own, and is taken; after a few of these in a row there is no going on.
+    distance to the solution itself. Each trial costs a back substitution. If even the shortest step fails the test,
+    a kink lies within it, and the far side has its own Jacobian: the step is accepted. The iteration stops after a few such steps in a row.
 
-    For starts near a solution. From far away, or where the Jacobian is nearly singular, the other globalisations come through more often.
+    Use it for starts near a solution. From far away, or where the Jacobian is nearly singular, the other globalisations converge more often.
     """
 
     def __init__(self) -> None:

@@ -50,7 +50,7 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepControl:
-    """How far a branch is followed in one step.
+    """Step control of a continuation.
 
     Length is measured in changes of x relative to its own size and in changes of p relative to `scale`.
 
@@ -61,9 +61,9 @@ class StepControl:
     first, smallest, largest
         Step lengths.
     max_points
-        Where to stop a branch that does not reach its end.
+        Number of points after which a branch ends that has not reached its end.
     growth
-        Factor on the step after a correction that took a single Newton step where the branch hardly turned.
+        Factor on the step length after a correction with a single Newton step on a nearly straight piece of the branch.
     """
 
     scale: float
@@ -76,7 +76,7 @@ class StepControl:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Following:
-    """How a branch is followed: corrector, steps, and what makes length.
+    """Options of a continuation: corrector, step control, measure of length.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ class Following:
     weights
         (n,) share of each unknown in the length of a step.
     parametrisation
-        What a step prescribes: ``arc_length``: the way along the direction of travel (Keller 1977); ``local``: the unknown, or p, that
-        changes most (Rheinboldt & Burkardt 1983); ``natural``: p, which stops at folds with `Status.STEP_TOO_SMALL`.
+        Quantity that a step prescribes. ``arc_length``: the distance along the direction of travel (Keller 1977). ``local``: the unknown, or p,
+        that changes most (Rheinboldt & Burkardt 1983). ``natural``: p; the branch ends at a fold with `Status.STEP_TOO_SMALL`.
     predictor
-        Direction of travel: ``tangent``, which costs a linear system a point at most and sees corners and folds at once; or ``secant`` through
-        the last two points, which costs nothing; or ``parabola``: the tangent, bent as the branch was between the last two points.
+        Direction of travel. ``tangent`` costs at most one linear system a point and detects corners and folds at once. ``secant`` through
+        the last two points costs nothing. ``parabola`` adds to the tangent the curvature between the last two points.
     corrector
-        ``newton``, or ``kept_factors``: Newton steps whose factors are kept while they serve, for the tangent too where the branch hardly turned.
-        It gives up early, for a shorter step; the shortest ones are left to Newton.
+        ``newton``, or ``kept_factors``: Newton steps that reuse factors while they converge, also for the tangent where the branch hardly turned.
+        The latter gives up early, and a shorter step follows; the shortest steps use ``newton``.
     """
 
     newton: Newton
@@ -111,26 +111,26 @@ class Following:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point of a branch with all that is needed to go on from it.
+    """A point of a branch, with all data to continue from it.
 
     Attributes
     ----------
     x, p
         The solution and its parameter.
     tangent
-        (n + 1,) direction of travel, unit length in the measure of the step control; the last entry is that of p. With the predictor
-        ``secant`` it points from the point before to this one.
+        (n + 1,) direction of travel, unit length in the measure of the step control; the last entry belongs to p. With the predictor
+        ``secant`` it is the direction from the previous point.
     step
         Length of the next step.
     solution
-        How Newton ended; x is a solution only if its status says so.
+        Result of the corrector; x is a solution only if its status says so.
     orientation
-        Sign of the determinant of the Jacobian bordered by the tangent; it stays the same along a path. 0 where it was not asked for
-        (secants), NaN where the linear solver cannot tell.
+        Sign of the determinant of the Jacobian bordered by the tangent; it is constant along a path. 0 where it was not computed
+        (secants), NaN where the linear solver gives no determinant.
     mark
-        Name of the mark that was located here; empty for the points of the steps themselves.
+        Name of the event located here; empty for points of regular steps.
     bend
-        (n + 1,) half the change of the direction over the length of the last step, for the predictor ``parabola``; None where it is unknown.
+        (n + 1,) half the change of direction divided by the length of the last step, for the predictor ``parabola``; None where unknown.
     """
 
     x: FloatArray
@@ -150,7 +150,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """Weights (n + 1,) of x and p that make lengths."""
+    """Norm of steps, by weights (n + 1,) of x and p."""
 
     weights: FloatArray
 
@@ -164,7 +164,7 @@ class Measure:
         return math.sqrt(self.row(vector) @ vector)
 
     def row(self, vector: FloatArray) -> FloatArray:
-        """Return the row whose product with another vector is their inner product."""
+        """Return the row (n + 1,) whose product with a second vector is the inner product of both."""
         return self.weights**2 * vector
 
     def cosine(self, a: FloatArray, b: FloatArray) -> float:
@@ -173,7 +173,7 @@ class Measure:
 
 
 def measure_at(x: FloatArray, following: Following) -> Measure:
-    """Return how lengths are measured near `x`: changes of x by its own size, changes of p by the scale of the step control."""
+    """Return the measure of length near `x`: changes of x relative to its size, changes of p relative to the scale of the step control."""
     own = following.weights
     weights = np.empty(own.size + 1)
     weights[-1] = 1.0 / following.control.scale
@@ -204,9 +204,9 @@ def tangent_at(
     previous
         (n + 1,) direction of travel so far.
     following
-        What makes length, and the linear solver.
+        Measure of length, and linear solver.
     at
-        The equation at `y` where that is known; it is evaluated otherwise.
+        The evaluation at `y` where it is known; None: it is made here.
     """
     measure = measure_at(y[:-1], following)
     if at is None:
@@ -221,9 +221,9 @@ def tangent_at(
 
 @dataclass(eq=False)
 class Latest:
-    """A problem that remembers its latest evaluation: where a corrector ends, the tangent asks for the same Jacobian again.
+    """A problem that remembers its latest evaluation: the tangent needs the Jacobian of the last iterate of the corrector.
 
-    A corrector leaves the Jacobian of the iterate at which it has converged as it is.
+    A corrector does not overwrite the Jacobian of its converged iterate.
     """
 
     problem: Problem
@@ -244,5 +244,5 @@ class Latest:
 
 
 def reversed_point(point: Point) -> Point:
-    """Return the point looking the other way along its branch, which is bent to the same side."""
+    """Return the point with the opposite direction of travel; the curvature is unchanged."""
     return replace(point, tangent=-point.tangent, orientation=-point.orientation)

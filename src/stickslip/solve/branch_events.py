@@ -14,16 +14,16 @@ from stickslip.solve.steps import across
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """Something to find where a function of the points of a branch changes its sign.
+    """An event of a branch: a sign change of a function of its points.
 
     Parameters
     ----------
     name
-        Given to the points located, as their `mark`.
+        Name, which becomes the `mark` of located points.
     value
-        A number for a point of the branch; its tangent is the true one there, whatever the predictor.
+        The function of a point of the branch; the point's tangent is the true one, whatever the predictor.
     tolerance
-        Length along the branch to which the mark is located.
+        Accuracy of the location, a length along the branch.
     """
 
     name: str
@@ -45,10 +45,10 @@ class _LostError(Exception):
 
 
 def located(problem: Problem, before: Point, after: Point, mark: Mark, following: Following) -> Point:
-    """Locate a mark between two neighbouring points of a branch.
+    """Locate an event between two neighbouring points of a branch.
 
-    The branch between them is solved on planes normal to the chord. It meets all of these, whatever corners it has; where the function
-    jumps, as the tangent does at a corner, the place of the jump is found.
+    Points between them are solved on planes normal to the chord, which the branch meets even where it has corners. If the function
+    jumps, as the tangent does at a corner, the location of the jump is found.
 
     Parameters
     ----------
@@ -57,15 +57,15 @@ def located(problem: Problem, before: Point, after: Point, mark: Mark, following
     before, after
         Points with values of different sign, with their tangents.
     mark
-        What to look for.
+        The event.
     following
         Corrector and measure of length.
 
     Returns
     -------
     Point
-        The point where the value is zero or jumps, named after the mark. If the corrector fails in between, a point with its status and
-        the state it came from.
+        The point where the value is zero or jumps, with the name of the event. If the corrector fails in between, a point with the status of the
+        failure and the state before it.
     """
     spent: list[Solution] = []
     try:
@@ -150,9 +150,9 @@ def with_tangent(problem: Problem, point: Point, following: Following) -> Point:
 
 
 def between(problem: Problem, before: Point, after: Point, marks: Sequence[Mark], following: Following) -> list[Point]:
-    """Return the marks between two neighbouring points of a branch, located, in the order of travel.
+    """Locate the events between two neighbouring points of a branch; return them in the order of travel.
 
-    A function that changes its sign twice between two points leaves no trace and no mark: take shorter steps.
+    A function that changes its sign twice between two points is missed: take shorter steps.
     """
     if not after.solution.status.converged:
         return []

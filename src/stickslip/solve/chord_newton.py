@@ -25,22 +25,22 @@ REFUSED = 2  # trials of one correction after which something else is tried
 
 
 class KeptFactors:
-    """Newton steps and corrections by the factors of the last one, for starts near a solution.
+    """Newton steps, each followed by corrections with the same factors, for starts near a solution.
 
     Parameters
     ----------
     tolerance
-        Of the corrector: corrections end where the residual is as small.
+        Tolerance of the corrector, at which corrections end.
     then
-        What goes on after a few refused trials, or where the Jacobian is not factorised; None: the correction is given up after them, for a shorter step along
-        a branch costs less.
+        Globalisation that takes over after a few refused trials, or where the Jacobian is not factorised. None: the correction is given up, as a
+        shorter step along a branch costs less.
     known
-        Factors of a Jacobian nearby, which are tried first.
+        Factors of a nearby Jacobian, which are tried first.
 
     Attributes
     ----------
     inverse
-        The last factors where corrections by them ended at a solution; None before, and where a new Jacobian is asked for.
+        The last factors, if corrections with them ended at a solution; None before, and where a new Jacobian is needed.
     """
 
     def __init__(self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None) -> None:

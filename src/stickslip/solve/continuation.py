@@ -52,7 +52,7 @@ STEPS_BETWEEN = 150  # Newton steps on the way from one value of the parameter t
 
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
-    """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
+    """Solve at fixed `p` from the guess `x`; return the point with its tangent towards growing p."""
     latest = problem if isinstance(problem, Latest) else Latest(problem)
     factors = LastFactors(following.newton.linear)
     solution = newton(lambda v: latest.linearise(v, p), x, following.newton, linear=factors)
@@ -82,18 +82,18 @@ def trace(
     start
         A converged point with its tangent; it is not yielded again.
     end
-        Parameter value of the last point, which is solved exactly there.
+        Parameter value of the last point.
     following
         Corrector, step control, weights.
     marks
-        What to locate on the way, `FOLD` among others.
+        Events to locate, such as `FOLD`.
 
     Yields
     ------
     Point
-        Each point that was reached, until the end or `max_points`; between two points the marks located there, named in their `mark`,
-        which do not change the steps. If no step, however short, converges, a last point with status `Status.STEP_TOO_SMALL` and
-        the state it came from.
+        Each computed point, until the end or `max_points`. Located events lie between the points of steps, carry their name in `mark`
+        and do not change the steps. If no step, however short, converges, the last point has the status `Status.STEP_TOO_SMALL` and
+        the state before the failed step.
     """
     point = start
     seen = with_tangent(problem, point, following) if marks else point
@@ -110,7 +110,7 @@ def trace(
 def advance(problem: Problem, point: Point, end: float, following: Following) -> Point:
     """Take one step from `point` along its branch; see `trace`.
 
-    The rung of its solution is at least `Rung.SHORTER_STEP` if a longer step did not converge.
+    The rung of the point's solution is at least `Rung.SHORTER_STEP` if a longer step did not converge.
     """
     control = following.control
     measure = measure_at(point.x, following)
@@ -144,15 +144,15 @@ def _with_cost(point: Point, spent: list[Solution], rung: Rung = Rung.FULL_STEPS
 
 
 def step_to(problem: Problem, point: Point, p: float, following: Following, steps: int = STEPS_BETWEEN) -> Point:
-    """Go from `point`, whose tangent shows growing p, to the value `p`: one predicted step, or the branch between.
+    """Go from `point`, whose tangent points to growing p, to the value `p`, in one predicted step or else along the branch.
 
-    The branch is left after so many Newton `steps`, and where it leads away.
+    The branch is abandoned after `steps` Newton steps, and where it leads away from `p`.
 
     Returns
     -------
     Point
-        The point at `p`, its tangent showing growing p; if neither way converges, one at `p` with the status of the direct
-        attempt and its last iterate.
+        The point at `p`, its tangent pointing to growing p. If neither way converges, a point at `p` with the status and the last
+        iterate of the predicted step.
     """
     if point.p == p:
         return point

@@ -30,7 +30,7 @@ class _Path:
     singular: bool
 
     def within(self, radius: float) -> tuple[FloatArray, FloatArray]:
-        """Return the last point of the path within `radius`, and the residual of the model there."""
+        """Return the last point of the path within `radius`, and the residual of the linear model there."""
         short = float(np.linalg.norm(self.cauchy))
         if radius <= short or self.singular:
             share = min(radius / short, 1.0)
@@ -48,8 +48,8 @@ class _Path:
 class Dogleg:
     """Trust region with the dogleg path (Powell 1970), lengths measured in columns of the Jacobian (Moré 1978).
 
-    A singular Jacobian is passed along the gradient. The first region holds the whole Newton step, so that easy problems cost what
-    Newton's method costs.
+    At a singular Jacobian the step follows the gradient. The first region contains the whole Newton step, so easy problems cost as much as
+    with Newton's method.
     """
 
     def __init__(self) -> None:

@@ -13,14 +13,14 @@ SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """An array by its LU factors."""
+    """LU factors of an array."""
 
     lu: FloatArray
     pivots: FloatArray
 
     @property
     def sign(self) -> float:
-        """Sign of its determinant."""
+        """Sign of the determinant."""
         swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
         flips = swaps + np.count_nonzero(self.lu.diagonal() < 0.0)
         return 1.0 if flips % 2 == 0 else -1.0

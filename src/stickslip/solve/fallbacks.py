@@ -30,18 +30,18 @@ BEYOND = 1e-9  # how far outside 0..1 rounding may carry s
 
 @dataclass(frozen=True, eq=False)
 class Homotopy:
-    """Equations with a parameter from 0 (easy) to 1, followed one after the other by arc length; the last one ends as the wanted one.
+    """Equations with a parameter from 0 (easy) to 1, followed one after the other by arc length; the last one ends at the equation to solve.
 
     Attributes
     ----------
     legs
-        At p = 1 each has the solutions that the next one has at p = 0.
+        Equations in order; each has at p = 1 the solutions that the next one has at p = 0.
     start
-        (n,) a point near the solution of the first leg where it begins.
+        (n,) a point near the solution of the first leg at its beginning.
     begins
-        Parameters at which the first leg may begin, 0 or little more: the first at which the corrector converges.
+        Parameters, 0 or little more, at which the first leg may begin. It begins at the first one at which the corrector converges.
     least
-        Parameter below which a path is left: beyond the only solution of the easy equation, it has lost its direction.
+        Parameter below which a path is abandoned: it runs backwards beyond the only solution of the easy equation.
     max_points
         Most points of one leg.
     """
@@ -54,7 +54,7 @@ class Homotopy:
 
 
 def steps_at_most(unknowns: int, share: float = 1.0) -> int:
-    """Return the Newton steps that a value of the parameter may take, whatever is tried there: a `share` of 300 up to 60 unknowns, of more above."""
+    """Return the limit of Newton steps of all attempts at one parameter value: `share` times 300 up to 60 unknowns, more for more unknowns."""
     return int(share * STEPS_A_POINT * min(max(unknowns / SMALL, 1.0), MOST_TIMES))
 
 
@@ -67,35 +67,35 @@ def solve_robustly(
     patience: int = PATIENCE,
     steps: int = 0,
 ) -> Solution:
-    """Solve ``residual(x) = 0`` at a fixed parameter, trying harder as long as it does not converge.
+    """Solve ``residual(x) = 0`` at a fixed parameter; further methods follow until one converges.
 
-    First the corrector of `options` from each start; then each of `homotopies` in turn; then the other globalisations, from that start
-    whose residual is least; last the homotopy that needs no physics, ``residual(x) - (1 - s) residual(x_start) = 0``. Shorter
-    continuation steps come between the first two and are the business of `stickslip.solve.continuation.advance`.
+    The order is: the corrector of `options` from each start; each of `homotopies`; the other globalisations, from the start with
+    the smallest residual; the homotopy that needs no physics, ``residual(x) - (1 - s) residual(x_start) = 0``. Shorter
+    continuation steps belong between the first two; `stickslip.solve.continuation.advance` takes them.
 
     Parameters
     ----------
     evaluate
         Residual and Jacobian at a point, as for `newton`.
     starts
-        (n,) starts, at least one. Those after one that converged are not asked for.
+        (n,) starts, at least one; evaluated lazily, none after one that converged.
     options
         Corrector. A homotopy uses it at each of its steps.
     homotopies
-        From easy equations to this one; those after one that came through are not asked for.
+        From easy equations to this one; evaluated lazily, none after one that converged.
     weights
         (n,) share of each unknown in the length of a step of a homotopy; default: equal.
     patience
         Most iterations of the other globalisations.
     steps
-        Newton steps of all attempts together, beyond which none is begun or goes on; 0: those of `steps_at_most`.
+        Limit of Newton steps of all attempts together; 0: that of `steps_at_most`.
 
     Returns
     -------
     Solution
-        The solution with the cost of all attempts. Its `rung` says what it took: `Rung.FULL_STEPS`, `DAMPED_STEP`,
-        `OTHER_GLOBALISATION` or `HOMOTOPY`; ``collections.Counter(s.rung for s in ...)`` counts a sweep. If nothing converges, that
-        attempt which came nearest, with its status.
+        The solution with the cost of all attempts. Its `rung` names the method that converged: `Rung.FULL_STEPS`, `DAMPED_STEP`,
+        `OTHER_GLOBALISATION` or `HOMOTOPY`; ``collections.Counter(s.rung for s in ...)`` counts a sweep. If nothing converges, the
+        attempt with the smallest residual, with its status.
 
     Examples
     --------
@@ -172,12 +172,12 @@ class _At:
 
 @dataclass(frozen=True, eq=False)
 class ByDifference:
-    """A family of equations as one with the parameter s, whose derivative by s is found by a difference.
+    """A family of equations as one equation with the parameter s; its derivative by s is a finite difference.
 
     Attributes
     ----------
     family
-        Returns, for s from 0 to 1, an `evaluate` at that s. It is never asked outside.
+        Function of s that returns an `evaluate`; s is always in [0, 1].
     """
 
     family: EvaluateAt

@@ -15,7 +15,7 @@ from stickslip.arrays import FloatArray
 def gmres(
     product: Callable[[FloatArray], FloatArray], right: FloatArray, tolerance: float, most: int
 ) -> tuple[FloatArray, float]:
-    """Solve a linear system known by its products.
+    """Solve a linear system whose matrix is known by its products.
 
     Parameters
     ----------
@@ -24,16 +24,16 @@ def gmres(
     right
         (n,) right side, not zero.
     tolerance
-        Residual left, relative to the right side.
+        Residual at the end, relative to the right side.
     most
-        Products at most.
+        Largest number of products.
 
     Returns
     -------
     solution
         (n,)
     residual
-        The relative residual that is left.
+        Relative residual of the solution.
     """
     size = float(np.linalg.norm(right))
     most = min(most, right.size)

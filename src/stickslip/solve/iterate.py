@@ -22,7 +22,7 @@ COARSEST = 1e-4  # residual that is not called rounding, whatever the last digit
 
 
 class Evaluation(Protocol):
-    """What a corrector needs of one evaluation."""
+    """Residual and Jacobian at one state, as a corrector needs them."""
 
     @property
     def residual(self) -> FloatArray: ...  # noqa: D102
@@ -36,7 +36,7 @@ class Evaluation(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """A state and what was evaluated there; `norm` is the largest absolute entry of the residual."""
+    """A state and its evaluation; `norm` is the largest absolute entry of the residual."""
 
     x: FloatArray
     at: Evaluation
@@ -45,7 +45,7 @@ class Iterate:
 
 @dataclass(eq=False)
 class Work:
-    """Evaluations and linear solves of one correction, and what they cost.
+    """Evaluations and linear solves of one correction, with their cost.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ class Work:
         return Iterate(x, at, float(np.abs(at.residual).max()))
 
     def rounded(self, now: Iterate) -> bool:
-        """Whether a residual is as small as the last digits of the unknowns allow.
+        """Whether a residual is at the level of rounding of the unknowns.
 
-        They are changed at random, and the residual with them: by the stiffness of a contact times the rounding of a gap, if that is
-        more than what the equations are to be solved to. No step can make it smaller than that.
+        The last digits of the unknowns are changed at random, which changes the residual: by the stiffness of a contact times the rounding of a
+        gap, where that exceeds the tolerance. No step can make the residual smaller than that.
         """
         if not now.norm <= COARSEST:
             return False
@@ -90,11 +90,11 @@ class Work:
         return now.norm <= ROUNDING * self.noise
 
     def newton_step(self, now: Iterate) -> FloatArray | None:
-        """Return the full Newton step; None if there is none. The Jacobian of `now` may be overwritten."""
+        """Return the full Newton step; None if the Jacobian is singular. The Jacobian of `now` may be overwritten."""
         return self.timed(lambda: solve_with(self.linear, now.at.jac, -now.at.residual))
 
     def timed(self, solve: Callable[[], FloatArray | None]) -> FloatArray | None:
-        """Solve a linear problem on the clock; a solution that is not finite is none."""
+        """Solve a linear problem and add its time; None also if the solution is not finite."""
         start = perf_counter()
         step = solve()
         self.seconds_linear += perf_counter() - start
@@ -104,17 +104,17 @@ class Work:
 
 
 class Globalisation(Protocol):
-    """How far to go, and where. An instance serves one correction and remembers what it learned on the way."""
+    """Choice of direction and length of steps. An instance serves one correction and keeps its state between iterates."""
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         ...
 
 
 def column_scale(jac: Jacobian, before: FloatArray | None) -> FloatArray:
-    """Return what makes lengths of steps independent of units: the largest norm each column has had (Moré 1978).
+    """Return the scale (n,) that makes lengths of steps independent of units: the largest norm each column has had (Moré 1978).
 
-    Unknowns of a Jacobian that is known by its products only count as they are.
+    The scale is one for a large Jacobian known by its products only.
     """
     norms = np.sqrt(_column_squares(jac))
     if before is not None:
@@ -129,6 +129,6 @@ def _column_squares(jac: Jacobian) -> FloatArray:
 
 
 def squared_ratio(residual: FloatArray, size: float) -> float:
-    """Return ``|residual|² / size²``; infinite and not an error where it overflows."""
+    """Return ``|residual|² / size²``; infinite where it overflows."""
     ratio = float(np.linalg.norm(residual)) / size
     return ratio * ratio

@@ -36,28 +36,28 @@ class Preconditioned(JacobianOperator, Protocol):
 
     @property
     def problem(self) -> object:
-        """What it is the Jacobian of; what is kept from one of its Jacobians serves the others."""
+        """Equation of this Jacobian; a preconditioner of one of its Jacobians serves the others."""
         ...
 
     def preconditioner(self) -> object | None:
-        """Return what of a new preconditioner is costly, such as factors; None if there is none."""
+        """Return the costly part of a new preconditioner, such as factors; None if there is none."""
         ...
 
     def preconditioned_by(self, kept: object) -> tuple[Solve, Product]:
-        """Return how to solve ``P x = y``, with P from what was kept and from this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        """Return the solver of ``P x = y``, P made of the `kept` part and this Jacobian, and ``J v`` as a function of v and ``P v``."""
         ...
 
 
 class Graded(Preconditioned, Protocol):
-    """One that has a better preconditioner where its own does not do."""
+    """A Jacobian with a second, better preconditioner for systems in which the first one fails."""
 
     def better_preconditioner(self, kept: object) -> object | None:
-        """Return what of a better preconditioner than `kept` is costly; None if there is none."""
+        """Return the costly part of a better preconditioner than `kept`; None if there is none."""
         ...
 
 
 class Either(Preconditioned, Assembling, Protocol):
-    """A Jacobian for which there is a choice."""
+    """A Jacobian that can be solved for by products or as an array."""
 
 
 def is_preconditioned(jac: Jacobian) -> TypeGuard[Preconditioned]:
@@ -66,18 +66,18 @@ def is_preconditioned(jac: Jacobian) -> TypeGuard[Preconditioned]:
 
 
 def is_either(jac: Jacobian) -> TypeGuard[Either]:
-    """Whether there is a choice."""
+    """Whether a Jacobian can be solved for by products or as an array."""
     return is_preconditioned(jac) and is_assembling(jac)
 
 
 def is_graded(jac: Preconditioned) -> TypeGuard[Graded]:
-    """Whether a Jacobian has a better preconditioner, too."""
+    """Whether a Jacobian has a second, better preconditioner."""
     return hasattr(type(jac), "better_preconditioner")
 
 
 @dataclass(eq=False)
 class KrylovCounts:
-    """What a Krylov solver did so far: systems solved, products with a Jacobian, preconditioners made, systems given up."""
+    """Work of a Krylov solver so far: systems solved, products with a Jacobian, preconditioners made, systems given up."""
 
     systems: int = 0
     products: int = 0
@@ -104,23 +104,23 @@ class _Kept:
 class Krylov:
     """Preconditioned GMRES or BiCGStab for Jacobians known by their products.
 
-    A preconditioner is kept for the next Jacobians of the same problem until it makes the iteration twice as long as it was with it
-    at first.
+    A preconditioner serves the next Jacobians of the same problem until the iteration takes twice as many products as with the first
+    Jacobian.
 
     Parameters
     ----------
     method
         ``gmres`` (Saad & Schultz 1986) without restart, or ``bicgstab`` (van der Vorst 1992), which keeps fewer vectors.
     tolerance
-        Residual left by a Newton step, relative to the right side: an inexact Newton method (Dembo, Eisenstat & Steihaug 1982).
+        Residual of a Newton step relative to the right side: an inexact Newton method (Dembo, Eisenstat & Steihaug 1982).
     tangent_tolerance
-        The same for the tangent of a branch, whose right side is zero but for the border; `tolerance` where that is finer.
+        The same for the tangent of a branch, whose right side is zero except in the border; the smaller one of this and `tolerance` counts.
     max_products
-        Products with the Jacobian in one system.
+        Largest number of products with the Jacobian in one system.
     lenient
-        Whether what these reach counts as a solution where its relative residual is below the root of the tolerance.
+        Whether the result after so many products is accepted if its relative residual is below the square root of the tolerance.
     counts
-        What was done so far.
+        Work so far.
     memory
         The preconditioner of each problem.
     """
@@ -137,7 +137,7 @@ class Krylov:
         check_choice("Krylov.method", self.method, ("gmres", "bicgstab"))
 
     def __reduce__(self) -> tuple["partial[Krylov]", tuple[()]]:
-        """Pickle the options alone: what is kept belongs to the problems of one process."""
+        """Pickle the options alone: preconditioners belong to the problems of one process."""
         options = ("method", "tolerance", "tangent_tolerance", "max_products", "lenient")
         return partial(Krylov, **{name: getattr(self, name) for name in options}), ()
 
@@ -148,7 +148,7 @@ class Krylov:
     def solve_bordered(
         self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
-        """Solve the bordered system, whose preconditioner has the same border; the sign is not known. See `LinearSolver`."""
+        """Solve the bordered system with a preconditioner of the same border; the sign is NaN. See `LinearSolver`."""
         whole = Bordered(jac, column, row, corner).flat
         tolerance = self.tolerance
         if not np.any(right[: whole.jac.shape[0]]):
@@ -307,18 +307,18 @@ _By = Callable[[LinearSolver, Jacobian], tuple[FloatArray | None, float]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Automatic:
-    """LU for a Jacobian that is an array. A Krylov method for one that is known by its products, and LU where that was seen to cost more.
+    """LU for a Jacobian that is an array; for one known by its products a Krylov method, or LU where that has cost less.
 
-    What products took is counted, not timed, so that every run decides alike: the costs of a product and of an array are estimated from
-    what can be counted (`Costs`): an array of few unknowns, where contacts rest, is factorised at once. A Krylov method that takes more than an array, or finds no solution, gives way to LU for some systems of the same
-    problem, and is then tried again.
+    Products are counted, not timed, so that every run makes the same choices; `Costs` estimates the time of a product and of an array.
+    An array of few unknowns, as where contacts stick, is factorised at once. If a Krylov method costs more than an array, or finds no
+    solution, LU solves some systems of the same problem, and then the Krylov method is tried again.
 
     Parameters
     ----------
     dense, krylov
         The solvers.
     accounts
-        What was seen so far, of each problem and each tolerance.
+        Costs so far, by problem and tolerance.
     """
 
     dense: LinearSolver = Dense()  # noqa: RUF009  # frozen
@@ -326,7 +326,7 @@ class Automatic:
     accounts: "WeakKeyDictionary[object, dict[float, _Account]]" = field(default_factory=WeakKeyDictionary, repr=False)
 
     def __reduce__(self) -> tuple["partial[Automatic]", tuple[()]]:
-        """Pickle the solvers alone: what was seen belongs to the problems of one process."""
+        """Pickle the solvers alone: costs so far belong to the problems of one process."""
         return partial(Automatic, dense=self.dense, krylov=self.krylov), ()
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
@@ -372,7 +372,7 @@ class Automatic:
 
 
 def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:
-    """Return `linear` with another relative residual of its solutions; LU leaves none. Preconditioners and counts are shared."""
+    """Return `linear` with another relative tolerance, which LU does not need. Preconditioners and counts are shared."""
     if isinstance(linear, Krylov):
         return replace(linear, tolerance=tolerance)
     if isinstance(linear, Automatic):

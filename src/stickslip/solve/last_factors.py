@@ -15,22 +15,22 @@ KEPT_FACTORS_RESIDUAL = 1e-4  # part of the residual that a step may leave where
 
 @dataclass(eq=False)
 class LastFactors:
-    """A solver of linear systems that remembers the last factors of an array.
+    """A linear solver that remembers the last factors of an array.
 
-    The part of the residual that a Newton step leaves is the change of the Jacobian on its way over the Jacobian itself. Where no contact
-    changes its state it is nearly nothing.
+    A full Newton step reduces the residual by the relative change of the Jacobian along the step. Where no contact changes its state,
+    this change is nearly zero, so the factors still serve.
 
     Parameters
     ----------
     linear
-        Solves the systems; factors are remembered of one that factorises arrays.
+        Solver of the systems; factors are remembered if it factorises arrays.
 
     Attributes
     ----------
     inverse
         The factors; None where there are none.
     residual
-        Where they were made, or its negative.
+        (n,) residual or its negative at the state of the factors.
     """
 
     linear: LinearSolver
@@ -55,7 +55,7 @@ class LastFactors:
         return found, 0.0 if self.inverse is None else self.inverse.sign
 
     def at(self, solution: Solution) -> Signed | None:
-        """Return the factors if they are those of the Jacobian at a solution, too."""
+        """Return the factors if they also hold for the Jacobian at a solution."""
         before = float(np.abs(self.residual).max())
         return self.inverse if solution.residual_norm <= KEPT_FACTORS_RESIDUAL * before else None
 

@@ -22,8 +22,8 @@ ITERATIVE = 1e-4  # relative accuracy of a step found by products only
 class LevenbergMarquardt:
     """Damped least squares (Levenberg 1944, Marquardt 1963) with the control of damping of Nielsen (1999).
 
-    The step minimises ``|J s + r|² + λ |D s|²``, D the norms of the columns (Moré 1978), so that units do not matter. λ is proportional
-    to the residual, for which the convergence is fast even where the Jacobian is singular at the solution (Fan & Yuan 2005).
+    The step minimises ``|J s + r|² + λ |D s|²``, D being the norms of the columns (Moré 1978), so that units do not matter. λ is proportional
+    to the residual: convergence is then fast even if the Jacobian is singular at the solution (Fan & Yuan 2005).
     """
 
     def __init__(self) -> None:

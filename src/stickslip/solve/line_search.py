@@ -11,8 +11,8 @@ MEMORY = 3  # residual norms a step is compared with: kinks make single increase
 class LineSearch:
     """Non-monotone line search along Newton steps (after Grippo et al. 1986).
 
-    A step is shortened until the residual norm falls below the largest of the last few, because contact states that switch make the norm
-    rise for one step on the way to the solution. Where that fails, the rest of the way goes from kink to kink; see `Kinks`.
+    A step is shortened until the residual norm falls below the largest of the last few, because contacts that switch their state raise the norm
+    for one step on the way to the solution. If no length suffices, the next steps go from kink to kink; see `Kinks`.
     """
 
     def __init__(self) -> None:

@@ -26,11 +26,11 @@ MAX_ARRAY_UNKNOWNS = 8000  # unknowns of an array, which then takes half a GB
 
 
 class Assembling(JacobianOperator, Protocol):
-    """A Jacobian known by its products that can be had as an array."""
+    """A Jacobian known by its products that can be assembled as an array."""
 
     @property
     def costs(self) -> Costs:
-        """What its linear systems cost."""
+        """Estimated cost of its linear systems."""
         ...
 
     def dense(self) -> FloatArray:
@@ -39,12 +39,12 @@ class Assembling(JacobianOperator, Protocol):
 
 
 def is_assembling(jac: Jacobian) -> TypeGuard[Assembling]:
-    """Whether a Jacobian known by its products can be had as an array; `isinstance` of a protocol would take longer than a small system."""
+    """Whether a Jacobian known by its products can be assembled as an array; `isinstance` of a protocol would take longer than a small system."""
     return hasattr(type(jac), "dense")
 
 
 class Signed(Protocol):
-    """The solution of systems with one matrix that is factorised, and the sign of its determinant."""
+    """Solver of systems with one factorised matrix, with the sign of its determinant."""
 
     @property
     def sign(self) -> float: ...  # noqa: D102
@@ -55,7 +55,7 @@ class Signed(Protocol):
 
 
 class LinearSolver(Protocol):
-    """How the linear systems of a corrector are solved. `Dense` factorises; iterative solvers need products only."""
+    """Solver of the linear systems of a corrector. `Dense` factorises; iterative solvers need products only."""
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``.
@@ -100,7 +100,7 @@ class LinearSolver(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Dense:
-    """LU with partial pivoting of the whole Jacobian, an array or one that can be put together as one."""
+    """LU with partial pivoting of the whole Jacobian, which is an array or can be assembled as one."""
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
@@ -117,7 +117,7 @@ class Dense:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """LU of a Jacobian known by its products: of what is left without the unknowns that are easily solved for, or of the whole array by `dense`."""
+    """LU of a Jacobian known by its products: of its Schur complement where cheap unknowns can be eliminated, else of the whole array by `dense`."""
 
     dense: LinearSolver = Dense()
 
@@ -156,7 +156,7 @@ def _last_known(
 
 
 def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatArray | None:
-    """Solve ``jac x = right`` by `linear`, which is given a border apart from its matrix."""
+    """Solve ``jac x = right`` by `linear`; the border of a `Bordered` matrix is passed separately."""
     if isinstance(jac, Bordered):
         flat = jac.flat
         return linear.solve_bordered(flat.jac, flat.column, flat.row, flat.corner, right)[0]
@@ -170,10 +170,10 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
 
 
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
-    """Return how systems with `jac` and with its transpose are solved; None if `jac` is singular.
+    """Return the solver of systems with `jac` and with its transpose; None if `jac` is singular.
 
-    An array is factorised once, and overwritten. So is a Jacobian known by its products where that costs less than some solutions, for several
-    right sides follow; others are solved by `linear` for each of them.
+    An array is factorised once, and overwritten. A Jacobian known by its products is factorised
+    if that costs less than several solutions, as several right sides follow; otherwise `linear` solves for each right side.
     """
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if isinstance(inside, np.ndarray) or array_pays(jac):
@@ -182,7 +182,7 @@ def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
 
 
 def array_pays(jac: Jacobian) -> bool:
-    """Whether a Jacobian known by its products is to be factorised for some right sides, and can be."""
+    """Whether a Jacobian known by its products can be factorised, and costs less so for several right sides."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return False
@@ -191,9 +191,9 @@ def array_pays(jac: Jacobian) -> bool:
 
 
 def factors_of(jac: Jacobian) -> Signed | None:
-    """Factorise a Jacobian, an array, which is overwritten, or known by its products, without the unknowns that are easily solved for.
+    """Factorise a Jacobian: an array, which is overwritten, or the Schur complement of one known by its products.
 
-    None if it is singular or cannot be put together.
+    None if it is singular or cannot be assembled.
     """
     array = array_of(jac)
     if array is not None:
@@ -216,7 +216,7 @@ class _Iterated:
 
 
 def assembled(jac: Jacobian) -> FloatArray | None:
-    """Return a Jacobian known by its products as a new array, borders included; None where it cannot be put together, or is too large."""
+    """Return a Jacobian known by its products as a new array, borders included; None if it cannot be assembled, or is too large."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return None
@@ -225,13 +225,13 @@ def assembled(jac: Jacobian) -> FloatArray | None:
 
 
 def whole_array(jac: Jacobian) -> FloatArray | None:
-    """Return a Jacobian that is an array, or known by its products and small; None for others."""
+    """Return a Jacobian as an array if it is one, or known by its products and small; None otherwise."""
     array = array_of(jac)
     return assembled(jac) if array is None and jac.shape[0] <= FEW else array
 
 
 def is_factorised(jac: Jacobian) -> bool:
-    """Whether systems with a Jacobian are solved by LU, as it is an array or costs less as one."""
+    """Whether systems with a Jacobian are solved by LU: it is an array or costs less as one."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if is_assembling(inside):
         return inside.shape[0] <= MAX_ARRAY_UNKNOWNS and not inside.costs.products_pay

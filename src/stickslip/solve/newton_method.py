@@ -34,13 +34,13 @@ class Newton:
     Parameters
     ----------
     tolerance
-        Largest absolute entry of the scaled residual at a solution; where the last digits of the unknowns change it by more, as with
-        contacts a million times stiffer than the structure, it is as small as they allow.
+        Largest absolute entry of the scaled residual at a solution. Where rounding of the unknowns changes the residual by more, as with
+        contacts a million times stiffer than the structure, the level of rounding counts.
     max_iterations
         Newton steps before giving up.
     globalisation
-        What is done where the full Newton step does not help: ``line_search`` shortens it, ``dogleg`` bends it towards the gradient
-        (Powell), ``levenberg_marquardt`` damps what the Jacobian knows little about.
+        Method where the full Newton step does not reduce the residual: ``line_search`` shortens it, ``dogleg`` bends it towards the gradient
+        (Powell), ``levenberg_marquardt`` damps directions of small singular values.
     linear
         Solver of the linear systems; by default LU for a Jacobian that is an array and a Krylov method for one known by its products.
     """
@@ -65,7 +65,7 @@ class Newton:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a corrector ended, why, what it cost, and what it took."""
+    """Result of a corrector: last iterate, status, cost, and rung of the method that was needed."""
 
     x: FloatArray
     status: Status
@@ -87,7 +87,7 @@ def charged(solution: Solution, spent: Sequence[Solution]) -> Solution:
 
 
 def first_converged(attempts: Iterable[Solution]) -> Solution:
-    """Return the first attempt that converged, or the last one, charged with all that were made; those after it are not asked for."""
+    """Return the first attempt that converged, or the last one, charged with the cost of all. The iterator is not advanced further."""
     spent: list[Solution] = []
     for attempt in attempts:
         spent.append(attempt)
@@ -114,14 +114,14 @@ def newton(
     options
         Tolerance, limits, globalisation and linear solver.
     globalisation
-        A new one in place of that of the options, such as `NaturalLevel` for a start that is known to be near.
+        Replaces that of the options, such as `NaturalLevel` for a start near the solution.
     linear
-        A solver in place of that of the options, such as one that remembers its factors.
+        Replaces the solver of the options, such as by one that remembers its factors.
 
     Returns
     -------
     Solution
-        The solution, or the iterate with the smallest residual, and why the iteration ended. Its rung is `Rung.DAMPED_STEP` if
+        The solution, or the iterate with the smallest residual, with the status that ended the iteration. Its rung is `Rung.DAMPED_STEP` if
         a step was ever refused.
     """
     work = Work(evaluate, linear or options.linear)

@@ -14,16 +14,16 @@ SLOW = 0.9  # share of the residual left by a step that hardly helped: usually o
 
 
 def slow(after: Iterate, before: Iterate) -> bool:
-    """Whether a step hardly helped."""
+    """Whether a step hardly reduced the residual."""
     left = np.linalg.norm(after.at.residual) / np.linalg.norm(before.at.residual)
     return bool(left > SLOW)
 
 
 class Kinks:
-    """Steps to just beyond the next kink, as long as that leads somewhere.
+    """Steps to just beyond the next kink, while the residual falls over a few crossings.
 
-    Where states switch, the Newton direction of this side goes uphill on the far side, from the kink on. There the Jacobian of the far
-    side has to take over, so a trial that lies just beyond the kink is accepted although the residual grew a little. Where the
+    Where contact states switch, the residual grows along the Newton direction from the kink on. There the Jacobian of the far
+    side must take over, so a trial just beyond the kink is accepted although the residual grew a little. Where the
     determinants of both sides have the same sign, the Newton direction of the far side leads away from the kink and not back (Ralph
     1994, for piecewise smooth equations); a piecewise linear equation is then solved piece by piece (Katzenelson 1965).
     """
@@ -40,15 +40,15 @@ class Kinks:
         work
             Evaluations and their cost.
         now
-            Where no other step helped.
+            Iterate at which no other step reduced the residual.
         step
-            (n,) its Newton step.
+            (n,) Newton step of this iterate.
 
         Returns
         -------
         Iterate or Status
             An iterate with a smaller residual, or just beyond the kink; `Status.STALLED` if there is neither, or if the last few
-            crossings gained nothing.
+            crossings did not reduce the residual.
         """
         size = float(np.linalg.norm(now.at.residual))
         self._idle = 0 if size < self._best else self._idle + 1

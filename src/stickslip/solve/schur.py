@@ -12,21 +12,21 @@ from stickslip.solve.factors import Factored, lu_factors
 
 
 class Eliminating(JacobianOperator, Protocol):
-    """A Jacobian some unknowns of which are easily solved for."""
+    """A Jacobian from which cheap unknowns can be eliminated."""
 
     def eliminated(self) -> Elimination | None:
-        """Return what is left without them; None where that costs as much as the whole array."""
+        """Return the elimination of cheap unknowns; None where it costs as much as the whole array."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class BorderedElimination:
-    """The same in a border, which is left.
+    """Elimination in a bordered matrix; the border remains.
 
     Parameters
     ----------
     inside
-        The elimination without it.
+        The elimination without the border.
     columns, rows, corner
         (n, m), (m, n) and (m, m).
     """
@@ -38,12 +38,12 @@ class BorderedElimination:
 
     @property
     def size(self) -> int:
-        """Unknowns that are left."""
+        """Number of remaining unknowns, border included."""
         return self.inside.size + len(self.corner)
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of what was eliminated."""
+        """Sign of the determinant of the eliminated block."""
         return self.inside.sign
 
     @cached_property
@@ -55,7 +55,7 @@ class BorderedElimination:
         return self.inside.reduced(self.rows.T, transposed=True)
 
     def array(self) -> FloatArray:
-        """Return what is left, (size, size)."""
+        """Return the Schur complement (size, size)."""
         n = self.inside.size
         columns, inner = self._across
         out = np.empty((self.size, self.size), order="F")
@@ -64,14 +64,14 @@ class BorderedElimination:
         return out
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return what is left of right sides, and what they make of the eliminated unknowns; see `Elimination`."""
+        """Return the right sides of the Schur complement, and their part of the eliminated unknowns; see `Elimination`."""
         n = len(self.columns)
         rows = self.columns.T if transposed else self.rows
         left, inner = self.inside.reduced(right[:n], transposed=transposed)
         return np.vstack([left, right[n:] - rows @ inner]), np.vstack([inner, np.zeros_like(right[n:])])
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Return all unknowns that those that are left make."""
+        """Return all unknowns from the remaining ones; see `Elimination`."""
         inner = (self._down if transposed else self._across)[1]
         n = self.inside.size
         all_of_it = self.inside.spread(x[:n], transposed=transposed)
@@ -80,7 +80,7 @@ class BorderedElimination:
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """A matrix by the LU factors of what an elimination leaves of it; None where nothing is left."""
+    """LU factors of the Schur complement of a matrix; None where no unknown remains."""
 
     elimination: Elimination
     factors: Factored | None
@@ -104,7 +104,7 @@ def _is_eliminating(jac: Jacobian) -> TypeGuard[Eliminating]:
 
 
 def elimination_of(jac: Jacobian) -> Elimination | None:
-    """Return what is left of a Jacobian without the unknowns that are easily solved for, borders included; None where there are none."""
+    """Return the elimination of cheap unknowns from a Jacobian, borders included; None where there are none."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not _is_eliminating(inside):
         return None
@@ -115,7 +115,7 @@ def elimination_of(jac: Jacobian) -> Elimination | None:
 
 
 def reduced_factors(elimination: Elimination) -> Reduced | None:
-    """Factorise what is left; None if it is singular to working precision."""
+    """Factorise the Schur complement; None if it is singular to working precision."""
     if elimination.size == 0:
         return Reduced(elimination, None)
     factors = lu_factors(elimination.array())

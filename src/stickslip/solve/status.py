@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """How a point ended; the numbers are those written to result files."""
+    """Reason why a solver stopped; result files hold these numbers."""
 
     CONVERGED = 0
     TOO_MANY_ITERATIONS = 1
@@ -22,7 +22,7 @@ class Status(IntEnum):
 
     @property
     def advice(self) -> str:
-        """What it means and what to do."""
+        """Meaning of the status, and advice."""
         return _ADVICE[self]
 
 
@@ -40,7 +40,7 @@ _ADVICE = {
 
 
 class Rung(IntEnum):
-    """What it took to find a solution, in the order in which it is tried; the numbers may be written to result files."""
+    """Method that found a solution, in the order in which methods are tried; result files may hold these numbers."""
 
     FULL_STEPS = 0
     DAMPED_STEP = 1

@@ -42,7 +42,7 @@ LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 
 @dataclass(frozen=True, eq=False)
 class _Across:
-    """The equation with one more condition below it: ``row @ (x, p) = value``."""
+    """The equation with one additional condition: ``row @ (x, p) = value``."""
 
     at: ParameterEvaluation
     row: FloatArray
@@ -66,20 +66,20 @@ def across(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _A
 
 
 def take_step(problem: Problem, point: Point, unit: FloatArray, step: float, end: float, following: Following) -> Point:
-    """Predict along `unit` and correct; the point says whether that worked.
+    """Predict along `unit` and correct; the status of the returned point says whether it converged.
 
     Parameters
     ----------
     problem
         The equation.
     point
-        Where to start.
+        Start of the step.
     unit
         (n + 1,) direction of unit length.
     step
-        Length of the step; change of p over its scale with natural parametrisation.
+        Length of the step; with natural parametrisation the change of p over its scale.
     end
-        Parameter value not to pass: a step that would ends there.
+        Parameter value at which a step ends that would pass it.
     following
         Corrector, parametrisation, predictor, measure of length.
     """
@@ -189,8 +189,8 @@ def _direction(
 def round_corner(problem: Problem, point: Point, unit: FloatArray, end: float, following: Following) -> Point:
     """Leave a corner of more than a right angle along its far side.
 
-    No plane across the old tangent meets that side. Its tangent is that of the Jacobian just beyond the corner, oriented as the path
-    was; where the linear solver gives no determinant both ways are tried.
+    No plane normal to the old tangent meets the far side. The tangent there follows from the Jacobian just beyond the corner, with the
+    orientation of the path; if the linear solver gives no determinant, both directions are tried.
     """
     smallest = following.control.smallest
     measure = measure_at(point.x, following)
@@ -224,7 +224,7 @@ def _left(new: Point, side: FloatArray, unit: FloatArray, known: bool, measure: 
 
 
 def no_step(point: Point, control: StepControl, iterations: int) -> Point:
-    """Return the point from which no step, however short, converged."""
+    """Return `point` with the status `Status.STEP_TOO_SMALL`."""
     failed = replace(
         point.solution,
         status=Status.STEP_TOO_SMALL,
@@ -237,7 +237,7 @@ def no_step(point: Point, control: StepControl, iterations: int) -> Point:
 
 
 def next_step(step: float, iterations: int, turn: float, control: StepControl) -> float:
-    """Grow after easy corrections, shrink where Newton works hard or the branch turns."""
+    """Return the next step length: longer after few Newton steps, shorter after many or where the branch turns."""
     factor = 1.5 if iterations <= 4 else 1.0 if iterations <= 8 else 0.6
     if iterations <= EASY and turn > STRAIGHT:
         factor = control.growth
