@@ -15,7 +15,7 @@ from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic.aft import contact_forces, forces_between
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.response.forced.response import Sweep, forced_response
-from stickslip.solve.affine_invariant import NaturalLevel
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 

@@ -10,10 +10,10 @@ from cyclic_models import random_sector, wedge
 
 from stickslip.errors import InputError
 from stickslip.model.fe.solid import Material, assemble_solid
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.full_wheel import wheel, wheel_shape
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.truncation import frequency_errors
 
 SECTORS = 8

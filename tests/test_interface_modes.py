@@ -9,10 +9,9 @@ from stickslip.errors import InputError, SingularError
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.modes import natural_frequencies
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.fixed_interface import craig_bampton, reduce_interface
 from stickslip.reduction.free_interface import rubin
 from stickslip.reduction.full_wheel import wheel_shape
-from stickslip.reduction.interface_modes import reduce_interface
 from stickslip.reduction.truncation import FrequencyError, ModesBelow, frequency_errors
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.solve import last_factors
+from stickslip.solve import chord_newton
 from stickslip.solve.branch import Latest, tangent_at, upward
+from stickslip.solve.chord_newton import LastFactors
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.krylov import Automatic, Krylov
-from stickslip.solve.last_factors import LastFactors
 from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
 
@@ -103,7 +103,7 @@ def test_factors_do_not_outlive_a_later_step_by_products(monkeypatch, bordered):
     factors, right = LastFactors(Automatic()), np.ones(2)
     factors.solve(MATRIX.copy(order="F"), right)
     assert factors.inverse is not None
-    monkeypatch.setattr(last_factors, "is_factorised", lambda _: False)
+    monkeypatch.setattr(chord_newton, "is_factorised", lambda _: False)
     if bordered:
         factors.solve_bordered(2.0 * MATRIX, right, right, 1.0, np.ones(3))
     else:

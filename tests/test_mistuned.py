@@ -44,8 +44,8 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.mistuned import MistunedWheel
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
 from stickslip.study.models.study import read_study
 

@@ -15,9 +15,9 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
 
 

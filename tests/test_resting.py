@@ -22,10 +22,10 @@ from stickslip.harmonic.stuck_contact_elimination import Resting, TransposedElim
 from stickslip.operators import Bordered, Costs, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.factors import BorderedElimination, Reduced, reduced_factors
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Assembled, Dense, factorised, factors_of
 from stickslip.solve.newton_method import Newton
-from stickslip.solve.schur import BorderedElimination, Reduced, reduced_factors
 
 KINDS = ("rests", "static", "tangents", "all")
 

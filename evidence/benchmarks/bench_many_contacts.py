@@ -32,10 +32,10 @@ from stickslip.harmonic.stuck_contact_elimination import Known
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
+from stickslip.solve.factors import reduced_factors
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Dense, LinearSolver
 from stickslip.solve.newton_method import Newton, Solution, newton
-from stickslip.solve.schur import reduced_factors
 
 ORDER, SAMPLES = 5, 128
 OMEGA = 2 * np.pi * 1600.0  # 10 % below the first resonance of the stuck plates

@@ -11,9 +11,9 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.free_interface import rubin
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
 
 Coordinates = Literal["craig_bampton", "rubin", "relative"]

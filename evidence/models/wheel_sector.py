@@ -19,9 +19,9 @@ from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.tuned import tuned_wheel
 from stickslip.response.system import System
 

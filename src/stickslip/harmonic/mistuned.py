@@ -17,8 +17,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.spectral import Blocks
-from stickslip.reduction.mistuned import MistunedWheel
-from stickslip.reduction.sectors import circulant
+from stickslip.reduction.mistuned import MistunedWheel, circulant
 
 KEPT_BYTES = 2e8  # of condensed waves that are kept
 MIN_KEPT_WAVES = 8  # frequencies times harmonics that are kept at least

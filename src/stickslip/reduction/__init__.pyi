@@ -6,6 +6,7 @@ from .aerodynamics import from_phase_angles as from_phase_angles
 from .aerodynamics import to_phase_angles as to_phase_angles
 from .cache import cached as cached
 from .choice import Reduction as Reduction
+from .contact_coordinates import in_relative_coordinates as in_relative_coordinates
 from .coupled_stages import Flange as Flange
 from .coupled_stages import Multistage as Multistage
 from .coupled_stages import MultistageModes as MultistageModes
@@ -14,11 +15,10 @@ from .coupled_stages import multistage_modes as multistage_modes
 from .cyclic import CyclicSector as CyclicSector
 from .cyclic import cyclic_sector as cyclic_sector
 from .cyclic import travelling_wave as travelling_wave
+from .fixed_interface import reduce_interface as reduce_interface
 from .free_interface import rubin as rubin
 from .full_wheel import wheel as wheel
 from .full_wheel import wheel_shape as wheel_shape
-from .interface_modes import reduce_interface as reduce_interface
-from .relative import in_relative_coordinates as in_relative_coordinates
 from .truncation import FrequencyError as FrequencyError
 from .truncation import FrequencyErrors as FrequencyErrors
 from .truncation import ModesBelow as ModesBelow

@@ -14,10 +14,9 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
+from stickslip.reduction.contact_coordinates import in_relative_coordinates, nodal_coordinates
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.nodal import nodal_coordinates
-from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.reduction.whole_wheel import (
     Reduce,

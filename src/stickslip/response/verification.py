@@ -14,7 +14,7 @@ from stickslip.harmonic.ringing import ringing
 from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert, led_to
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
-from stickslip.solve.affine_invariant import NaturalLevel
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import newton
 
 MAX_ROWS = 2000  # of a system that is solved where two steps say different things,

@@ -1,22 +1,24 @@
-"""Newton steps with old factors for as long as they converge.
+"""Newton steps with old factors for as long as they converge, and the last factors for the tangent.
 
 After a full Newton step the same factors give further corrections, with Broyden's updates of rank one (Kelley, Solving Nonlinear Equations with
 Newton's Method, SIAM 2003, chapter 4), as long as each is clearly smaller than the one before. Where contacts change their states they are not: then the
 Jacobian is factorised again where the residual is smallest.
 """
 
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.operators import Inverse
-from stickslip.solve.factors import Factored
+from stickslip.operators import Bordered, Corner, Inverse, Jacobian
+from stickslip.solve.factors import Factored, Reduced
 from stickslip.solve.iterate import Globalisation, Iterate, Work
+from stickslip.solve.krylov import Automatic
 from stickslip.solve.line_search import MEMORY, LineSearch
-from stickslip.solve.linear import Signed, factorised, is_factorised
-from stickslip.solve.schur import Reduced
+from stickslip.solve.linear import Dense, LinearSolver, Signed, factorised, factors_of, is_factorised
+from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
 SMALLER = 0.5  # part of a correction that the next one by the same factors may be
@@ -102,3 +104,63 @@ class KeptFactors:
         if best.norm <= self._tolerance and isinstance(solve, Factored | Reduced):
             self.inverse = solve
         return best
+
+
+KEPT_FACTORS_RESIDUAL = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
+
+
+@dataclass(eq=False)
+class LastFactors:
+    """A linear solver that remembers the last factors of an array.
+
+    A full Newton step reduces the residual by the relative change of the Jacobian along the step. Where no contact changes its state,
+    this change is nearly zero, so the factors still serve.
+
+    Parameters
+    ----------
+    linear
+        Solver of the systems; factors are remembered if it factorises arrays.
+
+    Attributes
+    ----------
+    inverse
+        The factors; None where there are none.
+    residual
+        (n,) residual or its negative at the state of the factors.
+    """
+
+    linear: LinearSolver
+    inverse: Signed | None = None
+    residual: FloatArray = field(default_factory=lambda: np.zeros(1))
+
+    def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
+        """Solve ``jac x = right``; see `LinearSolver`."""
+        if self._factorises(jac):
+            return self._solved(jac, right)
+        self.inverse = None  # those of an earlier step are not those of this one
+        return self.linear.solve(jac, right)
+
+    def solve_bordered(
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
+    ) -> tuple[FloatArray | None, float]:
+        """Solve the bordered system; see `LinearSolver`."""
+        if not self._factorises(jac):
+            self.inverse = None
+            return self.linear.solve_bordered(jac, column, row, corner, right)
+        found = self._solved(Bordered(jac, column, row, corner), right)
+        return found, 0.0 if self.inverse is None else self.inverse.sign
+
+    def at(self, solution: Solution) -> Signed | None:
+        """Return the factors if they also hold for the Jacobian at a solution."""
+        before = float(np.abs(self.residual).max())
+        return self.inverse if solution.residual_norm <= KEPT_FACTORS_RESIDUAL * before else None
+
+    def _factorises(self, jac: Jacobian) -> bool:
+        if isinstance(self.linear, Automatic):
+            return is_factorised(jac)
+        return isinstance(self.linear, Dense) and isinstance(jac, np.ndarray)
+
+    def _solved(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
+        self.inverse = factors_of(jac)
+        self.residual = right
+        return None if self.inverse is None else self.inverse(right)

@@ -22,7 +22,7 @@ from stickslip.solve.branch import (
     upward,
 )
 from stickslip.solve.branch_events import FOLD, Mark, between, located, with_tangent
-from stickslip.solve.last_factors import LastFactors
+from stickslip.solve.chord_newton import LastFactors
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
 from stickslip.solve.steps import SHARP_TURN, next_step, no_step, round_corner, take_step

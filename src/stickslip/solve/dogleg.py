@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.operators import times, transposed_times
 from stickslip.solve.iterate import Iterate, Work, column_scale, squared_ratio
-from stickslip.solve.nonsmooth_step import Kinks, slow
+from stickslip.solve.line_search import Kinks, slow
 from stickslip.solve.status import Status
 
 ACCEPT = 1e-4  # share of the predicted decrease below which a step is refused

@@ -7,8 +7,8 @@ from scipy.sparse.linalg import LinearOperator, lsmr
 from stickslip.arrays import FloatArray
 from stickslip.operators import Jacobian, times, transposed_times
 from stickslip.solve.iterate import Iterate, Work, column_scale, squared_ratio
+from stickslip.solve.line_search import Kinks, slow
 from stickslip.solve.linear import whole_array
-from stickslip.solve.nonsmooth_step import Kinks, slow
 from stickslip.solve.status import Status
 
 FIRST = 1e-3  # damping of the first step, as a share of the squared columns

@@ -1,8 +1,72 @@
-"""Newton steps, shortened where they do not help."""
+"""Newton steps shortened until the residual or the next correction is smaller, and steps past kinks where every shortened step fails."""
 
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
 from stickslip.solve.iterate import Iterate, Work
-from stickslip.solve.nonsmooth_step import Kinks
+from stickslip.solve.linear import factorised
 from stickslip.solve.status import Status
+
+SHARES = tuple(0.5**k for k in range(31))  # of a Newton step, longest first
+CREEP = 1.01  # by how much the residual may grow on the far side of a kink
+MAX_CREEP_SHARE = 1.0 / 64.0  # share of a Newton step from which on that is allowed
+MAX_IDLE_CROSSINGS = 10  # crossings in a row without a smaller residual than any before
+SLOW = 0.9  # share of the residual left by a step that hardly helped: usually one that ends at a kink
+
+
+def slow(after: Iterate, before: Iterate) -> bool:
+    """Whether a step hardly reduced the residual."""
+    left = np.linalg.norm(after.at.residual) / np.linalg.norm(before.at.residual)
+    return bool(left > SLOW)
+
+
+class Kinks:
+    """Steps to just beyond the next kink, while the residual falls over a few crossings.
+
+    Where contact states switch, the residual grows along the Newton direction from the kink on. There the Jacobian of the far
+    side must take over, so a trial just beyond the kink is accepted although the residual grew a little. Where the
+    determinants of both sides have the same sign, the Newton direction of the far side leads away from the kink and not back (Ralph
+    1994, for piecewise smooth equations); a piecewise linear equation is then solved piece by piece (Katzenelson 1965).
+    """
+
+    def __init__(self) -> None:
+        self._best = np.inf
+        self._idle = 0
+
+    def cross(self, work: Work, now: Iterate, step: FloatArray) -> Iterate | Status:
+        """Go along a Newton step until just beyond the next kink.
+
+        Parameters
+        ----------
+        work
+            Evaluations and their cost.
+        now
+            Iterate at which no other step reduced the residual.
+        step
+            (n,) Newton step of this iterate.
+
+        Returns
+        -------
+        Iterate or Status
+            An iterate with a smaller residual, or just beyond the kink; `Status.STALLED` if there is neither, or if the last few
+            crossings did not reduce the residual.
+        """
+        size = float(np.linalg.norm(now.at.residual))
+        self._idle = 0 if size < self._best else self._idle + 1
+        self._best = min(self._best, size)
+        if self._idle > MAX_IDLE_CROSSINGS:
+            return Status.STALLED
+        for share in SHARES:
+            trial = work.at(now.x + share * step)
+            norm = float(np.linalg.norm(trial.at.residual))
+            if norm <= (1.0 - 1e-4 * share) * size or (share <= MAX_CREEP_SHARE and norm <= CREEP * size):
+                return trial
+            work.rejected += 1
+        return Status.STALLED
+
 
 MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step before kinks are stepped across
 MEMORY = 3  # residual norms a step is compared with: kinks make single increases normal
@@ -35,3 +99,46 @@ class LineSearch:
             share *= 0.5
         self._careful = True
         return self._kinks.cross(work, now, step)
+
+
+MIN_NATURAL_STEP = 1.0 / 32.0  # shortest share of a Newton step; it is taken, across a kink
+GAIN = 0.25  # part of the share by which the next correction has to be smaller
+NATURAL_PATIENCE = 3  # shortest steps in a row, none of which helped, before the search is given up
+
+
+class NaturalLevel:
+    """Damped Newton steps with the natural monotonicity test (Deuflhard 2004, section 3.3).
+
+    A step is measured by the correction that the same factors give at its end, and not by the residual there. A contact that changes its
+    state raises the residual by the stiffness of the contact times the motion, however near the solution is; a correction is the
+    distance to the solution itself. Each trial costs a back substitution. If even the shortest step fails the test,
+    a kink lies within it, and the far side has its own Jacobian: the step is accepted. The iteration stops after a few such steps in a row.
+
+    Use it for starts near a solution. From far away, or where the Jacobian is nearly singular, the other globalisations converge more often.
+    """
+
+    def __init__(self) -> None:
+        self._failed = 0
+
+    def advance(self, work: Work, now: Iterate) -> Iterate | Status:
+        """Return the next iterate, or why there is none."""
+        began = perf_counter()
+        solve = factorised(work.linear, now.at.jac)
+        work.seconds_linear += perf_counter() - began
+        step = None if solve is None else work.timed(partial(solve, -now.at.residual))
+        if solve is None or step is None:
+            return Status.SINGULAR
+        size, share = float(np.linalg.norm(step)), 1.0
+        while True:
+            trial = work.at(now.x + share * step)
+            finite = np.isfinite(trial.norm)
+            left = work.timed(partial(solve, trial.at.residual)) if finite else None
+            if left is not None and np.linalg.norm(left) <= (1.0 - GAIN * share) * size:
+                self._failed = 0
+                return trial
+            work.rejected += 1
+            if share <= MIN_NATURAL_STEP:
+                break
+            share *= 0.5
+        self._failed += 1
+        return Status.STALLED if left is None or self._failed > NATURAL_PATIENCE else trial

@@ -18,8 +18,7 @@ from stickslip.operators import (
     array_of,
     transpose_of,
 )
-from stickslip.solve.factors import lu_factors
-from stickslip.solve.schur import elimination_of, reduced_factors
+from stickslip.solve.factors import elimination_of, lu_factors, reduced_factors
 
 SOLUTIONS, PRODUCTS = (5, 10)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
 MAX_ARRAY_UNKNOWNS = 8000  # unknowns of an array, which then takes half a GB

@@ -19,8 +19,7 @@ from stickslip.solve.branch import (
     tangent_at,
     upward,
 )
-from stickslip.solve.chord_newton import KeptFactors
-from stickslip.solve.last_factors import LastFactors
+from stickslip.solve.chord_newton import KeptFactors, LastFactors
 from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status

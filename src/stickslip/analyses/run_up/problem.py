@@ -22,7 +22,7 @@ from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
-from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, Sweep, forced_problem

@@ -10,7 +10,7 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.joints.rigid import InGaps
 from stickslip.errors import InputError
 from stickslip.model.structure import Structure
-from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 
 
 def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequence[str]) -> InGaps:

@@ -11,7 +11,7 @@ from stickslip.assembly.locations import picked
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
 from stickslip.model.structure import Structure
-from stickslip.reduction.interface_modes import reduce_interface
+from stickslip.reduction.fixed_interface import reduce_interface
 
 KEY = "reduction.interface_modes"
 

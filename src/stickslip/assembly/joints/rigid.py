@@ -12,7 +12,7 @@ from stickslip.contact.law import Rigid
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error
 from stickslip.model.structure import Structure
-from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.reduction.contact_coordinates import in_relative_coordinates
 
 
 @dataclass(frozen=True, eq=False)

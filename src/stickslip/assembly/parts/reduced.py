@@ -19,7 +19,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.choice import Reduction
-from stickslip.reduction.common_modes import modes_of, on_modes_of_others
+from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 REMEMBERED = 4  # reductions of a part that are kept in memory

@@ -19,7 +19,7 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.reduction.sectors import of_alike, strip
+from stickslip.reduction.mistuned import of_alike, strip
 from stickslip.units import HZ
 
 FEW_ROWS = 30  # shares of a sector's motion: above, all coordinates of the wheel are no more

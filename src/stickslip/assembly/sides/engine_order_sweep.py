@@ -15,7 +15,7 @@ from stickslip.assembly.parts.reduced import Store, in_memory
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
-from stickslip.reduction.common_modes import ModesExchangedError
+from stickslip.reduction.speed_basis import ModesExchangedError
 from stickslip.reduction.speed_line import AtRest, SpeedLine, speed_nodes
 
 TOLERANCE = 1e-9  # relative, of squares of frequencies and of the static load

@@ -40,8 +40,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.reduction.mistuned import MistunedWheel, mistuned_wheel
-from stickslip.reduction.sectors import circulant, couplings, repeated, travelling
+from stickslip.reduction.mistuned import MistunedWheel, circulant, couplings, mistuned_wheel, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.static_contact_state import pressed_by

@@ -19,10 +19,9 @@ from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.choice import Reduction
-from stickslip.reduction.common_modes import modes_of, on_modes_of_others
+from stickslip.reduction.contact_coordinates import in_relative_coordinates, nodal_coordinates
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
-from stickslip.reduction.nodal import nodal_coordinates
-from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.response.continuation.branch import Curve, Followed, Judged, Kind, Route
-from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import Latest, upward
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.fallbacks import steps_at_most
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
 from stickslip.solve.status import Status
 

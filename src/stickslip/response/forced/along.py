@@ -19,10 +19,10 @@ from stickslip.response.continuation.branch import Followed, Judged, Kind, Route
 from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.linear import factorised, is_factorised
 from stickslip.solve.newton_method import Solution, newton
 

@@ -13,9 +13,9 @@ from stickslip.harmonic.harmonic_set import is_full
 from stickslip.response.continuation.branch import Judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.time.repeating import Repetition, repetition
-from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.fallbacks import steps_at_most
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung, Status
 

@@ -11,9 +11,9 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.continuation.homotopies import homotopies
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
-from stickslip.solve.affine_invariant import NaturalLevel
 from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.fallbacks import solve_robustly, steps_at_most
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Rung

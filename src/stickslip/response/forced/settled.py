@@ -16,7 +16,7 @@ from stickslip.response.forced.along import AGREE, SAFETY, SAME_SHEET_RTOL, SMAL
 from stickslip.response.forced.choices import RUNGS, Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.verification import own_error, with_waves
-from stickslip.solve.affine_invariant import NaturalLevel
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 SOLUTIONS = 10  # of a point at most

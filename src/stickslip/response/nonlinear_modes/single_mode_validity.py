@@ -21,7 +21,7 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_basis, in_coordinates
-from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, at_resonance
 from stickslip.response.static_contact_state import holding

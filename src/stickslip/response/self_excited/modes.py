@@ -12,7 +12,7 @@ from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.basis import in_basis, in_coordinates
-from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.response.rotating.flutter import damping_ratio, followed_mode
 from stickslip.response.system import System
 

@@ -22,7 +22,7 @@ from stickslip.harmonic.fourier import to_real
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.system import System

@@ -13,7 +13,7 @@ import scipy.sparse
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
-from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.response.system import System
 
 RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
