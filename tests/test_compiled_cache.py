@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import stickslip.contact
-from stickslip.contact import cache_files, compiling
+from stickslip.contact import cache as compiled_cache
+from stickslip.contact import cache_files
 
 SOURCE = """
 from typing import NamedTuple
@@ -209,13 +210,13 @@ def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(tm
 
 @pytest.mark.parametrize("patience", [0.0, 1e3])
 def test_what_takes_long_to_compile_is_said_once(patience, monkeypatch, caplog):
-    monkeypatch.setattr(compiling, "PATIENCE", patience)
-    monkeypatch.setattr(compiling._LISTENER, "told", False)
+    monkeypatch.setattr(compiled_cache, "QUIET_SECONDS", patience)
+    monkeypatch.setattr(compiled_cache._LISTENER, "told", False)
     with caplog.at_level("INFO", "stickslip"):
         for number in range(2):
             assert numba.njit(lambda x, n=number: (x + n) ** 2)(1.0) == (1 + number) ** 2
         time.sleep(0.05)
-    said = [r for r in caplog.records if r.getMessage() == compiling.LINE]
+    said = [r for r in caplog.records if r.getMessage() == compiled_cache.LINE]
     assert len(said) == (patience == 0.0)
 
 

@@ -10,7 +10,7 @@ import stickslip as ss
 from stickslip.assembly.assembling import assemble
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.laws import LAWS
-from stickslip.contact.laws.iwan_populations import FourParameter
+from stickslip.contact.laws.iwan import FourParameter
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex, to_real

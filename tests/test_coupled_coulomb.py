@@ -13,7 +13,7 @@ from evidence.judges.planar_contact import Contact, growing, judged
 from stickslip.assembly.joints.frames import direction, told_apart
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.law import OPEN, PAIRS, SLIP, STICK
-from stickslip.contact.planar_slip import turned
+from stickslip.contact.steps.coupled_coulomb import turned
 from stickslip.harmonic.aft import contact_forces
 
 STIFFNESSES = [None, 0.4, 2.5]

@@ -12,7 +12,6 @@ from models import table
 
 from stickslip.errors import InputError
 from stickslip.harmonic import spectral
-from stickslip.harmonic.condensed_once import LARGE, condensed_once
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
@@ -20,6 +19,7 @@ from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.spectral import ModeTerms, Poles
 from stickslip.harmonic.state_space import StateSpace
 from stickslip.harmonic.structured import real_matrix
+from stickslip.harmonic.travelling import LARGE, condensed_once
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 

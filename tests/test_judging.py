@@ -9,8 +9,7 @@ import pytest
 import stickslip as ss
 from evidence.models.lumped import chain_stiffness, jenkins, lumped, system
 from stickslip.harmonic.harmonic_set import harmonics_of
-from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set
-from stickslip.harmonic.ringing import loudest, ringing
+from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set, loudest, ringing
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode

@@ -23,8 +23,7 @@ from stickslip.contact.pairing import (
     segment_to_segment,
 )
 from stickslip.contact.projection import closest
-from stickslip.contact.quadrature import HIGHEST_DEGREE, triangle_rule
-from stickslip.contact.segmentation import clip
+from stickslip.contact.segmentation import HIGHEST_DEGREE, clip, triangle_rule
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface, structure_surface
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad

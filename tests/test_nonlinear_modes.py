@@ -18,13 +18,12 @@ from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts
 from stickslip.analyses.page import plots
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
-from stickslip.contact.laws.iwan import Iwan
-from stickslip.contact.laws.iwan_populations import UniformBand
+from stickslip.contact.laws.iwan import Iwan, UniformBand
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.vector_forces import known_by_vectors
+from stickslip.harmonic.matrix_products import known_by_vectors
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation

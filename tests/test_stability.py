@@ -20,8 +20,7 @@ from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.dahl import Dahl
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.laws.iwan import Iwan
-from stickslip.contact.laws.iwan_populations import UniformBand
+from stickslip.contact.laws.iwan import Iwan, UniformBand
 from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError

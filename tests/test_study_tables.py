@@ -14,8 +14,7 @@ from small_v2 import EXAMPLES, write_four_masses, write_shrouded_deck, write_shr
 
 from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.laws.iwan import Iwan
-from stickslip.contact.laws.iwan_populations import FourParameter
+from stickslip.contact.laws.iwan import FourParameter, Iwan
 from stickslip.errors import InputError, input_error, together
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector

@@ -11,8 +11,7 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.bonded import Bonded
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.laws.iwan import Iwan
-from stickslip.contact.laws.iwan_populations import UniformBand
+from stickslip.contact.laws.iwan import Iwan, UniformBand
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import StickslipError

@@ -5,8 +5,7 @@ import numpy as np
 from evidence.validation.compare import Record, digits, record
 from stickslip.arrays import FloatArray
 from stickslip.contact.compiled import compile_contacts
-from stickslip.contact.laws.iwan import Iwan
-from stickslip.contact.laws.iwan_populations import FourParameter, UniformBand
+from stickslip.contact.laws.iwan import FourParameter, Iwan, UniformBand
 from stickslip.harmonic.aft import contact_forces
 
 SOURCE = "literature benchmark B1 (closed form)"

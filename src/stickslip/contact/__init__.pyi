@@ -3,9 +3,9 @@
 from .compiled import compile_contacts as compile_contacts
 from .law import law_kernel as law_kernel
 from .law_check import check_law as check_law
-from .laws.iwan_populations import FirstLoading as FirstLoading
-from .laws.iwan_populations import FourParameter as FourParameter
-from .laws.iwan_populations import UniformBand as UniformBand
+from .laws.iwan import FirstLoading as FirstLoading
+from .laws.iwan import FourParameter as FourParameter
+from .laws.iwan import UniformBand as UniformBand
 from .loop_fit import LoopFit as LoopFit
 from .loop_fit import fit_loops as fit_loops
 from .neighbours import neighbour_gaps as neighbour_gaps

@@ -5,7 +5,7 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.contact.facets import interpolation, lumped_areas
-from stickslip.contact.segment_points import segment_points
+from stickslip.contact.segmentation import segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 

@@ -15,7 +15,7 @@ from stickslip.contact.facets import positions
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.projection import facet_balls, project
-from stickslip.contact.segment_points import SKIP, Outside, need_facets, segment_points
+from stickslip.contact.segmentation import SKIP, Outside, need_facets, segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 

@@ -128,7 +128,7 @@ def _multiply(real, imaginary, h, rows, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def multiply_blocks(real, imaginary, rows, out):  # type: ignore[no-untyped-def]
-    """Set `out` (m, n) to the products with `rows` (m, n); see `stickslip.harmonic.small_blocks`."""
+    """Set `out` (m, n) to the products with `rows` (m, n); see `stickslip.harmonic.matrix_products`."""
     for h in range(real.shape[0]):
         _multiply(real, imaginary, h, rows, out)
 
@@ -140,7 +140,7 @@ def sweep(real, imaginary, blocks, columns, values, scale, rows, gap, out):  # t
     Parameters
     ----------
     real, imaginary
-        The inverses, as `stickslip.harmonic.small_blocks` has them.
+        The inverses, as `stickslip.harmonic.matrix_products` has them.
     blocks, columns, values, scale
         As in `subtract_lower`.
     rows

@@ -1,18 +1,75 @@
-"""Contact segments: the pieces that the facets of two surfaces have in common, and quadrature points on them.
+"""Contact segments: the common pieces of the facets of two surfaces, and quadrature points on them, on both sides.
 
 Segments as in Puso & Laursen (2004): the facets of side B are projected on the plane of each facet of side A and clipped there
-(Sutherland & Hodgman 1974), so that no shape function has a kink inside a piece.
+(Sutherland & Hodgman 1974), so that no shape function has a kink inside a piece. Triangles are integrated by symmetric rules with positive weights
+and inner points (Dunavant 1985; Strang & Fix 1973).
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.contact.facets import CORNERS, REFERENCE_NODES, kinds_of, shape_functions
-from stickslip.contact.projection import near_pairs
-from stickslip.contact.quadrature import triangle_rule
+from stickslip.contact.facets import (
+    CORNERS,
+    DEGREE,
+    REFERENCE_NODES,
+    interpolation,
+    kinds_of,
+    normals,
+    positions,
+    shape_functions,
+)
+from stickslip.contact.projection import facet_balls, meet, near_pairs
 from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+
+# degree -> orbits (weight, barycentric coordinates); an orbit holds all permutations
+_ORBITS: dict[int, tuple[tuple[float, tuple[float, float, float]], ...]] = {
+    1: ((1.0, (1 / 3, 1 / 3, 1 / 3)),),
+    2: ((1 / 3, (2 / 3, 1 / 6, 1 / 6)),),
+    4: (
+        (0.223381589678011, (0.108103018168070, 0.445948490915965, 0.445948490915965)),
+        (0.109951743655322, (0.816847572980459, 0.091576213509771, 0.091576213509771)),
+    ),
+    5: (
+        (0.225, (1 / 3, 1 / 3, 1 / 3)),
+        ((155 + 15**0.5) / 1200, ((9 - 2 * 15**0.5) / 21, (6 + 15**0.5) / 21, (6 + 15**0.5) / 21)),
+        ((155 - 15**0.5) / 1200, ((9 + 2 * 15**0.5) / 21, (6 - 15**0.5) / 21, (6 - 15**0.5) / 21)),
+    ),
+    6: (
+        (0.116786275726379, (0.501426509658179, 0.249286745170910, 0.249286745170910)),
+        (0.050844906370207, (0.873821971016996, 0.063089014491502, 0.063089014491502)),
+        (0.082851075618374, (0.636502499121399, 0.310352451033785, 0.053145049844816)),
+    ),
+}
+HIGHEST_DEGREE = max(_ORBITS)
+
+
+def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
+    """Return barycentric points (n, 3) and weights (n,) with sum 1, exact for polynomials up to `degree`.
+
+    Raises
+    ------
+    InputError
+        If no rule of that degree is known.
+    """
+    if not 1 <= degree <= HIGHEST_DEGREE:
+        raise input_error(
+            "degree of the quadrature",
+            f"must lie between 1 and {HIGHEST_DEGREE}, got {degree}",
+            "Products of quadratic shape functions on triangles have degree 4, on quadrilaterals 6.",
+        )
+    orbits = _ORBITS[min(known for known in _ORBITS if known >= degree)]
+    points: list[tuple[float, ...]] = []
+    weights: list[float] = []
+    for weight, (a, b, c) in orbits:
+        orbit = sorted({(a, b, c), (b, c, a), (c, a, b), (a, c, b), (c, b, a), (b, a, c)})
+        points += orbit
+        weights += [weight] * len(orbit)
+    return np.array(points), np.array(weights)
+
 
 STRAIGHT = 1e-9  # mid nodes nearer to the edge than this share of its length do not bend it
 ON_EDGE = 1e-12  # corners nearer to a clipping edge than this share of it lie on it
@@ -203,3 +260,113 @@ def _facing_cells(
     keep = beside < radius_a[first] + radius_b[second]
     keep &= np.einsum("pd,pd->p", normal_a[first], normal_b[second]) < 0
     return first[keep], second[keep]
+
+
+SKIP = "; or leave them out with outside='skip'"
+
+Outside = Literal["error", "skip"]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentPoints:
+    """Quadrature points on the common pieces of two sides' facets, on both sides.
+
+    Parameters
+    ----------
+    facet_a, facet_b
+        (p,) facets.
+    on_a, on_b
+        (p, 2) reference coordinates there.
+    place, partner, normal
+        (p, 3) places on both sides, m, and the unit normal of side A.
+    weight
+        (p,) area, m².
+    unpaired
+        Facets of side A no part of which has a partner.
+    """
+
+    facet_a: IntArray
+    facet_b: IntArray
+    on_a: FloatArray
+    on_b: FloatArray
+    place: FloatArray
+    partner: FloatArray
+    normal: FloatArray
+    weight: FloatArray
+    unpaired: IntArray
+
+
+def segment_points(
+    a: Surface, b: Surface, *, reach: float | None = None, degree: int | None = None, outside: Outside = "error"
+) -> SegmentPoints:
+    """Place quadrature points on the common pieces of two sides' facets; see `segment_to_segment`."""
+    need_facets("segment_to_segment", a, b)
+    radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
+    reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
+    if degree is None:
+        highest = [max(DEGREE[int(kind)] for kind in kinds_of(side.facets)) for side in (a, b)]
+        degree = min(sum(highest), HIGHEST_DEGREE)
+    found = segments(a, b, reach, degree)
+    facets_a, facets_b = a.facets[found.facet_a], b.facets[found.facet_b]
+    on_a, missed_a = meet(a.points, facets_a, found.place, found.axes)
+    places = positions(a.points, facets_a, on_a)
+    normal = np.einsum("pk,pkc->pc", interpolation(facets_a, on_a), a.corner_normals()[found.facet_a])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    on_b, missed_b = meet(b.points, facets_b, places, _across(normal))
+    _refuse_warped(found.facet_a[np.union1d(missed_a, missed_b)])
+    partner = positions(b.points, facets_b, on_b)
+    near = np.linalg.norm(partner - places, axis=1) <= reach
+    left = np.setdiff1d(np.arange(len(a.facets)), found.facet_a[near])
+    if left.size and (outside == "error" or not near.any()):
+        raise _without_facet(a, left, reach)
+    # the plane of a cell and the curved facet above it differ in area
+    own = normals(a.points, facets_a, on_a)
+    plane = np.cross(found.axes[:, 0], found.axes[:, 1])
+    tilt = np.einsum("pc,pc->p", own, plane) / np.linalg.norm(own, axis=1)
+    return SegmentPoints(
+        found.facet_a[near],
+        found.facet_b[near],
+        on_a[near],
+        on_b[near],
+        places[near],
+        partner[near],
+        normal[near],
+        (found.weight / tilt)[near],
+        left,
+    )
+
+
+def _across(normal: FloatArray) -> FloatArray:
+    """Return two unit vectors (p, 2, 3) across each unit normal (p, 3)."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def need_facets(place: str, *sides: Surface) -> None:
+    """Refuse sides that have none."""
+    for name, side in zip("AB"[-len(sides) :], sides, strict=True):
+        if len(side.facets) == 0:
+            raise input_error(place, f"side {name} has no facets", "Give facets, or pair by node_to_node.")
+
+
+def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
+    row = a.facets[left[0]]
+    middle = a.points[row[row >= 0]].mean(axis=0)
+    return input_error(
+        "segment_to_segment",
+        f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:.3g} m, e.g. facet "
+        f"{left[0]} at ({', '.join(f'{x:.6g}' for x in middle)}) m",
+        "Check that both sides' normals point outward, or raise $reach$outside.",
+        outside=SKIP,
+        reach="reach",
+    )
+
+
+def _refuse_warped(facets: IntArray) -> None:
+    if facets.size:
+        raise input_error(
+            "segment_to_segment",
+            f"points of {np.unique(facets).size} facets of side A, e.g. facet {facets[0]}, cannot be projected on both sides",
+            "Facets are folded or too warped there: refine the mesh.",
+        )

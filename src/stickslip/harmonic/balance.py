@@ -20,10 +20,9 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics, complex_rows, harmonics_of, is_full, real_rows, rows_of
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.matrix_products import matrices, products
+from stickslip.harmonic.matrix_products import known_by_vectors, linear_force, mass_damping_slope, matrices, products
 from stickslip.harmonic.sparse_stiffness import SparseStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_form
-from stickslip.harmonic.vector_forces import known_by_vectors, linear_force, mass_damping_slope
 from stickslip.operators import Costs
 
 REDUCED = 300  # unknowns from which leaving out what rests can cost less than the whole array

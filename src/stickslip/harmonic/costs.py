@@ -5,7 +5,7 @@ factor, as on a slower machine, nothing changes: they are compared with each oth
 """
 
 from stickslip.arrays import IntArray
-from stickslip.harmonic.small_blocks import SMALL
+from stickslip.harmonic.matrix_products import SMALL
 from stickslip.operators import Costs
 
 # an array: a call, each entry, each entry times the unknowns

@@ -1,4 +1,10 @@
-"""A condensed dynamic stiffness at one frequency: by its matrices, where these are known, or by its products."""
+"""Products ``Z q`` of a condensed dynamic stiffness at one frequency, by the cheapest way for its size and damping.
+
+`MatrixProducts` and `products` multiply by the matrices, where these are known. `SmallBlocks` multiplies all harmonics in one compiled loop: with a
+hundred unknowns a harmonic or fewer, a call from Python for each harmonic costs several times its arithmetic. `linear_force` needs products with
+vectors only, where the interior's modes diagonalise its damping: a corrector whose frequency changes at every step needs the residual of
+each trial, and the condensed matrices only of accepted ones.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -6,11 +12,46 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.product import multiply_blocks
 from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics, is_full
-from stickslip.harmonic.linear import DynamicStiffness, Products
-from stickslip.harmonic.small_blocks import SMALL
+from stickslip.harmonic.linear import DynamicStiffness, Products, StiffnessProducts
+from stickslip.harmonic.spectral import Blocks
+
+SMALL = 96  # unknowns a harmonic up to which this is faster than LAPACK and BLAS for each
+
+
+@dataclass(frozen=True, eq=False)
+class SmallBlocks:
+    """One complex matrix a harmonic, the static one first; build it with `small_blocks`.
+
+    Attributes
+    ----------
+    real, imaginary
+        (len(harmonics), n, n) parts of the transposed matrices.
+    """
+
+    real: FloatArray
+    imaginary: FloatArray
+
+    def product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of the products with the coefficients ``C - iS`` that the (m, n) `rows` stand for."""
+        out = np.empty_like(rows)
+        multiply_blocks(self.real, self.imaginary, rows, out)
+        return out
+
+
+def small_blocks(matrices: list[ComplexArray]) -> SmallBlocks:
+    """Return (n, n) matrices, one a harmonic, in the form that the compiled loops read."""
+    stacked = np.stack([matrix.T for matrix in matrices])
+    return SmallBlocks(np.ascontiguousarray(stacked.real), np.ascontiguousarray(stacked.imag))
+
+
+@lru_cache(maxsize=2)
+def dynamic_stiffness(linear: StiffnessProducts) -> SmallBlocks:
+    """Return the dynamic stiffness of all harmonics at one frequency, N/m; kept, because a Krylov method multiplies with it many times."""
+    return small_blocks([linear.block(h) for h in linear.harmonics])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,3 +125,50 @@ def products(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Pr
     if isinstance(linear, CondensedStiffness) and linear.n <= SMALL:
         return matrices(linear, harmonics, omega)
     return linear.products(omega, harmonics)
+
+
+def known_by_vectors(linear: DynamicStiffness) -> CondensedStiffness | None:
+    """Return a condensed structure whose interior is diagonal, without structural damping and Coriolis forces; None if it is none."""
+    if isinstance(linear, CondensedStiffness) and linear.diagonal and linear.loss is None:
+        return linear if linear.ln is None else None
+    return None
+
+
+def linear_force(linear: CondensedStiffness, omega: float, q: ComplexArray) -> ComplexArray:
+    """Return ``Z q - F``, (H+1, n), of a motion (H+1, n) at `omega` (rad/s)."""
+    s = _frequencies(omega, q)
+    near, far = linear.modal_loads(len(q) - 1)
+    moved = (far - _forward(linear.nl, s, q)) / _own(linear, s)
+    return _forward(linear.nn, s, q) + _back(linear.nl, s, moved) - near
+
+
+def mass_damping_slope(linear: CondensedStiffness, omega: float, q: ComplexArray) -> ComplexArray:
+    """Return the derivative of ``Z q``, (H+1, n), by the rate (1/s) of a damping in proportion to the mass."""
+    s = _frequencies(omega, q)
+    own = _own(linear, s)
+    moved = -_forward(linear.nl, s, q) / own
+    across, inner = linear.nl[2], np.diagonal(linear.ll[2])
+    pulled = 1j * s * (q @ across + moved * inner)
+    direct = 1j * s * (q @ linear.nn[2].T + moved @ across.T)
+    return np.asarray(direct - _back(linear.nl, s, pulled / own))
+
+
+def _frequencies(omega: float, q: ComplexArray) -> FloatArray:
+    return omega * np.arange(len(q))[:, None]
+
+
+def _own(linear: CondensedStiffness, s: FloatArray) -> ComplexArray:
+    k, c, m = (np.diagonal(block) for block in linear.ll)
+    return np.asarray(k + 1j * s * c - s**2 * m)
+
+
+def _forward(blocks: Blocks, s: FloatArray, q: ComplexArray) -> ComplexArray:
+    """Return the force of retained coordinates on those of the columns."""
+    k, c, m = blocks
+    return np.asarray(q @ k + 1j * s * (q @ c) - s**2 * (q @ m))
+
+
+def _back(blocks: Blocks, s: FloatArray, q: ComplexArray) -> ComplexArray:
+    """Return the force of the interior on the retained coordinates."""
+    k, c, m = blocks
+    return np.asarray(q @ k.T + 1j * s * (q @ c.T) - s**2 * (q @ m.T))

@@ -15,7 +15,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.product import harmonic_means
 from stickslip.harmonic.costs import CALL, linear_costs
 from stickslip.harmonic.factors import AnyFactors, factorise
-from stickslip.harmonic.small_blocks import SMALL
+from stickslip.harmonic.matrix_products import SMALL
 from stickslip.harmonic.structured import StructuredJacobian, Transposed
 from stickslip.operators import Costs
 

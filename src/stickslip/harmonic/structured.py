@@ -20,10 +20,9 @@ from stickslip.contact.product import contact_product, harmonic_means, less_mean
 from stickslip.harmonic.costs import linear_costs, reduced_cost
 from stickslip.harmonic.factors import AnyFactors, as_array, factorise, real_part, with_contacts
 from stickslip.harmonic.linear import Shareable, StiffnessProducts
-from stickslip.harmonic.matrix_products import MatrixProducts
+from stickslip.harmonic.matrix_products import SMALL, MatrixProducts, SmallBlocks, dynamic_stiffness, small_blocks
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
-from stickslip.harmonic.small_blocks import SMALL, SmallBlocks, dynamic_stiffness, small_blocks
-from stickslip.harmonic.sparse_product import SparseProduct
+from stickslip.harmonic.sparse_stiffness import SparseProduct
 from stickslip.harmonic.stuck_contact_elimination import Coupling, Resting, TransposedElimination, coupling, known
 from stickslip.operators import Costs, JacobianOperator
 

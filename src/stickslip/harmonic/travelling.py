@@ -7,13 +7,15 @@ Computational Methods in Engineering 24 (2017) 589-636, section 3 and appendices
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import blake2b
+from weakref import WeakKeyDictionary
 
 import numpy as np
+import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.harmonic.condensed_once import condensed_once
-from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness, condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics
@@ -27,6 +29,42 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.tuned import TunedWheel
+
+LARGE = 300  # dofs from which the eigenproblem of the interior takes much longer than reading the matrices
+
+_last: "WeakKeyDictionary[Structure, tuple[bytes, CondensedStiffness]]" = WeakKeyDictionary()
+
+
+def condensed_once(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:
+    """Prepare the exact condensation as `condense` does, from what the same structure's last one left.
+
+    Matrices changed in place are told by their contents.
+    """
+    if structure.n < LARGE or load.static.size != structure.n:
+        return condense(structure, retained, load)
+    contents = _contents(structure, retained)
+    known = _last.get(structure)
+    if known is None or known[0] != contents:
+        known = _last[structure] = contents, condense(structure, retained, load)
+    return known[1].with_load(load)
+
+
+def _contents(structure: Structure, retained: IntArray) -> bytes:
+    digest = blake2b(np.asarray(retained, dtype=np.int64).tobytes())
+    for matrix in (structure.mass, structure.damping, structure.stiffness, structure.loss):
+        for own in _arrays(matrix):
+            digest.update(own.tobytes())
+    return digest.digest()
+
+
+def _arrays(matrix: Matrix | None) -> tuple[np.ndarray, ...]:
+    if matrix is None:
+        return ()
+    if scipy.sparse.issparse(matrix):
+        plain = scipy.sparse.csr_array(matrix)
+        return plain.data, plain.indices, plain.indptr
+    return (np.asarray(matrix),)
+
 
 ANY = 100  # harmonics for which a wheel with every wave is there
 

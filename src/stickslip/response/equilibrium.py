@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.contact.frozen_sliders import freezable, left_behind, sharing_friction
+from stickslip.contact.initial_sliders import freezable, left_behind, sharing_friction
 from stickslip.contact.law import ContactLaw, holding_directions
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError, input_error

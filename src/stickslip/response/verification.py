@@ -9,8 +9,15 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
-from stickslip.harmonic.judging import SAMPLES_A_HARMONIC, UNSEEN, covers, judging_balance, judging_set, judging_set_of
-from stickslip.harmonic.ringing import ringing
+from stickslip.harmonic.judging import (
+    SAMPLES_A_HARMONIC,
+    UNSEEN,
+    covers,
+    judging_balance,
+    judging_set,
+    judging_set_of,
+    ringing,
+)
 from stickslip.harmonic.selection.alert import Alert, asked_again, jacobian_alert, led_to
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness

@@ -7,8 +7,12 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS, kernel_in
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, tangential_stiffness
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    check_any_stiffness,
+    normal_stiffness,
+    tangential_stiffness,
+)
 from stickslip.errors import input_error
 from stickslip.units import check_quantities, quantity
 

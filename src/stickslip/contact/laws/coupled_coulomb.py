@@ -7,8 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import COUPLED_TANGENTS, kernel_in
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
+from stickslip.contact.laws.quantities import check_any_stiffness, friction_coefficient, normal_stiffness
 from stickslip.units import check_quantities, quantity
 
 

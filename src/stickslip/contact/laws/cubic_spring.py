@@ -7,9 +7,13 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.polynomial_spring import polynomial_step
-from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, tangential_stiffness
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    check_any_stiffness,
+    normal_stiffness,
+    tangential_stiffness,
+)
 from stickslip.units import check_quantities, quantity
 
 

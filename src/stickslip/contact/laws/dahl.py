@@ -7,8 +7,13 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, slip_limit, tangential_stiffness
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    check_any_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
 from stickslip.units import check_quantities
 
 

@@ -1,17 +1,161 @@
-"""Iwan's parallel-series element: many Jenkins elements side by side."""
+"""Iwan's parallel-series element: many Jenkins elements in parallel, with published populations of sliders.
+
+A slider of break-free distance φ has a stiffness density ρ(φ) (Segalman 2005, eq. 5). A cell of the density becomes one slider with the
+stiffness ``∫ρ dφ`` and the limit ``∫ρ φ dφ`` of that cell, so that stiffness and limit of the whole are exact whatever the number.
+"""
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import ROUND_OFF, element
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
-from stickslip.contact.laws.iwan_populations import Population, UniformBand
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, slip_limit, tangential_stiffness
-from stickslip.units import check_quantities
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    check_any_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
+from stickslip.errors import input_error
+from stickslip.units import check_quantities, quantity
+
+
+class Population(Protocol):
+    """What the Iwan element needs of its sliders."""
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of the stiffness, with sum 1, and of the limit, the finite ones with sum 1."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UniformBand:
+    """Break-free distances spread evenly over a band about their mean (Iwan 1966), beside an elastic spring (Song et al. 2004).
+
+    Parameters
+    ----------
+    n_sliders
+        Sliders, without the elastic spring.
+    half_width
+        Half of the band over the mean distance, above 0 and at most 1; 1: sliders from distance zero on.
+    elastic_share
+        Share of the stiffness that never slips, 0 to below 1; the limit is that of the others.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of its range.
+    """
+
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
+    half_width: float = quantity("half of the band over the mean distance", default=1.0, above=0, most=1)
+    elastic_share: float = quantity("share of the stiffness that never slips", default=0.0, least=0, below=1)
+
+    def __post_init__(self) -> None:
+        check_quantities(self)
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        middle = (2.0 * np.arange(self.n_sliders) + 1.0) / self.n_sliders - 1.0
+        shares = np.full((2, self.n_sliders), 1.0 / self.n_sliders)
+        shares[1] *= 1.0 + self.half_width * middle
+        if self.elastic_share == 0.0:
+            return shares
+        shares[0] *= 1.0 - self.elastic_share
+        return np.hstack([shares, [[self.elastic_share], [np.inf]]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FourParameter:
+    """Segalman's population (2005): ``ρ = R φ^chi`` up to φ_max and a group of sliders that break free there together.
+
+    Two of the four parameters are stiffness and limit of the element.
+
+    Parameters
+    ----------
+    chi
+        Exponent, above -1 and at most 0: energy lost in micro-slip grows with the power 3 + chi of the amplitude.
+    beta
+        Stiffness of the sliders at φ_max over that of all others, not negative.
+    n_sliders
+        Sliders below φ_max, in cells that grow geometrically from φ_max / 1000.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of its range.
+    """
+
+    chi: float = quantity("exponent of the distribution", above=-1, most=0)
+    beta: float = quantity("stiffness of the last sliders over that of all others", least=0)
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
+
+    def __post_init__(self) -> None:
+        check_quantities(self)
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        edges = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, self.n_sliders)])
+        stiffness = np.diff(edges ** (self.chi + 1.0))
+        limit = np.diff(edges ** (self.chi + 2.0)) * (self.chi + 1.0) / (self.chi + 2.0)
+        if self.beta > 0.0:
+            stiffness, limit = np.append(stiffness, self.beta), np.append(limit, self.beta)
+        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstLoading:
+    """Sliders of any first-loading curve, which slip one after the other at its corners (Segalman & Starr 2008).
+
+    The curve begins at the origin; where it ends all have slipped, and the force stays. Only its shape counts: the element scales
+    it to its own stiffness and limit.
+
+    Parameters
+    ----------
+    displacement, force
+        Corners of the curve after the origin, in any units; slopes fall from piece to piece.
+
+    Raises
+    ------
+    InputError
+        If the corners do not make such a curve.
+    """
+
+    displacement: tuple[float, ...] = quantity("displacements of the corners after the origin")
+    force: tuple[float, ...] = quantity("forces of the corners after the origin")
+
+    def __post_init__(self) -> None:
+        x, f = self.displacement, self.force
+        if len(x) != len(f) or len(x) < 2 or not np.all(np.isfinite([*x, *f])):
+            raise input_error(
+                "FirstLoading",
+                f"got {len(x)} displacements and {len(f)} forces",
+                "Give two corners or more, with finite numbers.",
+            )
+        if np.any(np.diff([0.0, *x]) <= 0.0):
+            raise input_error("FirstLoading.displacement", f"must rise from above zero, got {x}", "Sort it.")
+        slopes = self._slopes()
+        if slopes[-1] < 0.0 or np.any(np.diff(slopes) >= 0.0):
+            raise input_error(
+                "FirstLoading.force",
+                f"must rise ever more slowly, got the slopes {slopes}",
+                "Leave corners out that lie on a line with their neighbours or below it.",
+            )
+
+    def _slopes(self) -> FloatArray:
+        """Slopes of the pieces."""
+        force, displacement = np.array([0.0, *self.force]), np.array([0.0, *self.displacement])
+        return np.asarray(np.diff(force) / np.diff(displacement))
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        stiffness = -np.diff([*self._slopes(), 0.0])
+        limit = stiffness * np.asarray(self.displacement)
+        slips = stiffness > 0.0
+        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit)])[:, slips]
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]

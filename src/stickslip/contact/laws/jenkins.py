@@ -8,8 +8,13 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_any_stiffness
-from stickslip.contact.laws.quantities import axial_stiffness, normal_stiffness, slip_limit, tangential_stiffness
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    check_any_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
 from stickslip.units import check_quantities
 
 

@@ -1,7 +1,8 @@
-"""Fields that several laws share, with their study keys."""
+"""Fields that several laws share, with their study keys, and checks of their values."""
 
 from typing import Any
 
+from stickslip.errors import input_error
 from stickslip.units import quantity
 
 
@@ -35,3 +36,21 @@ def slip_limit(least: float | None = 0, **given: Any) -> Any:
 def _stiffness(where: str, key: str, given: dict[str, Any]) -> Any:
     about = f"stiffness along the {where}"
     return quantity(about, "n_per_m", key=key, shared=True, **{"least": 0, **given})
+
+
+def check_not_negative(law: object, *names: str) -> None:
+    """Raise `InputError` if one of the named numbers of `law` is negative; None is not."""
+    for name in names:
+        value = getattr(law, name)
+        if value is not None and value < 0:
+            raise input_error(
+                f"{type(law).__name__}.{name}", f"must be finite and not negative, got {value}", "Give it in SI units."
+            )
+
+
+def check_any_stiffness(law: object, *names: str) -> None:
+    """Raise `InputError` if all the named stiffnesses of `law` are zero."""
+    if not any(getattr(law, name) for name in names):
+        raise input_error(
+            type(law).__name__, "all contact stiffnesses are zero", "Give at least one, or remove the contact."
+        )

@@ -8,8 +8,7 @@ from stickslip.contact.element import element_step
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
-from stickslip.contact.laws.parameter_checks import check_not_negative
-from stickslip.contact.laws.quantities import friction_coefficient
+from stickslip.contact.laws.quantities import check_not_negative, friction_coefficient
 from stickslip.errors import InputError, input_error
 from stickslip.units import check_quantities
 

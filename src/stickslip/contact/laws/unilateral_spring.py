@@ -8,8 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_not_negative
-from stickslip.contact.laws.quantities import normal_stiffness
+from stickslip.contact.laws.quantities import check_not_negative, normal_stiffness
 from stickslip.errors import input_error
 from stickslip.units import check_quantities
 

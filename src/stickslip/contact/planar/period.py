@@ -18,15 +18,78 @@ from stickslip.contact.event_integrals import add_normal_force, fill_limit
 from stickslip.contact.events import LARGEST, sample_normal
 from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT, TW, WN, WT, WW
 from stickslip.contact.planar.cycle import follow_closings, forgets, settle
-from stickslip.contact.planar.motion import fill_motion, place
-from stickslip.contact.planar.radau import PART
-from stickslip.contact.planar.samples import sample_plane
-from stickslip.contact.planar.sensitivities import basis_at, follow_rows, rows_room, to_stick
-from stickslip.contact.planar.signatures import FOLLOW_ROWS, RUN
-from stickslip.contact.planar.trajectory import course_room, run
-from stickslip.contact.slider import scratch, zeros
+from stickslip.contact.planar.motion import Motion, fill_motion, place
+from stickslip.contact.planar.radau import CROWDED, INNER, NEARLY, PART, POWER
+from stickslip.contact.planar.sensitivities import Rows, basis_at, follow_rows, rows_room, to_stick
+from stickslip.contact.planar.slip import Piece, interpolated
+from stickslip.contact.planar.trajectory import (
+    COUNT,
+    END,
+    FIRST,
+    PIECE_ANGLE,
+    PIECE_KIND,
+    PIECE_START,
+    PIECE_WIDTH,
+    PLACE_X,
+    PLACE_Y,
+    START,
+    STATE,
+    Course,
+    course_room,
+    run,
+)
+from stickslip.contact.slider import PERIOD, scratch, zeros
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import product_matrix, search_grid
+
+_line = types.float64[::1]
+_plane = types.float64[:, ::1]
+_whole = types.int64[::1]
+_named: Any = types.NamedTuple
+_motion = _named((_plane, _line), Motion)
+_piece = _named((_plane, _line, _line, _plane, _whole, _line, _line), Piece)
+_course = _named((_motion, _piece, _line, _line, _plane, _plane, _plane, _whole), Course)
+_rows = _named(
+    (_plane, _line, _plane, _plane, _plane, _whole, _line, *(_plane,) * 6, types.float64[:, :, ::1], _plane), Rows
+)
+RUN = types.void(_course, types.float64, types.float64, types.int64)
+FOLLOW_ROWS = types.void(_course, types.float64, types.float64, _rows, types.boolean)
+
+
+@njit(**INNER)
+def sample_plane(course, gap, k, force, state):  # type: ignore[no-untyped-def]
+    """Fill the force in the plane and the states where the contact is closed."""
+    n = gap.shape[1]
+    if n == 0:
+        return
+    step = PERIOD / n
+    for s in range(course.counts[0]):
+        segment = course.segments[s]
+        now = int(segment[STATE])
+        piece = int(segment[FIRST])
+        last = piece + int(segment[COUNT]) - 1
+        i = int(np.ceil(segment[START] / step))
+        while i * step < segment[END]:
+            at = i % n
+            if now == STICK:
+                force[0, at] = k * gap[0, at] - segment[PLACE_X]
+                force[1, at] = k * gap[1, at] - segment[PLACE_Y]
+            elif last >= piece:
+                tau = i * step
+                while piece < last and tau > course.pieces[piece + 1, PIECE_START]:
+                    piece += 1
+                row = course.pieces[piece]
+                share = (tau - row[PIECE_START]) / row[PIECE_WIDTH]
+                share = min(max(share, 0.0), 1.0)
+                if row[PIECE_KIND] == CROWDED:
+                    share = min((1.0 - (1.0 - share) ** (1.0 / POWER)) / NEARLY, 1.0)
+                angle = interpolated(row[PIECE_ANGLE:], share)
+                _, _, limit = place(course.motion, tau)
+                limit = max(limit, 0.0)
+                force[0, at], force[1, at] = limit * np.cos(angle), limit * np.sin(angle)
+            state[0, at] = state[1, at] = now
+            i += 1
+
 
 _BLOCKS = np.array([[TT, TW, TN], [WT, WW, WN]])
 

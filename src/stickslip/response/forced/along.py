@@ -9,8 +9,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.harmonic_set import Harmonics
-from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set_of
-from stickslip.harmonic.ringing import ringing
+from stickslip.harmonic.judging import UNSEEN, covers, judging_balance, judging_set_of, ringing
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.operators import Jacobian

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field
 from stickslip.assembly.contact import GROUND, NEXT, SPATIAL, PairingKind, Share
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import ALL_LAWS
-from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
+from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import did_you_mean
 from stickslip.study.file.model.bodies import Triple
 from stickslip.study.file.model.parts import union_of
