@@ -19,7 +19,7 @@ TASKS = {
     "Damping": ("model.damping",),
     "Read and write files of other programs": ("model.readers", "model.deck", "model.structure_file"),
     "Contact laws": ("contact.laws", "contact.law", "contact.law_check"),
-    "Fit a law to measured loops": ("contact.loop_fit", "model.readers.hysteresis"),
+    "Fit a law to measured loops": ("contact.loop_fit", "model.readers.measured_columns"),
     "Pair surfaces": ("contact",),
     "Matrices, modes and rotation": ("model",),
     "Reduction": ("reduction",),

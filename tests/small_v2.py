@@ -14,9 +14,8 @@ import numpy as np
 
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.solid import Material
-from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector import BladedSector, Shroud
 from stickslip.model.mesh.sector_mesh import mesh_sector
-from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

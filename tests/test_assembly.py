@@ -21,8 +21,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import Damping, rayleigh_damping
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import lumped
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.part import damper_part, solid_part, structure_part
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import join

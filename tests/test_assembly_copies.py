@@ -19,8 +19,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
 from stickslip.model.matrices import lumped
-from stickslip.model.mesh.mesh_facets import facets_of
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh, facets_of
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import BodyPoints, Place, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody

@@ -25,8 +25,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping, rayleigh_damping
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
-from stickslip.model.mesh.mesh_facets import facets_of
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh, facets_of
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.part import BodyPoints, rigid_part, solid_part
 from stickslip.model.rigid.body import RigidBody

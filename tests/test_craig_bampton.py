@@ -10,8 +10,7 @@ import scipy.sparse
 from stickslip.errors import InputError, SingularError
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import chain, lumped
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError, StickslipError
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.solid_mesh import write_mesh
 from stickslip.model.rigid.damper import FlatCurvedDamper
 

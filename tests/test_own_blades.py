@@ -20,7 +20,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.axis import Axis
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.mesh.mesh_facets import facets_of
+from stickslip.model.mesh.solid_mesh import facets_of
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.rigid.body import RigidBody

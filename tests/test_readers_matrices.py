@@ -22,7 +22,7 @@ from stickslip.model import (
     save_structure,
 )
 from stickslip.model.readers.abaqus import read_coordinate_matrix
-from stickslip.model.readers.matrix_market import read_matrix_market
+from stickslip.model.readers.matrix_files import read_matrix_market
 from stickslip.model.readers.node_table import NodeTable
 
 DATA = Path(__file__).parent / "data" / "calculix"

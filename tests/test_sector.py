@@ -12,9 +12,8 @@ from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh import sector_mesh
-from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector import Airfoil, BladedSector, DiskProfile, Platform, Shroud
 from stickslip.model.mesh.sector_mesh import mesh_sector
-from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave

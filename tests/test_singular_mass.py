@@ -11,7 +11,7 @@ from stickslip.model.dense_modes import dense_modes
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.fe.rotation import rotating_solid
-from stickslip.model.mesh.mesh_facets import HEX_EDGES
+from stickslip.model.mesh.solid_mesh import HEX_EDGES
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.structure import Structure
 

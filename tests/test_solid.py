@@ -9,8 +9,7 @@ from stickslip.errors import InputError
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import lumped
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.rigid.damper import FlatCurvedDamper

@@ -17,8 +17,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import FourParameter, Iwan
 from stickslip.errors import InputError, input_error, together
 from stickslip.model.mesh.blade_pair import BladePair
-from stickslip.model.mesh.sector import BladedSector
-from stickslip.model.mesh.sector_parts import Shroud
+from stickslip.model.mesh.sector import BladedSector, Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.analysis import named
 from stickslip.study.file.example import Kind, example_text

@@ -23,8 +23,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
-from stickslip.model.mesh.mesh_facets import facets_of
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh, facets_of
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
 from stickslip.reduction.choice import Reduction

@@ -20,9 +20,8 @@ from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.fe.solid import Material
-from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector import BladedSector, Shroud
 from stickslip.model.mesh.sector_mesh import mesh_sector
-from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix import read_calculix_matrices

@@ -12,7 +12,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
 from stickslip.model.dofs import Dofs, is_numbered, join_dofs
-from stickslip.model.mesh.mesh_facets import facets_of
+from stickslip.model.mesh.solid_mesh import facets_of
 from stickslip.model.part import BodyPoints, Part
 
 AXES = ("x", "y", "z")

@@ -20,12 +20,12 @@ from .gyroscopic import GyroscopicModes as GyroscopicModes
 from .gyroscopic import gyroscopic_modes as gyroscopic_modes
 from .matrices import chain as chain
 from .matrices import lumped as lumped
-from .mesh.blade_mesh import mesh_blade_pair as mesh_blade_pair
+from .mesh.blade_pair import mesh_blade_pair as mesh_blade_pair
+from .mesh.sector import Airfoil as Airfoil
+from .mesh.sector import DiskProfile as DiskProfile
+from .mesh.sector import Platform as Platform
+from .mesh.sector import Shroud as Shroud
 from .mesh.sector_mesh import mesh_sector as mesh_sector
-from .mesh.sector_parts import Airfoil as Airfoil
-from .mesh.sector_parts import DiskProfile as DiskProfile
-from .mesh.sector_parts import Platform as Platform
-from .mesh.sector_parts import Shroud as Shroud
 from .mesh.solid_mesh import SolidMesh as SolidMesh
 from .mesh.solid_mesh import write_mesh as write_mesh
 from .modes import Modes as Modes
@@ -51,8 +51,8 @@ from .readers.calculix_deck import read_deck as read_deck
 from .readers.frd import FrdResults as FrdResults
 from .readers.frd import NodalField as NodalField
 from .readers.frd import read_frd as read_frd
-from .readers.hysteresis import read_loops as read_loops
 from .readers.matrix_files import read_matrix_files as read_matrix_files
+from .readers.measured_columns import read_loops as read_loops
 from .readers.nastran import NastranResults as NastranResults
 from .readers.nastran import read_nastran_op2 as read_nastran_op2
 from .readers.nastran import read_nastran_op4 as read_nastran_op4

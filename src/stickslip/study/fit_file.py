@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip.contact.loop_fit import LoopFit, fit_loops
 from stickslip.errors import InputError
-from stickslip.model.readers.hysteresis import read_loops
+from stickslip.model.readers.measured_columns import read_loops
 
 WIDTH = 24  # of the column of names
 UNTOLD = "not told"

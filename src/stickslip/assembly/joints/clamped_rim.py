@@ -6,7 +6,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.assembly.locations import Places, Spot
 from stickslip.contact.facets import centres, normals
 from stickslip.contact.surface import SMOOTH, Surface
-from stickslip.model.mesh.mesh_facets import facets_of
+from stickslip.model.mesh.solid_mesh import facets_of
 
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 

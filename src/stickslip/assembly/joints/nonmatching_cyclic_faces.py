@@ -8,7 +8,7 @@ from stickslip.assembly.locations import node_rows
 from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
-from stickslip.model.mesh.mesh_facets import facets_of
+from stickslip.model.mesh.solid_mesh import facets_of
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector

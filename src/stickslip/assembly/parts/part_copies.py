@@ -11,8 +11,7 @@ from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.rotation import RotatingSolid
-from stickslip.model.mesh.mesh_facets import mirrored_cells
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh, mirrored_cells
 from stickslip.model.part import BodyPoints, Part, Place, rigid_part
 from stickslip.model.structure import Structure
 from stickslip.reduction.turning import dof_rotation

@@ -12,8 +12,7 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, missing_package
-from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
 
 CHUNK = 200_000  # cells x quadrature points x nodes worked on at once: 20 to 100 MB
 TET_PLACES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)

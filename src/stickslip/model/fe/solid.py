@@ -14,8 +14,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import EXACT, Quadrature, check_jacobians, library, library_element, shape_functions
-from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
 from stickslip.model.structure import Structure
 from stickslip.units import check_quantities, quantity
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
-from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
+from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES
 from stickslip.model.readers.deck_model import DeckModel, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, unique_in_order, whole_number
 

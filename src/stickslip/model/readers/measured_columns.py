@@ -1,4 +1,4 @@
-"""Columns of measured numbers from a CSV file, with the unit at the end of each name."""
+"""Columns of measured numbers from a CSV file, with the unit at the end of each name, and hysteresis loops made of them."""
 
 import csv
 import math
@@ -164,3 +164,49 @@ def _check(path: Path, names: tuple[str, ...], table: list[tuple[int, list[str]]
                 f"has {len(row)} cells, the first line {len(names)}",
                 "Mend the line; the file may be cut short, or have commas in its numbers.",
             )
+
+
+LOOP = "loop"  # column that tells recordings apart
+
+
+def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:
+    """Read displacement and force of hysteresis loops, in SI.
+
+    The columns are ``displacement_m`` (or ``_mm``, ``_um``) and ``force_n`` (or ``_kn``), in the order of time. A column ``loop``
+    tells recordings apart that do not follow on each other; other columns are passed over.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    tuple
+        For each recording the displacements (n,) in m and forces (n,) in N.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read; it names the line and the cell.
+    """
+    if not Path(path).is_file():
+        near = [p.name for p in Path(path).parent.glob("*.csv")]
+        raise input_error(
+            str(path), "there is no such file", did_you_mean(Path(path).name, near) if near else "Check the path."
+        )
+    table = read_columns(Path(path))
+    displacement = table.required("displacement", LENGTHS)
+    force = table.required("force", FORCES)
+    if LOOP not in table.names:
+        return ((displacement, force),)
+    at = table.names.index(LOOP)
+    of = np.array([row[at] for row in table.rows])
+    names = list(dict.fromkeys(of.tolist()))
+    again = np.flatnonzero(of[1:] != of[:-1]) + 1
+    if len(again) != len(names) - 1:
+        row = next(int(i) for i in again if of[i] in of[:i])
+        raise table.wrong(
+            row, LOOP, "comes back to an earlier recording", "Give each recording in one piece, or another name."
+        )
+    return tuple((displacement[of == name], force[of == name]) for name in names)

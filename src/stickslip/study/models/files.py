@@ -24,8 +24,8 @@ from stickslip.model.readers.ansys_archive import (
     read_ansys_materials,
 )
 from stickslip.model.readers.calculix_deck import Deck, read_deck
-from stickslip.model.readers.definite import negative_damping, refuse_indefinite
 from stickslip.model.readers.open_model import read_model
+from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.parts import FileModel, SetTable

@@ -18,8 +18,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
 from stickslip.model.fe.solid import Material
 from stickslip.model.matrices import lumped, lumped_sector
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.part import BodyPoints, Part, Place, damper_part, rigid_part, solid_part, structure_part
