@@ -1,4 +1,4 @@
-"""The seam of analyses: a question, its table, its jobs, its solution record by record, its dataset."""
+"""Interface between runner and analyses: a question, its table, its jobs, its records, its dataset."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,37 +21,37 @@ from stickslip.study.verdict import Verdict, stored
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One member of the family that [vary] spans.
+    """One case of a study: one combination of the values in [vary].
 
     Parameters
     ----------
     index
         Its position.
     label
-        What is varied, as text; empty for a study without [vary].
+        Varied keys with their values; empty for a study without [vary].
     values
         Varied key -> its value here.
     settings
-        Tables of the study with the varied keys in place: ``harmonics``, ``solver``, ``limits``, and one for each analysis
-        asked for, by name.
+        Tables of the study with the values of this case: ``harmonics``, ``solver``, ``limits``, and one for each analysis of the study, by
+        name.
     build
-        Makes the model; called in the runner's process and only where a job is not sealed yet.
+        Function that makes the model. The runner calls it in its own process, and only for unfinished jobs.
     digest
-        Hash of all that the model depends on: its tables and the content of its files.
+        Hash of everything the model depends on: its tables and the content of its files.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     checks
-        Further checks that this run asks for, of those that the analysis names in `Analysis.checks`.
+        Additional checks of this run, a subset of `Analysis.checks`.
     store
-        Keeps what is expensive of the model: for `assemble`.
+        Cache for expensive parts of the model; argument of `assemble`.
     digest_at_rest
-        As `digest`, without harmonic loads and outputs.
+        The same hash without harmonic loads and outputs.
     at
-        Makes the model with another value of a key, picklable; None where no key can be changed.
+        Function that makes the model with another value of a key, picklable; None if no key can be changed.
     accepts
-        Refuses a value of a key, without a model; None where only the model itself can tell.
+        Function that refuses an invalid value of a key without building a model; None if only the model can tell.
     drive
-        Harmonic forces over static ones: the more, the more contacts slip, and the longer a response takes.
+        Ratio of harmonic to static forces. The larger it is, the more contacts slip and the longer a response takes.
     """
 
     index: int
@@ -69,21 +69,21 @@ class Case:
     drive: float = 0.0
 
     def as_text(self, *tables: str) -> str:
-        """Return tables of the settings, by name, as a text that changes where they do."""
+        """Return some tables of the settings as text; equal texts mean equal tables."""
         own = (getattr(self.settings, name) for name in tables)
         return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One case of one analysis, picklable: solved anywhere, it appends records to its own journal and seals one file.
+    """One case of one analysis, picklable. Any process can solve it; it appends records to its own journal and seals one file.
 
     Parameters
     ----------
     label
-        What is said of it while it runs.
+        Name of the job in the log.
     inputs
-        All that `Analysis.solve` needs; made by `Analysis.inputs`.
+        Inputs of `Analysis.solve`, made by `Analysis.inputs`.
     """
 
     label: str
@@ -92,16 +92,16 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What a sealed job holds.
+    """Content of a sealed job.
 
     Parameters
     ----------
     case
         The case.
     records
-        In the order in which they came.
+        Records in the order of solution.
     notes
-        Named arrays, numbers and texts that the job put down beside its records (`Notes.put`).
+        Named arrays, numbers and texts that the job stored beside its records (`Notes.put`).
     """
 
     case: Case
@@ -110,14 +110,14 @@ class Solved:
 
 
 class Notes(Protocol):
-    """Where a job puts down what is no record, and finds it after an interruption: the journal."""
+    """Store of a job for everything that is no record; kept in the journal, so it survives an interruption."""
 
     def put(self, name: str, values: Mapping[str, Any]) -> None:
         """Store named arrays, numbers and texts."""
         ...
 
     def get(self, name: str) -> dict[str, Any] | None:
-        """Return what was stored under `name`, or None."""
+        """Return what was stored under `name`; None for an unknown name."""
         ...
 
     def forget(self, name: str) -> None:
@@ -127,20 +127,20 @@ class Notes(Protocol):
 
 @dataclass(eq=False)
 class Pieces:
-    """Pieces of a long computation in the notes of a job, so that a stopped one goes on where it was.
+    """Intermediate results of a long computation, kept in the notes of a job so that an interrupted run continues from them.
 
     Parameters
     ----------
     notes
-        Of the job.
+        Notes of the job.
     name
-        What the names of the pieces begin with.
+        Common beginning of the names of the pieces.
     seconds
-        On the clock: pieces that are made faster are made again.
+        Wall-clock time below which a piece is not stored but computed again.
     places
-        Of the pieces that are kept.
+        Names of the stored pieces.
     taken
-        Number of pieces that a stopped job had made.
+        Number of pieces that an interrupted run had made.
     """
 
     notes: Notes
@@ -150,7 +150,7 @@ class Pieces:
     taken: int = 0
 
     def keep(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        """Return what `make` makes, or what it made before the job was stopped; `content` is all that this depends on."""
+        """Return the result of `make`, stored or new; `content` is everything that it depends on."""
         place = f"{self.name} {sha256(content.encode()).hexdigest()}"
         known = self.notes.get(place)
         if known is not None:
@@ -165,14 +165,14 @@ class Pieces:
         return made
 
     def give_up(self) -> None:
-        """Remove the pieces, once what they were made for is kept."""
+        """Remove the pieces when their final result is stored."""
         for place in self.places:
             self.notes.forget(place)
         self.places.clear()
 
 
 def of_tables(*tables: str) -> Callable[[Case], str]:
-    """Return what gives the key of a case whose records depend on some tables beside the model."""
+    """Return the `key` function of an analysis whose records depend on these tables beside the model."""
     return partial(_key, tables)  # which another process can be given
 
 
@@ -181,51 +181,52 @@ def _key(tables: tuple[str, ...], case: Case) -> str:
 
 
 def judged_when_made(data: xr.Dataset) -> tuple[Verdict, ...]:
-    """Return the verdicts that a dataset was given when it was made."""
+    """Return the verdicts stored in the attributes of a dataset."""
     return stored(data.attrs)
 
 
 def nothing_to_add(data: xr.Dataset, _measured: MeasuredPeaks | None) -> xr.Dataset:
-    """Return the dataset as it is."""
+    """Return the dataset unchanged."""
     return data
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
-    """A question that a study may ask. The module of each defines one instance; `ANALYSES` lists them.
+    """A question that a study may ask. The module of each analysis defines one instance; `ANALYSES` lists them.
 
     Parameters
     ----------
     name
-        Key of its table in the study file, its node in the result, its section of the page.
+        Name of its table in the study file, of its node in the result, and of its section on the page.
     table
-        pydantic section of the study file.
+        pydantic class of its table in the study file.
     record
-        Dataclass of what `solve` yields: arrays, numbers, texts, enumerations and None.
+        Dataclass of the records of `solve`: arrays, numbers, texts, enumerations and None.
     key
-        Returns all that the records of a case depend on beside its model, as text: tables and files, not titles or checks.
+        Returns, as text, everything that the records of a case depend on beside its model: tables and files, not titles or checks.
     inputs
-        Returns what `solve` needs, refusing what cannot be answered; raises InputError before any long computation.
+        Returns the inputs of `solve`. Raises InputError, before any long computation, for a case that cannot be answered.
     solve
-        Yields the records that are not among those done, as they are found; a generator. What `dataset` needs beside the records goes
-        into the notes: it has no model. Progress is told by `store.progress.advance`.
+        Generator of the records that are not yet done, in the order of solution. `dataset` does not have the model, so other data for it go
+        into the notes. `store.progress.advance` reports progress.
     dataset
         Returns the node of the result from all cases sealed so far. Variables of a case have the leading dimension ``case``; the runner
-        adds ``case_label`` and ``vary_value``. Attributes: ``failed``, how many points have no solution (0 if left out), and the verdicts.
+        adds ``case_label`` and ``vary_value``. Attributes: ``failed``, the number of points without a solution (0 if left out), and the
+        verdicts.
     check
-        Returns what ``stickslip check`` says of a case beyond its static state and natural frequencies: choices and estimates.
+        Returns the lines of ``stickslip check`` on a case beyond its static state and natural frequencies: choices and estimates.
     summary
-        Returns what the terminal prints of a dataset.
+        Returns the terminal tables of a dataset.
     linear
-        Whether it looks at small vibrations about the static state, of which harmonic loads and outputs are no part: cases that
-        differ in these alone then share a job.
+        Whether it concerns small vibrations about the static state. These do not depend on harmonic loads and outputs, so cases that differ
+        in these alone share a job.
     checks
-        Names of checks that a run may ask for beside the answer (``verify``). A sealed job that has not had them is opened again:
-        `solve` then finds all its records among those done, and puts what the checks found into the notes.
+        Names of additional checks that a run may ask for (``verify``). A sealed job without them is opened again: `solve` then finds all
+        its records done and writes the outcome of the checks into the notes.
     verdicts
-        Returns what is to be trusted of a finished dataset; terminal, page, file and Python show these and nothing else.
+        Returns the verdicts on a finished dataset; terminal, page, file and Python show these and nothing else.
     completed
-        Adds to a dataset what takes all cases, or the measured peaks of the study.
+        Adds to a dataset whatever needs all cases, or the measured peaks of the study.
     """
 
     name: str
@@ -244,7 +245,7 @@ class Analysis:
 
 
 def named(name: str) -> Analysis:
-    """Return an analysis of `ANALYSES`; its module is imported now, not before."""
+    """Return an analysis of `ANALYSES`; its module is imported at this call."""
     module, _, instance = ANALYSES[name].partition(":")
     found: Analysis = getattr(import_module(module), instance)
     return found
@@ -252,7 +253,7 @@ def named(name: str) -> Analysis:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text: its heading, the names of its columns, its cells, and lines below it; `detail`: a terminal shows it on request."""
+    """A table as text: heading, column names, cells, and lines below. With `detail` a terminal shows it on request only."""
 
     title: str
     head: tuple[str, ...]

@@ -59,7 +59,7 @@ def estimates(fit: LoopFit) -> list[str]:
 
 
 def study_lines(fit: LoopFit) -> list[str]:
-    """Return the lines for the table of a contact in a study file."""
+    """Return the lines for a contact table of a study file."""
     head = ['per = "interface"   # the whole contact that was measured']
     limit = {True: "friction_coefficient", False: "slip_limit_n"}[fit.normal_load is not None]
     value, off = (fit.mu, fit.deviations["mu"]) if fit.normal_load else (fit.limit, fit.deviations["limit"])

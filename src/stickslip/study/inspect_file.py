@@ -24,18 +24,18 @@ _OPTIONS = {
 
 
 def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[str]:
-    """Return what is in a model's file.
+    """Return a summary of a model file, as lines and tables.
 
     Parameters
     ----------
     path
-        Any file that `read_model` opens.
+        Any file supported by `read_model`.
     units
         Name of its unit system.
     modes
-        Natural frequencies to compute; 0 for none.
+        Number of natural frequencies to compute; 0 for none.
     mesh
-        Where the nodes lie, beside matrices that do not say.
+        File with node positions, for matrix files without them.
 
     Raises
     ------

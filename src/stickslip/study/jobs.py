@@ -1,4 +1,4 @@
-"""Execution of jobs: in this process, in watched processes, on other machines, in shares of several runs. A failed job stops no other."""
+"""Execution of jobs: in this process, in worker processes, on other machines, in several runs. A failed job stops no other."""
 
 import logging
 import pickle
@@ -42,9 +42,9 @@ class Shard:
     Parameters
     ----------
     number
-        From 1 on.
+        From 1.
     count
-        Of all.
+        Number of shards.
     """
 
     number: int
@@ -52,12 +52,12 @@ class Shard:
 
     @classmethod
     def read(cls, text: str) -> "Shard":
-        """Return what ``3/8`` says.
+        """Parse a text such as ``3/8``.
 
         Raises
         ------
         InputError
-            If it says no share.
+            If the text is not of this form.
         """
         found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
         shard = cls(*map(int, found.groups())) if found else cls(0, 0)
@@ -71,15 +71,15 @@ class Shard:
 
     @property
     def log(self) -> str:
-        """Name of the file of what it says."""
+        """Name of its log file."""
         return f"run-{self.number}-of-{self.count}.log"
 
     def own(self, tasks: Sequence[Task]) -> Sequence[Task]:
-        """Return its share of all tasks, which every shard puts into the same order."""
+        """Return its share of all tasks; every shard sorts the tasks in the same order."""
         return tasks[self.number - 1 :: self.count]
 
     def outcome(self, book: Book, done: int, left: int, folder: Path) -> Outcome:
-        """Return what is to be said where other shards have not ended."""
+        """Return the outcome of a shard that ends before others."""
         text = (
             f"shard {self.number}/{self.count}: {done} jobs done, {left} of other shards are not. The last one to end puts the "
             "result together, as does the same command without --shard."
@@ -97,18 +97,18 @@ SILENCE = 60.0  # seconds that it may not
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """A job with all that doing it needs; picklable.
+    """A job with everything a worker needs; picklable.
 
     Parameters
     ----------
     analysis, job, checks
-        What to answer.
+        The analysis, one of its jobs, and the checks asked for.
     sealed
-        The file that it ends in.
+        File of the finished job.
     limits
-        What it may take.
+        Limits on time and memory.
     owner
-        Of its file at work; empty: the only process that may write it.
+        Owner of the file at work; empty: no other process may write it.
     """
 
     analysis: Analysis
@@ -120,11 +120,11 @@ class Order:
 
     @property
     def file(self) -> Path:
-        """Where it is at work."""
+        """File of the job at work."""
         return file_at_work(self.sealed, self.owner)
 
     def packed(self, owner: str = "") -> Parcel:
-        """Return it as it is given to whoever does it."""
+        """Return the job pickled for a worker."""
         question = self.analysis.name.replace("_", " ")
         told = (self.sealed, self.job.label, question, self.limits, owner or self.owner)
         return Parcel(pickle.dumps((solve, self)), *told)
@@ -132,18 +132,18 @@ class Order:
 
 @dataclass
 class Loss:
-    """Workers that were lost with a job since it last went on.
+    """Count of lost workers since a job last made progress.
 
     Parameters
     ----------
     begun
-        Those that had opened a file for it.
+        Workers lost after they had opened a file for the job.
     early
-        Those that had not.
+        Workers lost before.
     files
-        That they have left.
+        Number of files left behind.
     furthest
-        How far the job has come in these.
+        Progress of the furthest of these files.
     """
 
     begun: int = 0
@@ -152,7 +152,7 @@ class Loss:
     furthest: tuple[int, ...] = ()
 
     def count(self, left: Sequence[Path]) -> None:
-        """Count one more."""
+        """Count one more lost worker; `left` are the files left behind."""
         furthest = max(map(reached, left), default=())
         if furthest > self.furthest > ():
             self.begun = self.early = 0
@@ -164,16 +164,16 @@ class Loss:
 
 
 def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Path]:
-    """Work jobs off, in their order; give the file of each when it is sealed.
+    """Work off jobs in their order; yield the file of each job when it is sealed.
 
     Parameters
     ----------
     orders
         The jobs.
     hands
-        What they are given to.
+        The workers.
     folder
-        Of the results.
+        Folder of the results.
     """
     left, running = deque(orders), dict[Future[Answer], Order]()
     lost: dict[Path, Loss] = {}
@@ -265,7 +265,7 @@ def _watched_here(order: Order, hands: Hands) -> None:
 
 
 def solve(order: Order, file: Path) -> None:
-    """Solve a job, going on from what its file holds, and seal the file; runs in any process."""
+    """Solve a job from the state in its file, and seal the file. Runs in any process."""
     begin(order.sealed, file, order.analysis.record)
     with until_sealed_elsewhere(order.sealed, file), JobJournal(file, order.analysis.record) as journal:
         journal.forget(ASIDE)
@@ -275,7 +275,7 @@ def solve(order: Order, file: Path) -> None:
 
 
 def solve_job(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[str]) -> None:
-    """Add the records to the journal that are not in it."""
+    """Append the missing records of a job to its journal."""
     done = journal.records()
     if done:
         LOG.info(f"{job.label} goes on after {len(done)} records of the earlier start")

@@ -27,20 +27,20 @@ REMEDIES = {
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run has found.
+    """Result of a run.
 
     Parameters
     ----------
     tree
-        A node an analysis; attributes of the root say where it comes from.
+        One node an analysis; the attributes of the root hold the provenance.
     summaries
-        Of each analysis, what the terminal prints.
+        Terminal tables of each analysis.
     failed
         Number of points without a solution.
     files
-        Of the run; the result first.
+        Files of the run, the result first.
     waits
-        For what the result waits, where other runs have to put it together; empty: it is here.
+        Shards still missing, in words; empty for a complete result.
     """
 
     tree: xr.DataTree
@@ -51,7 +51,7 @@ class Outcome:
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """What is to be trusted."""
+        """Verdicts of all analyses."""
         return of_tree(self.tree)
 
 
@@ -64,7 +64,7 @@ class Task:
     sealed: Path
 
     def ended(self) -> bool:
-        """Whether the job is sealed, and has had the checks or was set aside."""
+        """Whether the job is sealed, and either has had its checks or was set aside."""
         if not self.sealed.exists():
             return False
         wanted = self.case.checks
@@ -73,18 +73,18 @@ class Task:
         return read_note(self.sealed, ASIDE) is not None
 
     def finished(self) -> bool:
-        """Whether nothing is left to do: the job has ended, and was not set aside."""
+        """Whether the job has ended and was not set aside."""
         return self.ended() and read_note(self.sealed, ASIDE) is None
 
 
 def checked(note: Mapping[str, Any] | None) -> frozenset[str]:
-    """Return the checks that a job has had, by its note."""
+    """Return the names of the checks that a job has had, from its note."""
     return frozenset() if note is None else frozenset(map(str, note["names"]))
 
 
 @dataclass(frozen=True, eq=False)
 class Book:
-    """What is finished so far: each case is judged when its job ends, what speaks of all of them when they are put together."""
+    """Finished jobs of a run. Each case is judged when its job ends; nodes of analyses are made when the tree is asked for."""
 
     origin: Provenance
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
@@ -96,7 +96,7 @@ class Book:
     measured: MeasuredPeaks | None = None
 
     def read(self, tasks: Sequence[Task], unfinished: Container[Path]) -> None:
-        """Take up the jobs that have been sealed since, and tell what is to be thought of their cases."""
+        """Read the jobs sealed since the last call, and log the verdicts on their cases."""
         for asked in {t.analysis.name: t.analysis for t in tasks}.values():
             own = [t for t in tasks if t.analysis is asked and t.sealed not in unfinished]
             new = {t.sealed for t in own} - self.solved.keys()
@@ -118,7 +118,7 @@ class Book:
         self._tell(new)
 
     def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
-        """Make the node of an analysis from what its cases have found; those set aside have none."""
+        """Make the node of an analysis from its solved cases; cases set aside are left out."""
         self.aside[asked.name] = [_unsolved(s, ASIDE) for s in solved if ASIDE in s.notes]
         solved = [s for s in solved if ASIDE not in s.notes]
         if not solved:
@@ -149,7 +149,7 @@ class Book:
         return sorted(self.nodes, key=[*ANALYSES, *self.nodes].index)
 
     def tree(self, *, complete: bool) -> xr.DataTree:
-        """Return the tree of all nodes, with what it comes from."""
+        """Return the tree of all nodes with its provenance."""
         self._put_together()
         attributes = self.origin.attributes(complete=complete)
         aside = [verdict for found in self.aside.values() for verdict in found]
@@ -159,7 +159,7 @@ class Book:
         return xr.DataTree.from_dict({"/": root, **{n: self.nodes[n] for n in self._names}})
 
     def outcome(self, asked: Sequence[Analysis]) -> Outcome:
-        """Return what a run has found that has answered everything it was asked; tell what has not been told."""
+        """Return the result of a complete run, and log the verdicts not logged before."""
         tree = self.tree(complete=True)
         self._tell(verdict for found in self.aside.values() for verdict in found)
         for name in self._names:
@@ -186,7 +186,7 @@ def _unsolved(solved: Solved, note: str) -> Verdict:
 
 
 def case_variables(cases: Sequence[Case]) -> dict[str, Any]:
-    """Return the label of each case, and the values of the varied keys if there are any."""
+    """Return the labels of the cases, and the values of the varied keys if there are any."""
     found: dict[str, Any] = {"case_label": variable("case", [c.label for c in cases], "1", "what is varied")}
     keys = list(cases[0].values)
     if keys:

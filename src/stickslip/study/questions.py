@@ -1,4 +1,4 @@
-"""The questions that a study may ask, one line each: name of the table -> module and its instance, and the class of the table.
+"""The analyses that a study may ask for, one line each: name of the table -> module and its instance, and the class of the table.
 
 A file is judged by the tables alone; the analyses, with all that they compute, are loaded when it is found good.
 """

@@ -1,4 +1,4 @@
-"""The runner: every job of every analysis, each record written to disk."""
+"""The runner: it works off the jobs of all analyses and writes each record to disk."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -39,16 +39,16 @@ SHARE = 0.1  # of the time that a run may write what is not complete
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where the jobs of a run are worked off.
+    """Where a run executes its jobs.
 
     Parameters
     ----------
     workers
         Number of processes; the numbers do not depend on it.
     kind
-        What runs them, see `executor`.
+        Kind of executor, see `executor`.
     shard
-        Which of them; None: all.
+        Shard of this run; None: all jobs.
     """
 
     workers: int = 1
@@ -56,11 +56,11 @@ class Place:
     shard: Shard | None = None
 
     def log(self, folder: Path) -> Path:
-        """Return the file of what the run says."""
+        """Return the path of the log file."""
         return folder / (LOG_FILE if self.shard is None else self.shard.log)
 
     def check(self, *, fresh: bool) -> None:
-        """Refuse what cannot be, before anything is computed."""
+        """Refuse impossible settings before any computation."""
         if self.workers < 1:
             raise input_error("--workers", f"must be above zero, got {self.workers}", "Leave it out for one.")
         if isinstance(self.kind, str):
@@ -83,27 +83,27 @@ def run_study(
     fresh: bool = False,
     checks: Sequence[str] = (),
 ) -> Outcome:
-    """Answer the questions of a study, going on from what an interrupted run has finished.
+    """Answer the questions of a study. An interrupted run continues with the unfinished jobs.
 
     Parameters
     ----------
     study
-        That has been read.
+        A study from `read_study`.
     only
         Names of the analyses to answer; all of the study if empty.
     workers, kind, shard
-        Where the jobs are worked off, see `Place`.
+        Where the jobs are executed, see `Place`.
     fresh
-        Forget what the results folder holds.
+        Delete earlier results and start again.
     checks
-        Checks beside the answers, by names of `Analysis.checks`.
+        Additional checks, by the names in `Analysis.checks`.
 
     Raises
     ------
     InputError
-        If the study, its files or its folder do not allow a run; before anything long is computed.
+        If the study, its files or its folder do not allow a run; raised before any long computation.
     Interrupted
-        If the user stops it; the message says how to go on.
+        If the user stops the run; the message says how to continue.
     """
     asked, place = asked_for(study, only), Place(workers, kind, shard)
     place.check(fresh=fresh)
@@ -123,12 +123,12 @@ def run_study(
 
 
 def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
-    """Return the analyses that a study asks for, in their order.
+    """Return the analyses of a study in their order.
 
     Raises
     ------
     InputError
-        If `only` names one that is not known or has no table, or the study asks for none.
+        If `only` names an analysis that is unknown or has no table, or the study has no analysis.
     """
     for name in only:
         if name not in ANALYSES:
@@ -146,7 +146,7 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
 
 
 def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None) -> Outcome:
-    """Answer one question to models of Python, for whose page is `given` what a study file would have of them; nothing is written."""
+    """Run one analysis on Python models without writing files; `given` are the tables of an equivalent study file, for the page."""
     book = Book(Provenance(title, "", library_versions(), json.dumps(given or {}, default=str)))
     found = []
     for case in cases:
@@ -287,7 +287,7 @@ def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]
 
 @contextmanager
 def of_task(study: Study, case: Case) -> Iterator[None]:
-    """Let a refusal name the study's file, and the case where there are several."""
+    """Add the path of the study file, and the case if there are several, to input errors raised in the block."""
     try:
         yield
     except InputError as error:

@@ -16,7 +16,7 @@ def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
 
 
 def as_number(value: object) -> float:
-    """Return a varied value as a number, NaN where it is none."""
+    """Return a varied value as a number; NaN for a text."""
     try:
         return float(str(value))
     except ValueError:
@@ -24,7 +24,7 @@ def as_number(value: object) -> float:
 
 
 def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
-    """Return the first varied key whose values are numbers, and its values (case,); no key and NaN without one."""
+    """Return the first varied key whose values are numbers, and its values (case,); an empty key and NaN if there is none."""
     keys, values = varied_values(data)
     numbers = np.array([[as_number(v) for v in row] for row in values]).reshape(values.shape)
     for column, key in enumerate(keys):
@@ -35,7 +35,7 @@ def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
 
 
 def other_values(data: xr.Dataset, key: str) -> list[str]:
-    """Return what else is varied in each case, as labels of cases have it; empty where nothing is."""
+    """Return the other varied keys of each case with their values, as in labels of cases; empty if there are none."""
     keys, values = varied_values(data)
     others = [i for i, k in enumerate(keys) if k != key]
     return [", ".join(f"{keys[i]} = {_written(row[i])}" for i in others) for row in values]

@@ -21,7 +21,7 @@ INCOMPLETE = "the run is not complete"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be thought of an answer, or of a point of it.
+    """Verdict on an answer or on one of its points.
 
     Verdicts are ordered by their levels: `max` of several is the worst one.
 
@@ -30,15 +30,15 @@ class Verdict:
     level
         ``trusted``, ``doubtful`` or ``wrong``.
     case
-        Label of the case; empty: the only one, or all of them.
+        Label of the case; empty: the only case, or all of them.
     frequency_hz
-        Of the point; None: the case as a whole.
+        Frequency of the point; None: the whole case.
     why
-        Half a sentence or more, without a full stop.
+        Reason: half a sentence or more, without a full stop.
     remedy
-        What to do, in whole sentences; empty where nothing is to be done.
+        Remedy in whole sentences; empty for none.
     warns
-        Whether an answer that is trusted tells of danger: a wheel that flutters.
+        Whether a trusted answer is a warning, such as a wheel that flutters.
     """
 
     level: Level
@@ -55,32 +55,32 @@ class Verdict:
 
     @property
     def told(self) -> bool:
-        """Whether the user is told of it unasked: it is not trusted, or there is something to do or to know."""
+        """Whether it is shown unasked: it is not trusted, or has a remedy or a warning."""
         return self.rank > 0 or self.warns or bool(self.remedy)
 
     @property
     def word(self) -> str:
-        """What begins it wherever it is shown: its level; of what is trusted ``warning`` or ``note`` where there is something to do or to know."""
+        """Word in front of it: its level, or ``warning`` or ``note`` for a trusted answer with a warning or a remedy."""
         if self.warns and not self.rank:
             return "warning"
         return "note" if self.told and not self.rank else self.level
 
     @property
     def finding(self) -> str:
-        """The verdict in words, but for its level and what to do."""
+        """The verdict as a sentence, without level and remedy."""
         hertz = self.frequency_hz
         place = "" if hertz is None else f"{hertz:.2f} Hz: " if hertz >= 1.0 else f"{hertz:.4g} Hz: "
         return said(self.case, f"{place}{self.why}.")
 
     @property
     def place(self) -> str:
-        """Its case and frequency."""
+        """Case and frequency."""
         hertz = "" if self.frequency_hz is None else f"{self.frequency_hz:.6g} Hz"
         return f"{self.case} ({hertz})" if self.case and hertz else self.case or hertz
 
     @property
     def sentence(self) -> str:
-        """The verdict in words, but for its level."""
+        """The verdict as a sentence, without level."""
         return f"{self.finding} {self.remedy}".rstrip()
 
     def __str__(self) -> str:
@@ -91,22 +91,22 @@ class Verdict:
 
 
 def said(label: str, text: str) -> str:
-    """Return a sentence about a case, with its label where there are several."""
+    """Return a sentence about a case, preceded by its label if there are several cases."""
     return f"{label}: {text}" if label else text[:1].upper() + text[1:]
 
 
 def doubt(text: str, case: str = "") -> Verdict:
-    """Return the verdict ``doubtful`` with what a whole sentence, or several, says."""
+    """Return the verdict ``doubtful`` with a text of one or more sentences as its reason."""
     return Verdict("doubtful", case, None, text.removesuffix("."))
 
 
 def worst(levels: Iterable[Level]) -> Level:
-    """Return the worst of several levels, ``trusted`` of none."""
+    """Return the worst of several levels; ``trusted`` if there are none."""
     return max(levels, key=LEVELS.index, default="trusted")
 
 
 def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdict, ...]:
-    """Return verdicts in their order, and once without a case what holds as a whole for each of several."""
+    """Return verdicts in their order. One that is the same for several whole cases appears once, without a case."""
     cases: dict[tuple[Any, ...], list[str]] = {}
     for v in each:
         cases.setdefault((v.level, v.frequency_hz, v.why, v.remedy, v.warns), []).append(v.case)
@@ -119,12 +119,12 @@ def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdic
 
 
 def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
-    """Return verdicts as they are read: wrong, doubtful, warnings, notes, trusted; the order of the cases within each."""
+    """Return verdicts in reading order: wrong, doubtful, warnings, notes, trusted; within each in the order of the cases."""
     return sorted(verdicts, key=lambda v: (-v.rank, not v.warns, not v.told))
 
 
 def together(labels: Sequence[str]) -> str:
-    """Return labels of cases in a line: values of one key behind its name."""
+    """Join labels of cases to one line; a common key is named once."""
     keys = {label.partition(" = ")[0] for label in labels}
     if len(keys) == 1 and not any(", " in label for label in labels):
         head, *rest = labels
@@ -133,7 +133,7 @@ def together(labels: Sequence[str]) -> str:
 
 
 def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:
-    """Return verdicts by kind, the kinds worst first: of one kind say the same before their first number; what is only trusted of cases is one kind."""
+    """Group verdicts by kind, the worst kind first. Verdicts of a kind agree up to their first number; plain trusted cases form one kind."""
     kinds: dict[tuple[str, ...], list[Verdict]] = {}
     for v in worst_first(verdicts):
         own: tuple[str, ...] = (v.word, _gist(v.why), _gist(v.remedy))
@@ -146,12 +146,12 @@ def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:
 
 
 def likewise(others: Sequence[Verdict]) -> str:
-    """Say where the others of a kind are; nothing where there are none."""
+    """List the places of the other verdicts of a kind; empty for none."""
     return f"Likewise: {together([v.place for v in others])}." if others else ""
 
 
 def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
-    """Return verdicts as lines, worst first: of one kind the first one and where the others are, unless `every` one is asked for."""
+    """Return verdicts as lines, worst first: one line a kind with the places of the others, or with `every` one line a verdict."""
     if every:
         return [str(v) for v in worst_first(verdicts)]
     lines = []
@@ -179,9 +179,9 @@ def from_json(text: str) -> tuple[Verdict, ...]:
 
 
 def stored(attributes: Mapping[Any, Any]) -> tuple[Verdict, ...]:
-    """Return the verdicts that stand in the attributes of a dataset.
+    """Return the verdicts stored in the attributes of a dataset.
 
-    Results of versions that knew no verdicts have sentences instead, which were warnings.
+    Results of early versions hold warnings as sentences instead; these become verdicts.
     """
     if ATTRIBUTE in attributes:
         return from_json(str(attributes[ATTRIBUTE]))
@@ -204,7 +204,7 @@ def of_tree(tree: xr.DataTree) -> tuple[Verdict, ...]:
 
 
 def not_trusted(tree: xr.DataTree) -> str:
-    """Say in a line which analyses, and which of their cases, are doubtful or wrong; empty where all are trusted."""
+    """Name in a line the analyses and cases that are doubtful or wrong; empty if all are trusted."""
     aside = len(stored(tree.attrs))
     each = [INCOMPLETE] * _incomplete(tree) + [f"{aside} of the jobs set aside"] * (aside > 0)
     each += [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
@@ -213,7 +213,7 @@ def not_trusted(tree: xr.DataTree) -> str:
 
 
 def conclusion(tree: xr.DataTree) -> str:
-    """Say in a line whether a result is to be trusted: `not_trusted`, or else which single points are not, after how many warnings there are."""
+    """Summarise a result in a line: `not_trusted`, or else the number of warnings and the single points that are not trusted."""
     told = not_trusted(tree)
     if told:
         return told

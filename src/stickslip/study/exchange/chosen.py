@@ -23,27 +23,27 @@ class Chosen:
     Parameters
     ----------
     analysis
-        That has it.
+        Name of the analysis.
     told
-        What it is, in words.
+        Description of the motion in words.
     label
-        Of its case.
+        Label of the case.
     omega
         Frequency, rad/s.
     labels, retained
-        Names (n,) and motion (H+1, n) of the coordinates that are solved for, m.
+        Names (n,) and motion (H+1, n) of the retained coordinates, m.
     outputs, reported
-        Names (k,) and motion (H+1, k) of what is reported, m.
+        Names (k,) and motion (H+1, k) of the outputs, m.
     orders
-        Highest harmonics with which the model may have been assembled.
+        Candidates for the highest harmonic of the assembled model.
     wave_number
-        Of a tuned wheel that nothing drives; None: a load drives, or it is no such wheel.
+        Wave number of a free motion of a tuned wheel; else None.
     free
-        Whether nothing drives it.
+        Whether the motion is free of harmonic loads.
     rate, decays
-        Damping by the mass that keeps the motion going, 1/s; or the rate at which it decays as it is.
+        Mass-proportional damping that sustains the motion, 1/s; decay rate of the motion without it, 1/s.
     point
-        Of a forced response: among all its points; else None.
+        Index among all points of the forced response; else None.
     """
 
     analysis: str
@@ -63,7 +63,7 @@ class Chosen:
 
     @property
     def hz(self) -> float:
-        """Frequency."""
+        """Frequency in Hz."""
         return self.omega / HZ
 
 
@@ -83,20 +83,20 @@ def chosen(
     tree
         The result.
     analysis
-        Empty: the first that can be written.
+        Name of the analysis; empty: the first one whose motions can be written.
     case
-        Position among the cases.
+        Index of the case.
     number
-        Which nonlinear mode or limit cycle of the case, from 0.
+        Index of the nonlinear mode or limit cycle in the case, from 0.
     hz
-        Of a forced response: the point nearest to it; None: the peak.
+        Frequency at which a point of a forced response is chosen, the nearest one; None: the peak.
     amplitude_mm
-        Of a nonlinear mode: the motion nearest to it; None: the most damped one.
+        Amplitude at which a motion of a nonlinear mode is chosen, the nearest one; None: the motion with the highest damping.
 
     Raises
     ------
     InputError
-        If there is none.
+        If there is no such motion.
     """
     name = _analysis(tree, analysis)
     data = tree[name].to_dataset()
@@ -139,12 +139,12 @@ def _refuse_unused(name: str, *, number: int, hz: float | None, amplitude_mm: fl
 
 
 def point_of(data: xr.Dataset, case: int, hz: float | None) -> int:
-    """Return the index of the peak of a case of a forced response, or of its converged point nearest to a frequency.
+    """Return the index of the peak of a forced response, or of the converged point nearest to a frequency.
 
     Raises
     ------
     InputError
-        If no point of it has converged, or the frequency is none of its response.
+        If no point has converged, or the frequency lies outside the response.
     """
     solved = np.isfinite(data["retained_displacement"].values).any(axis=(1, 2, 3))
     mine = np.flatnonzero((data["point_case"].values == case) & solved)
@@ -166,7 +166,7 @@ def point_of(data: xr.Dataset, case: int, hz: float | None) -> int:
 
 
 def as_complex(values: FloatArray) -> ComplexArray:
-    """Return the complex numbers that a result holds as pairs in its last dimension."""
+    """Return complex numbers from stored pairs (real, imaginary) in the last dimension."""
     return np.asarray(values[..., 0] + 1j * values[..., 1])
 
 

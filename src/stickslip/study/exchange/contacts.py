@@ -19,15 +19,15 @@ class ContactMotion:
     Parameters
     ----------
     position
-        (p, 3) in m.
+        (p, 3) positions, m.
     frame
         (p, 3, 3) columns t, w, n.
     area
-        (p,) in m², NaN where there are no facets.
+        (p,) m²; NaN for points without facets.
     gap, force
         (p, 3, s) along t, w, n, in m and N.
     state
-        (p, 2, s) stick 0, slip 1, open 2 for t and w; None where the result has none: beside the peak.
+        (p, 2, s) stick 0, slip 1, open 2 for t and w; None away from the peak, where results hold no states.
     energy
         (p,) dissipated in a cycle, J.
     static_force
@@ -44,7 +44,7 @@ class ContactMotion:
     static_force: FloatArray
 
     def at(self, share: float) -> dict[str, FloatArray]:
-        """Return fields on the points at a share of the period; vectors along the global axes."""
+        """Return the fields at a fraction of the period, (p,) or (p, 3); vectors along the global axes."""
         gap, force = (_between(signal, share) for signal in (self.gap, self.force))
         tangential = np.array([1.0, 1.0, 0.0])
         found = {
@@ -73,7 +73,7 @@ class ContactMotion:
 
 
 def contacts_of(data: xr.Dataset, motion: Motion, case: int, point: int) -> tuple[ContactMotion, ...]:
-    """Return what contacts do at a point of a response, sector by sector; none where they have no place in space."""
+    """Return the motion of the contacts at a point of a response, one entry a sector; none for contacts without positions."""
     position, frame, area = (_of_case(data, f"contact_{name}", case) for name in ("position", "frame", "area"))
     placed = np.isfinite(position).all(axis=1)
     if not placed.any():

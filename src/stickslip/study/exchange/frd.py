@@ -1,4 +1,4 @@
-"""Fields for CalculiX's viewer and whatever reads ``.frd``: two result blocks a harmonic, real and imaginary part."""
+"""Fields for CalculiX's viewer and other readers of ``.frd``: two result blocks a harmonic, real and imaginary part."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,11 +21,11 @@ def write_frd(motion: Motion, path: Path, units: Units) -> Path:
     Parameters
     ----------
     motion
-        At one point of a response.
+        The motion at one point of a response.
     path
         The file.
     units
-        In which lengths and frequencies are written.
+        Unit system of lengths and frequencies.
     """
     lines = [*_head(), *_mesh(motion, units)]
     for step, h in enumerate([0, *(h for h in motion.harmonics if h > 0)], 1):

@@ -20,14 +20,14 @@ CHANGED = "Files of the model have changed since the run, or the study has: run 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The nodes of a part, in one sector, and how they move.
+    """Nodes of a part in one sector, and their motion.
 
     Parameters
     ----------
     nodes
-        Where they are.
+        Nodes with positions.
     sector
-        Counted from 0.
+        Index from 0.
     amplitudes
         (H+1, n, 3) coefficients of ``u(t) = Re Σ U_h exp(i h ω t)`` in m along the global axes.
     """
@@ -50,28 +50,28 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How everything moves.
+    """Motion of all parts.
 
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     hz
-        Frequency.
+        Frequency in Hz.
     harmonics
-        Those that move anything, from 0.
+        Harmonics with nonzero motion, from 0.
     bodies
-        Part by part, sector by sector.
+        Parts in their order, sector by sector.
     outputs
         Label of each output -> its sector, part and node number.
     sectors
-        How many sectors of a wheel there are: 1 or all.
+        Number of sectors described: 1 or all.
     lag
-        Share of the period by which a sector is ahead of the one before it; None where each has a motion of its own.
+        Fraction of the period by which a sector leads the one before it; None if each sector has a motion of its own.
     axis
-        That sectors are turned about.
+        Rotation axis of the wheel.
     pitch
-        Angle of a sector in rad.
+        Sector angle in rad.
     """
 
     label: str
@@ -86,16 +86,16 @@ class Motion:
 
 
 def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
-    """Return how everything moves.
+    """Return the motion of all parts.
 
     Parameters
     ----------
     chosen
-        The motion of a result.
+        The motion of the result.
     model
-        Of its case.
+        The model of its case.
     wheel
-        Whether all sectors are wanted, not one; a wheel whose sectors differ is always whole.
+        Whether all sectors are wanted instead of one; a mistuned wheel is always whole.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
 
 
 def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
-    """Return the model with its way back and the motion of all dofs of its sectors, which has to hold the outputs of the result."""
+    """Return the assembled model with its expansion to all dofs, and the motion of all dofs of its sectors. The outputs must agree with the result."""
     # how many modes the waves of a wheel keep may depend on the other waves
     ways = [(chosen.orders[0], chosen.wave_number is not None)]
     if model.sectors > 1 and model.mistuning is None and not chosen.free:
@@ -191,7 +191,7 @@ def _places(model: Model, whole: Everywhere) -> Iterator[tuple[str, tuple[int, s
 
 
 def numbers_of(motion: Motion) -> tuple[list[IntArray], list[IntArray]]:
-    """Return node and cell numbers of each body, from 1, none twice: those of the model's files where they are so, else counted through."""
+    """Return unique node and cell numbers of each body, from 1: those of the model's files if they are unique, else consecutive ones."""
     nodes = [body.nodes.numbers for body in motion.bodies]
     cells = [body.nodes.cell_numbers for body in motion.bodies]
     return _once(nodes), _once([np.zeros(0, dtype=np.int64) if c is None else c for c in cells])

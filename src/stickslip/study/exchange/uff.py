@@ -22,14 +22,14 @@ AT_FREQUENCY, TRANSLATIONS = 5, 2  # of dataset 55
 
 
 def write_uff(motion: Motion, data: xr.Dataset | None, case: int, path: Path) -> Path:
-    """Write nodes, a shape a harmonic, and of every output its response over frequency in each harmonic.
+    """Write the nodes, one shape a harmonic, and the response of every output over frequency in each harmonic.
 
     Parameters
     ----------
     motion
-        At one point of a response, or one that nothing drives.
+        The motion at one point of a response, or a free motion.
     data, case
-        The forced response, and which case; None of a motion that nothing drives, which has no response functions.
+        The forced response and the index of its case; None for a free motion, which has no response functions.
     path
         The file.
     """
@@ -135,7 +135,7 @@ def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str
 
 
 def in_order(data: xr.Dataset, mine: BoolArray) -> IntArray:
-    """Return the points of a case by frequency; where its branch folds, along the branch, without those that resolve the peak."""
+    """Return the points of a case by frequency; on a folded branch along the branch, without the added points at the peak."""
     points = np.flatnonzero(mine)
     branch = points[data["refinement"].values[points] == 0]
     steps = np.diff(data["frequency_hz"].values[branch])

@@ -1,4 +1,4 @@
-"""Fields for ParaView: one ``.vtu`` an instant with a ``.pvd`` that says when, and one with the harmonics."""
+"""Fields for ParaView: one ``.vtu`` an instant, a ``.pvd`` with their times, and one file with the harmonics."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,11 +22,11 @@ def write_vtu(motion: Motion, contacts: Sequence[ContactMotion], folder: Path, s
     Parameters
     ----------
     motion, contacts
-        At one point of a response.
+        The motion at one point of a response.
     folder
-        It exists.
+        An existing folder.
     steps
-        Instants of the period.
+        Number of instants in the period.
     """
     points = np.vstack([body.nodes.points for body in motion.bodies])
     cells, numbers = _cells(motion)

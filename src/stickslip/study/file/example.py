@@ -7,6 +7,6 @@ Kind = Literal["blades", "sector", "wheel", "file", "masses"]
 
 
 def example_text(kind: Kind = "blades") -> str:
-    """Return the example study of two blades and a damper, a meshed sector of a bladed disk, a wheel of lumped masses, one from a file, or four masses."""
+    """Return a commented example study: two blades and a damper, a meshed sector, a wheel of lumped masses, a model from a file, or four masses."""
     folder = files("stickslip.study.file").joinpath("examples")
     return folder.joinpath(f"{kind}.toml").read_text(encoding="utf-8")

@@ -111,20 +111,20 @@ class Harmonics(Section):
         return harmonics_of(self.low)
 
     def beginning(self, driven: Iterable[int]) -> Support:
-        """Return the harmonics of the first passage, from 0: where `low` is left out those that loads drive."""
+        """Return the harmonics of the first passage, from 0; without `low` the harmonics of the loads."""
         own = {h for h in driven if h > 0}
         return self.low_harmonics if "low" in self.model_fields_set or not own else harmonics_of(own)
 
     @property
     def high_harmonics(self) -> Support:
-        """Harmonics of the reference, from 0; with ``auto`` those of the published one, or of the first passage where it has more."""
+        """Harmonics of the reference, from 0; with ``auto`` those of the published method, or those of the first passage if there are more."""
         if self.high == "auto":
             return harmonics_of(max(PUBLISHED, self.low_harmonics[-1]))
         return harmonics_of(self.high)
 
     @property
     def strategy(self) -> Any:
-        """What chooses, with this table's threshold where it has one."""
+        """The strategy that chooses harmonics, with the threshold of this table if it has one."""
         from stickslip.harmonic.selection import strategy_named  # loads the contact kernels
 
         verifies = self.selection in VERIFYING
@@ -137,7 +137,7 @@ class Harmonics(Section):
 
     @property
     def chooser(self) -> Any:
-        """What a sweep takes as its selection: the name, or the strategy with this table's own threshold."""
+        """Argument `selection` of a sweep: the name of a strategy, or the strategy with the threshold of this table."""
         as_named = self.strategy_threshold is None and not self._options
         return self.selection if as_named else self.strategy
 

@@ -22,7 +22,7 @@ class Keys:
     Parameters
     ----------
     title
-        The table as the file has it, with the key that chooses its kind.
+        The table as written in the file, with the key that chooses its kind.
     rows
         Key, default and meaning of each.
     """
@@ -39,12 +39,12 @@ def tables_of_file() -> Keys:
 
 
 def table_keys(name: str) -> list[Keys]:
-    """Return the keys of a table; one entry for each kind of it.
+    """Return the keys of a table, one entry for each kind of it.
 
     Parameters
     ----------
     name
-        Of the table, such as ``forced_response``; ``contact.elastic_coulomb`` is one kind of a table alone.
+        Name of the table, such as ``forced_response``; ``contact.elastic_coulomb`` is a single kind.
     """
     schema = study_tables().model_json_schema()
     table, _, kind = name.strip("[]").partition(".")

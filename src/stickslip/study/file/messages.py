@@ -21,11 +21,11 @@ class Spot:
     Parameters
     ----------
     keys
-        As the file has them.
+        Keys that lead to it, as written in the file.
     owner
-        Model of the table that holds the last key; None for what lies in no table of fixed keys.
+        Class of the table that holds the last key; None if the table has no fixed keys.
     about
-        What the last key means.
+        Meaning of the last key.
     """
 
     keys: tuple[str, ...]
@@ -36,18 +36,18 @@ class Spot:
 def told(
     place: str, model: type[BaseModel], error: ValidationError, renamed: Mapping[str, str] | None = None
 ) -> InputError:
-    """Return one error that tells each problem: ``FILE: table.key: problem, got VALUE. REMEDY``.
+    """Return one error that lists all problems: ``FILE: table.key: problem, got VALUE. REMEDY``.
 
     Parameters
     ----------
     place
         The file.
     model
-        Of the whole file.
+        Class of the whole file.
     error
-        What pydantic found.
+        Error of pydantic.
     renamed
-        Keys that come from elsewhere: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
+        Keys written elsewhere in the file: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
     """
     every = [one for details in error.errors(include_url=False) for one in _each(details)]
     found = (_told(place, model, one, renamed or {}) for one in _unknown_first(model, every))
@@ -104,7 +104,7 @@ def _told(place: str, model: type[BaseModel], details: ErrorDetails, renamed: Ma
 
 
 def spot_at(model: type[BaseModel], path: Sequence[str | int]) -> Spot:
-    """Return the place that pydantic's path leads to: names of alternatives left out, places in lists in brackets."""
+    """Return the place of a pydantic path: tags of unions are left out, positions in lists are in brackets."""
     here: Any = model
     keys: list[str] = []
     owner, about = None, NO_ABOUT
@@ -137,14 +137,14 @@ def _opened(here: Any, part: str | int) -> tuple[Any, type[BaseModel] | bool | N
 
 
 def whole(field: Any) -> Any:
-    """Return a field's annotation with what pydantic took out of it."""
+    """Return a field's annotation together with the metadata that pydantic separates from it."""
     if field.metadata:
         return Annotated[field.annotation, *field.metadata]
     return field.annotation
 
 
 def plain(annotation: Any) -> list[Any]:
-    """Return an annotation and what it is one of, ``Annotated`` taken off."""
+    """Return the types of an annotation: the members of unions, without ``Annotated``."""
     if get_origin(annotation) is Annotated:
         return plain(get_args(annotation)[0])
     if get_origin(annotation) in (dict, list, tuple) or not get_args(annotation):
@@ -153,7 +153,7 @@ def plain(annotation: Any) -> list[Any]:
 
 
 def alternatives(annotation: Any) -> dict[str, Any]:
-    """Return the tagged members of a union by their tags."""
+    """Return the members of a tagged union by their tags."""
     if get_origin(annotation) is Annotated:
         inner, *metadata = get_args(annotation)
         tags = {m.tag: inner for m in metadata if isinstance(m, Tag)}

@@ -1,4 +1,4 @@
-"""Tables made from the dataclasses that they become: keys, units, ranges and defaults are told once, by the dataclass."""
+"""Tables made from dataclasses: the fields of the dataclass define keys, units, ranges and defaults."""
 
 from collections.abc import Collection
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -40,22 +40,22 @@ def table_of(
     name: str = "",
     **more: Column,
 ) -> type[Section]:
-    """Return the table of a dataclass whose fields tell their quantities; it refuses what the dataclass refuses.
+    """Return the pydantic table of a dataclass with quantity fields; it applies the checks of the dataclass.
 
     Parameters
     ----------
     cls
         The dataclass.
     base
-        What the table is a section of.
+        Base class of the table.
     without
-        Fields that are no keys.
+        Fields that are not keys.
     optional
-        Fields that may be left out and then come from elsewhere.
+        Fields that may be left out in the file because their values come from elsewhere.
     name
-        Of the table's class; that of `cls` if empty.
+        Name of the table's class; empty: the name of `cls`.
     more
-        Further keys.
+        Additional keys.
     """
     columns = columns_of(cls, without=without, optional=optional)
 
@@ -78,7 +78,7 @@ def table_of(
 def columns_of(
     cls: type, *, without: Collection[str] = (), optional: Collection[str] = (), per_area: bool = False
 ) -> dict[str, Any]:
-    """Return the keys that the quantities of a dataclass make, each with its annotation and what pydantic knows of it."""
+    """Return the keys of the quantities of a dataclass, each with annotation and pydantic field."""
     hints = get_type_hints(cls)
     return {
         q.key_of(entry.name, per_area=per_area): _column(entry, q, hints[entry.name], entry.name in optional, per_area)
@@ -89,13 +89,13 @@ def columns_of(
 
 @cache
 def quantities_of(cls: type) -> tuple[tuple[Field[Any], Quantity], ...]:
-    """Return the fields of a dataclass that are quantities."""
+    """Return the quantity fields of a dataclass."""
     found = ((entry, quantity_of(entry)) for entry in fields(cls))
     return tuple((entry, q) for entry, q in found if q is not None)
 
 
 def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) -> Any:
-    """Return the dataclass that a table describes, in SI; `given` are fields that do not come from the table, or instead of it."""
+    """Return the dataclass of a table, in SI units; fields in `given` replace those of the table or add to them."""
     hints = get_type_hints(cls)
     for entry, q in quantities_of(cls):
         if entry.name in given:
@@ -109,7 +109,7 @@ def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) ->
 
 
 def refused_by(cls: type, make: Any) -> Any:
-    """Return what `make` makes of `cls`; its complaint about a field becomes one about the key."""
+    """Return `make()`, an instance of `cls`; an error about a field becomes an error about its key."""
     try:
         return make()
     except InputError as error:
@@ -117,7 +117,7 @@ def refused_by(cls: type, make: Any) -> Any:
 
 
 def key_path(cls: type, argument: str) -> str:
-    """Return the keys of the field ``a.b`` of a dataclass; empty where there is none."""
+    """Return the keys of the field ``a.b`` of a dataclass; empty for an unknown field."""
     keys = []
     for name in filter(None, argument.split(".")):
         found = {entry.name: q for entry, q in quantities_of(cls)} if is_dataclass(cls) else {}

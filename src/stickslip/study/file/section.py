@@ -61,13 +61,13 @@ def _is_usual(size: float) -> bool:
 
 
 def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomError:
-    """Return the error that a validator of this package raises; `key` is the one at fault if it judges a whole table."""
+    """Return the error for a validator of this package to raise; `key` names the key at fault if the validator checks a whole table."""
     context = {"problem": problem, "remedy": remedy, "key": key}
     return PydanticCustomError("stickslip", "{problem}. {remedy}", context)
 
 
 def refuse_all(errors: Iterable[PydanticCustomError]) -> None:
-    """Raise one error that tells of all `errors`, if there are any: a validator can raise no more."""
+    """Raise one error with all `errors`, since a validator can raise only once; nothing for no errors."""
     found = list(errors)
     if found:
         first, *others = [dict(error.context or {}) for error in found]
@@ -76,7 +76,7 @@ def refuse_all(errors: Iterable[PydanticCustomError]) -> None:
 
 
 def shown(value: object) -> str:
-    """Return `value` as a message shows it: cut when long."""
+    """Return `value` as shown in messages, shortened if long."""
     try:
         text = repr(value)
     except ValueError:  # Python writes no number of thousands of digits
@@ -87,7 +87,7 @@ def shown(value: object) -> str:
 
 
 def rising_pair(values: Sequence[float], key: str, what: str = "frequency") -> None:
-    """Refuse a pair that does not rise."""
+    """Refuse a pair that does not increase."""
     if len(values) == 2 and values[0] == values[1]:
         raise custom_error(f"begins and ends at {values[0]:g}", f"Give the lower {what} first, then a higher one.", key)
     if len(values) == 2 and not values[0] < values[1]:
@@ -97,6 +97,6 @@ def rising_pair(values: Sequence[float], key: str, what: str = "frequency") -> N
 
 
 def once(values: Sequence[object], key: str) -> None:
-    """Refuse a list that holds an entry twice."""
+    """Refuse a list with duplicates."""
     if len(set(values)) < len(values):
         raise custom_error(f"holds an entry twice, got {shown(list(values))}", "Give every one once.", key)

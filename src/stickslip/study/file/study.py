@@ -1,4 +1,4 @@
-"""The study file: TOML, read and validated whole for each case that [vary] spans."""
+"""The study file: TOML, validated as a whole for each case of [vary]."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from stickslip.study.file.vary import cases_of, label_of, with_values
 
 @dataclass(frozen=True, eq=False)
 class TablesOfCase:
-    """The tables of a study with the varied keys in place.
+    """The tables of a study with the values of one case.
 
     Parameters
     ----------
     label
-        What is varied, as text; empty for a study without [vary].
+        Varied keys with their values; empty for a study without [vary].
     values
         Varied key -> its value here.
     tables
-        Validated.
+        The validated tables.
     """
 
     label: str
@@ -35,18 +35,18 @@ class TablesOfCase:
 
 @dataclass(frozen=True, eq=False)
 class StudyFile:
-    """A study file that has been read and found good.
+    """A validated study file.
 
     Parameters
     ----------
     path
-        The file, by which messages call it.
+        Path of the file, as messages name it.
     text
-        Its content, kept for the provenance of results.
+        Its text, kept for the provenance of results.
     raw
-        Its content as TOML has it.
+        Its content as parsed TOML.
     cases
-        What [vary] spans; one without it.
+        Cases of [vary]; one case without it.
     """
 
     path: Path
@@ -56,12 +56,12 @@ class StudyFile:
 
     @property
     def tables(self) -> Tables:
-        """Tables of the first case: title, output folder and which analyses are asked for are those of all."""
+        """Tables of the first case. Title, output folder and analyses are the same in all cases."""
         return self.cases[0].tables
 
     @property
     def home(self) -> Path:
-        """Folder that names of files are relative to."""
+        """Folder to which file names are relative."""
         return self.path.resolve().parent
 
 

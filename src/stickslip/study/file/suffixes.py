@@ -48,11 +48,11 @@ class Unit:
     Parameters
     ----------
     symbol
-        As sentences write it.
+        Symbol in sentences.
     size
-        In SI, angles in rad.
+        Value in SI; angles in rad.
     powers
-        Of length, mass, time and angle.
+        Exponents of length, mass, time and angle.
     """
 
     symbol: str
@@ -61,7 +61,7 @@ class Unit:
 
 
 def unit_of(ending: str) -> Unit | None:
-    """Return the unit that an ending such as ``n_per_mm`` stands for; None where it is none."""
+    """Return the unit of an ending such as ``n_per_mm``; None for an unknown one."""
     if ending == "percent":
         return Unit(*_PERCENT)
     above: list[str] = []
@@ -104,9 +104,9 @@ def nearest_key(word: str, known: Sequence[str], value: object = None) -> str:
     Parameters
     ----------
     word
-        The key that was given.
+        The unknown key.
     known
-        Keys that there are.
+        The known keys.
     value
         Its value; a number or a list of numbers is converted.
     """
@@ -118,7 +118,7 @@ def nearest_key(word: str, known: Sequence[str], value: object = None) -> str:
 
 
 def meant_key(word: str, known: Sequence[str]) -> str:
-    """Return the known key that `nearest_key` names; empty where it names none."""
+    """Return the known key that `nearest_key` names; empty if it names none."""
     found = _in_another_unit(word, known)
     return nearest(word, list(known)) if found is None else found[0]
 

@@ -1,4 +1,4 @@
-"""All tables of a study file, those of the analyses among them."""
+"""All tables of a study file, including those of the analyses."""
 
 import json
 from functools import cache
@@ -122,7 +122,7 @@ def study_tables() -> type[Tables]:
 
 
 def asked_of(tables: Tables) -> tuple[str, ...]:
-    """Return the names of the analyses that have a table."""
+    """Return the names of the analyses whose tables are in the file."""
     return tuple(name for name in ANALYSES if getattr(tables, name, None) is not None)
 
 
@@ -132,6 +132,6 @@ def json_schema() -> str:
 
 
 def original(tables: Tables, name: str) -> Any:
-    """Return the table of a part; of a copy, the one of what is copied."""
+    """Return the table of a part; for a copy, the table of its original."""
     table = tables.part[name]
     return original(tables, table.of) if isinstance(table, Copy) else table

@@ -1,4 +1,4 @@
-"""TOML of bounded size and depth."""
+"""TOML of limited size and depth."""
 
 import re
 import tomllib
@@ -26,24 +26,24 @@ _LINE = re.compile(r"line (\d+)")
 
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the text of a TOML file and what it holds.
+    """Return the text of a TOML file and its content.
 
     Raises
     ------
     InputError
-        If it cannot be read, is no TOML, or is larger in any way than studies are.
+        If it cannot be read, is not TOML, or exceeds the limits on size and depth.
     """
     text = _text(path)
     return text, parsed(text, path)
 
 
 def parsed(text: str, path: Path) -> dict[str, Any]:
-    """Return what a text of TOML holds; `path` is what messages call it.
+    """Return the content of TOML text; `path` names the file in messages.
 
     Raises
     ------
     InputError
-        If it is no TOML, or is larger in any way than studies are.
+        If it is not TOML, or exceeds the limits on size and depth.
     """
     _check_size(path, text)
     try:

@@ -29,7 +29,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     raw
         Its content.
     model
-        Section of the whole file, which tells the keys that there are.
+        Class of the whole file, which defines the known keys.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
 
 
 def with_values(raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False) -> dict[str, Any]:
-    """Return the content of a file with some keys in place, without [vary] unless it is kept."""
+    """Return the content of a file with other values of some keys; [vary] is removed if it is not kept."""
     content = {k: v for k, v in deepcopy(dict(raw)).items() if keep_vary or k != "vary"}
     for key, value in values.items():
         *tables, last = key.split(".")
@@ -69,12 +69,12 @@ def with_values(raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary:
 
 
 def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any]) -> None:
-    """Refuse single values of keys that [vary] of the content would replace at once.
+    """Refuse single values of keys that [vary] would overwrite.
 
     Raises
     ------
     InputError
-        Naming each of them, and how it is given another list, or none.
+        Naming each key, and how to give it another list or none.
     """
     given = raw.get("vary", {})
     tables = given if isinstance(given, list) else [given]
@@ -93,7 +93,7 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
 
 
 def label_of(values: Mapping[str, Any]) -> str:
-    """Return what is varied as text: ``load.shaker.ratio = 250``."""
+    """Return the label of a case: ``load.shaker.ratio = 250``."""
     return ", ".join(f"{key} = {_text(value)}" for key, value in values.items())
 
 

@@ -1,4 +1,4 @@
-"""The table [aero] and its file of coefficients as part of a model."""
+"""The table [aero] and its coefficient file as part of a model."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ WHOLE = 1e-9  # by which a whole number may be off
 
 
 def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
-    """Yield what is wrong with [aero] before any mesh is made."""
+    """Yield errors in [aero] that can be found before meshing."""
     table = tables.aero
     if table is None:
         if getattr(tables, "flutter", None) is not None:
@@ -45,7 +45,7 @@ def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[I
 
 
 def knows_speeds(table: AeroTable | None, home: Path) -> bool:
-    """Return whether coefficients are given over the speed, which then chooses among them; True where the file cannot be read."""
+    """Return whether the coefficients are tabulated over speed; True for an unreadable file."""
     if table is None:
         return False
     try:
@@ -57,20 +57,20 @@ def knows_speeds(table: AeroTable | None, home: Path) -> bool:
 def aerodynamics_of(
     table: AeroTable, home: Path, sectors: int, points: Mapping[str, str], clamped: str
 ) -> Aerodynamics:
-    """Return what a model holds of [aero].
+    """Return the aerodynamic part of a model, read from [aero].
 
     Parameters
     ----------
     table
         The table.
     home
-        Folder that the file's name is relative to.
+        Folder to which file names are relative.
     sectors
-        Of the wheel.
+        Number of sectors of the wheel.
     points
-        Name of a point -> its place, as the part's file writes it.
+        Name of a point -> its location, as in the part's file.
     clamped
-        The same of the place that holds the blade.
+        Name of a point -> location at which the blade is clamped.
 
     Raises
     ------

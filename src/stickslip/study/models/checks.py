@@ -1,4 +1,4 @@
-"""Refusals without a mesh: missing names, missing files, incomplete questions."""
+"""Errors that can be found without a mesh: missing names, missing files, incomplete questions."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -37,7 +37,7 @@ OF_SECTOR = re.compile(r"\[\d+\](?=\.)")  # of one blade of a mistuned wheel
 
 
 def refuse(file: StudyFile) -> None:
-    """Refuse what can be refused without a mesh.
+    """Refuse a study with errors that can be found without a mesh.
 
     Raises
     ------
@@ -53,14 +53,14 @@ def refuse(file: StudyFile) -> None:
 
 
 def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
-    """Yield what is wrong with the tables of a case, their places being keys of the file.
+    """Yield the errors in the tables of a case, each with its key as place.
 
     Parameters
     ----------
     tables
-        Of the case.
+        Tables of the case.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     """
     wrong = [*_parts(tables, home)]
     yield from wrong
@@ -80,7 +80,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
 
 
 def sectors_of(tables: Tables) -> int | None:
-    """Return the number of sectors of the wheel, 1 for a single structure; None where only a file knows it."""
+    """Return the number of sectors: 1 for a single structure, None if only a file holds it."""
     found: list[int | None] = [1]
     for table in tables.part.values():
         known: Any = table
@@ -211,7 +211,7 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
 
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
-    """Return the names of surfaces and sets that a part will have; None where only a file knows them."""
+    """Return the names of surfaces and sets of a part before meshing; None if only a file holds them."""
     table = original(tables, part)
     return None if isinstance(table, FileModel) else _NAMES[type(table)](table)
 
@@ -372,7 +372,7 @@ def _turns(table: Any) -> bool:
 
 
 def without_areas(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaint about each key that a contact per area needs and its body does not have."""
+    """Yield an error for each key that a contact per area requires and its body lacks."""
     contacts: dict[str, Any] = tables.contact
     for name, contact in contacts.items():
         head, _, side = contact.between[0].partition(".")
@@ -403,7 +403,7 @@ def _told(table: Any, side: str) -> dict[str, Any]:
 
 
 def diameter_refusals(tables: Tables, sectors: int | None) -> Iterator[InputError]:
-    """Yield the complaints about nodal diameters that a wheel of so many sectors has not; None where only a file knows."""
+    """Yield errors about nodal diameters that a wheel with this number of sectors lacks; None: only a file holds the number."""
     for name in ("modes", "campbell"):
         yield from _diameters(name, getattr(tables, name, None), sectors)
 
@@ -437,13 +437,13 @@ def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputErro
 
 
 def fluid_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
-    """Yield what is wrong with [aero] and with pressures of loads."""
+    """Yield errors in [aero] and in pressures of loads."""
     yield from aero_refusals(tables, home, sectors)
     yield from pressure_refusals(tables, home)
 
 
 def run_up_refusals(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaints about aerodynamic forces, mistuning and rigid contacts beside [run_up]."""
+    """Yield errors about aerodynamic forces, mistuning and rigid contacts in a study with [run_up]."""
     asked: Any = getattr(tables, "run_up", None)
     contacts: dict[str, Any] = tables.contact
     if asked is None:
@@ -475,7 +475,7 @@ def staged(tables: Tables) -> bool:
 
 
 def stage_refusals(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaints about what nobody knows of coupled stages."""
+    """Yield errors about features that are not supported for coupled stages."""
     if not staged(tables):
         return
     for name in ANALYSES:

@@ -25,18 +25,18 @@ ADVICE = "Take a coarser mesh, fewer points, contacts or harmonics, or raise the
 
 
 def memory_gb(nodes: float) -> float:
-    """Return the memory that building and reducing parts of so many nodes takes."""
+    """Return the memory in GB for building and reducing parts with these numbers of nodes."""
     return BASE_GB + nodes * BYTES_A_NODE / 1e9
 
 
 def waves_gb(nodes: float) -> float:
-    """Return the memory that the modes of several waves of a sector of so many nodes take: matrices, and factors of what they share."""
+    """Return the memory in GB for the modes of several waves of a sector: matrices, and the factors that the waves share."""
     factors = BYTES_OF_FACTORS * float(nodes ** (4 / 3))
     return BASE_GB + (nodes * BYTES_OF_MATRICES + factors) / 1e9
 
 
 def too_large(tables: Tables, home: Path) -> InputError | None:
-    """Return the complaint about parts that take more than the study's limits allow; None if they do not."""
+    """Return the error about parts above the limits of the study; None if there is none."""
     nodes = sum(_nodes(table, home) for table in tables.part.values())
     what = f"the parts, some {max(round(nodes), 1):.2g} nodes, are estimated"
     memory = max(memory_gb(nodes), waves_gb(nodes) if _asks_for_waves(tables) else 0.0)
@@ -51,7 +51,7 @@ def _asks_for_waves(tables: Tables) -> bool:
 
 
 def above(limits: Limits, what: str, memory: float, seconds: float) -> InputError | None:
-    """Return the complaint about the limit that an estimate exceeds, None if it exceeds none; `what` begins the sentence."""
+    """Return the error about the limit that an estimate exceeds; None if it exceeds none. `what` begins the sentence."""
     found = {"memory_gb": (memory, ".1f", "GB"), "work_s": (seconds, ".0f", "s")}
     for key, (needed, digits, unit) in found.items():
         allowed = getattr(limits, key)
@@ -75,7 +75,7 @@ def _nodes(table: Any, home: Path) -> float:
 
 
 def blade_nodes(b: BladePair) -> float:
-    """Return about how many nodes the mesh of both blades will have."""
+    """Estimate the number of nodes in the mesh of both blades."""
     chord, thickness = (b.hub_chord + b.tip_chord) / 2, (b.hub_thickness + b.tip_thickness) / 2
     one = (
         _block(b.airfoil_size, b.airfoil_length, chord, thickness)
@@ -87,7 +87,7 @@ def blade_nodes(b: BladePair) -> float:
 
 
 def sector_nodes(sector: BladedSector) -> float:
-    """Return about how many nodes the mesh of a sector will have."""
+    """Estimate the number of nodes in the mesh of a sector."""
     d, a, p, s = sector.disk, sector.airfoil, sector.platform, sector.shroud
     chord, thickness = (a.hub_chord + a.tip_chord) / 2, (a.hub_thickness + a.tip_thickness) / 2
     middle, width = (d.rim_radius + d.bore_radius) / 2, (d.bore_width + d.web_width) / 2
@@ -101,7 +101,7 @@ def sector_nodes(sector: BladedSector) -> float:
 
 
 def file_nodes(path: Path) -> float:
-    """Return about how many nodes a file holds, by its size."""
+    """Estimate the number of nodes in a file from its size."""
     name = path.name.lower()
     size = path.stat().st_size * (PACKED if name.endswith(".gz") else 1.0)
     return size / (OF_A_MESH if name.endswith(MESHES) else OF_MATRICES)

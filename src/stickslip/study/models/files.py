@@ -1,4 +1,4 @@
-"""A part from the files of a finite-element program, and the node sets that a study picks from them."""
+"""A part from the files of a finite-element program, with the node sets that the study defines."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -36,23 +36,23 @@ EDGE = 1e-9  # of the size of the mesh, by which boxes and cylinders are larger:
 def with_sets(
     key: str, tables: Mapping[str, SetTable], points: FloatArray, known: Mapping[str, IntArray]
 ) -> dict[str, IntArray]:
-    """Return the sets of a file and those that a study picks.
+    """Return the sets of a file together with those that the study defines.
 
     Parameters
     ----------
     key
-        Of the part, for messages.
+        Key of the part, for messages.
     tables
-        By name.
+        Set tables of the study by name.
     points
-        (n, 3) places in m of what sets hold by index: nodes, or dofs; NaN without a place.
+        (n, 3) positions in m of the nodes or dofs that sets refer to by index; NaN if unknown.
     known
         Sets of the file.
 
     Raises
     ------
     InputError
-        If the file has a set of that name, or nothing is picked.
+        If the file already has a set of that name, or the new set is empty.
     """
     found = dict(known)
     for name, table in tables.items():
@@ -124,20 +124,20 @@ def file_part(key: str, table: FileModel, home: Path, material: Material | None,
     Parameters
     ----------
     key
-        Of the table, for messages: ``part.blade``.
+        Key of the table, for messages: ``part.blade``.
     table
         The table.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     material
-        Of all elements; None: that of the file.
+        Material of all elements; None: the material of the file.
     **others
         Further fields of `Part`.
 
     Raises
     ------
     InputError
-        If a file cannot be read, table and file disagree, or a set is not there.
+        If a file cannot be read, table and file disagree, or a set is missing.
     """
     path = home / table.file
     name = path.name.lower()
@@ -152,7 +152,7 @@ def file_part(key: str, table: FileModel, home: Path, material: Material | None,
 
 
 def with_companions(path: Path) -> list[Path]:
-    """Return a file and those that CalculiX writes beside a stiffness."""
+    """Return a file and the companion files that CalculiX writes with a stiffness matrix."""
     zipped = ".gz" if path.name.endswith(".gz") else ""
     plain = path.name.removesuffix(".gz")
     if not plain.endswith(".sti"):
@@ -381,7 +381,7 @@ def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
 
 
 def alike(name: str, known: Iterable[str]) -> str | None:
-    """Return the one of the known names that a name is, capitals aside; None if there is none, or several."""
+    """Return the known name that equals a name up to capitals; None if there is none or several."""
     words = list(known)
     if name in words:
         return name

@@ -1,4 +1,4 @@
-"""Measured peaks of a study: read and judged before anything is computed."""
+"""Measured peaks of a study, read and checked before any computation."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -32,11 +32,11 @@ class Quantity:
     Parameters
     ----------
     values, errors
-        (n,) in `unit`; NaN where it was not measured, or has no error bar.
+        (n,) in `unit`; NaN if not measured or without an error bar.
     unit
-        SI, or Hz.
+        SI unit, or Hz.
     bar
-        What error bars are: ``standard deviation``, ``half-width``; empty for none.
+        Meaning of the error bars: ``standard deviation``, ``half-width``; empty for none.
     """
 
     values: FloatArray
@@ -52,21 +52,21 @@ class MeasuredPeaks:
     Parameters
     ----------
     file
-        Name of their file.
+        Name of the file.
     source
-        Where they come from.
+        Origin of the data.
     key
-        The varied key that they are drawn over.
+        Varied key on the abscissa.
     values
-        (n,) its values.
+        (n,) values of this key.
     others
-        (n,) the other varied keys with their values, as labels of cases have them; empty where the file does not say.
+        (n,) other varied keys with their values, written as in labels of cases; empty if the file lacks them.
     amplitude
-        At the output whose peak counts, m or m/N.
+        Amplitude of the output whose peak is reported, m or m/N.
     frequency
-        Hz.
+        Frequency of the peak, Hz.
     excitation
-        (n,) amplitude of the force, N: that of the file, else that of the study; NaN where it is not needed.
+        (n,) amplitude of the force, N, from the file or else from the study; NaN if not needed.
     """
 
     file: str
@@ -80,19 +80,19 @@ class MeasuredPeaks:
 
     @property
     def sentence(self) -> str:
-        """What ``check`` says."""
+        """The line of ``stickslip check``."""
         n = self.values.size
         of = f", {self.source}" if self.source else ""
         return f"measured: {n} point{'s' * (n != 1)} of {self.file} over {self.key}{of}"
 
 
 def measured_peaks(file: StudyFile) -> MeasuredPeaks | None:
-    """Return the measured peaks that a study names; None for none.
+    """Return the measured peaks named by a study; None if it names none.
 
     Raises
     ------
     InputError
-        If there is nothing that they can be drawn over, or their file cannot be read; it names line, column and value.
+        If the study varies no number, or the file cannot be read; the message names line, column and value.
     """
     table = file.tables.measured
     if table is None:

@@ -24,20 +24,20 @@ BLADE_COLUMNS = ("blade", "mode", "frequency_hz")
 def mistuning_of(
     tables: Tables, home: Path, model: Model, parts: Mapping[str, Part], own_name: Any
 ) -> Mistuning | None:
-    """Return what a model holds of [mistuning]; None where the study has none.
+    """Return the mistuning of a model; None for a study without [mistuning].
 
     Parameters
     ----------
     tables
-        Of a case.
+        Tables of a case.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     model
-        The wheel with all sectors alike.
+        The wheel with equal sectors.
     parts
-        All parts of the study, spare ones too.
+        All parts of the study, including spare parts.
     own_name
-        From a name of the study to that of the model.
+        Function that turns a name of the study into a name of the model.
 
     Raises
     ------
@@ -114,12 +114,12 @@ def _means(table: MistuningTable, mean: FloatArray, alone: FloatArray) -> str:
 
 
 def read_blades(path: Path, sectors: int) -> FloatArray:
-    """Return measured frequencies (n_s, modes) in Hz of blades by themselves, from a CSV file with columns blade, mode, frequency_hz.
+    """Return measured frequencies (n_s, modes) in Hz of single blades, from a CSV file with the columns blade, mode, frequency_hz.
 
     Raises
     ------
     InputError
-        If a blade or mode is missing, or stands there twice.
+        If a blade or mode is missing or occurs twice.
     """
     columns = read_columns(path)
     missing = [n for n in BLADE_COLUMNS if n not in columns.names]

@@ -32,16 +32,16 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     Parameters
     ----------
     tables
-        Of the case.
+        Tables of the case.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     memo
-        Parts of earlier cases; new ones are added.
+        Parts built for earlier cases; new parts are added.
 
     Raises
     ------
     InputError
-        Naming the key, if files cannot be read or something does not fit.
+        Naming the key, if files cannot be read or inputs are inconsistent.
     """
     every = Workshop(tables, home, memo).parts()
     spare = spare_parts(tables)
@@ -105,7 +105,7 @@ def _aerodynamics(tables: Tables, parts: Mapping[str, Part], home: Path) -> Aero
 
 
 def newton(tables: Tables, table: LoadTable) -> float:
-    """Return the force of a load, N: its own, or that of another one over the ratio."""
+    """Return the force of a load, N: its own value, or the force of another load divided by the ratio."""
     if table.force_n is not None:
         return table.force_n
     if table.pressure is not None:  # the share of the field

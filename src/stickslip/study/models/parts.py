@@ -44,16 +44,16 @@ Memo = MutableMapping[str, Part]
 
 @dataclass(frozen=True, eq=False)
 class Workshop:
-    """What parts are made from.
+    """Builder of the parts of one case.
 
     Parameters
     ----------
     tables
-        Of one case.
+        Tables of one case.
     home
-        Folder that names of files are relative to.
+        Folder to which file names are relative.
     memo
-        Parts made before, by the digest of all they depend on.
+        Parts built before, by the digest of everything they depend on.
     """
 
     tables: Tables
@@ -65,7 +65,7 @@ class Workshop:
         return {name: self.part(name) for name in self.tables.part}
 
     def part(self, name: str) -> Part:
-        """Return a part, that of an earlier case if nothing it depends on has changed."""
+        """Return a part; an unchanged part of an earlier case is used again."""
         key = digest(self.tables, name, self.home)
         if key not in self.memo:
             made = self._made(name, self.tables.part[name])
@@ -83,7 +83,7 @@ class Workshop:
         return made
 
     def material(self, table: Any) -> Material | None:
-        """Return the material of a part; None where the study names none."""
+        """Return the material of a part; None if the study names none."""
         given = table.material or self.tables.material
         return None if given is None else build(Material, given)
 
@@ -94,7 +94,7 @@ class Workshop:
         return found
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
-        """Return how a part is damped and reduced; `reduced`: whether it is where the study does not say."""
+        """Return damping and reduction of a part; `reduced` is the default where the study does not specify a reduction."""
         reduction = table.reduction or self.tables.reduction or ReductionTable()
         found: dict[str, Any] = {}
         if reduced or table.reduction is not None:
@@ -105,7 +105,7 @@ class Workshop:
         return found
 
     def blades(self, name: str, table: Any) -> Part:
-        """Mesh a pair of prismatic blades, with nodes where a damper touches them."""
+        """Mesh a pair of prismatic blades with nodes at the contact points of a damper."""
         points = contact_nodes(self.tables, table)
         LOG.info("meshing the part %s", name)
         mesh = mesh_blade_pair(build(BladePair, table), points)
@@ -156,7 +156,7 @@ class Workshop:
         return damper_part(build(CylinderDamper, table))
 
     def from_file(self, name: str, table: FileModel) -> Part:
-        """Read a part."""
+        """Read a part from its files."""
         LOG.info("reading %s", table.file)
         others = self.others(table)
         return file_part(f"part.{name}", table, self.home, self.material(table), **others)
@@ -176,7 +176,7 @@ _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
 
 
 def place_in_steps(steps: Sequence[Placed]) -> Place:
-    """Return where a part comes to that is mirrored, turned and moved step by step."""
+    """Return the placement of a part that is mirrored, turned and moved in steps."""
     place = Place(np.eye(3), np.zeros(3))
     for step in steps:
         x, y, z = step.move_m
@@ -188,12 +188,12 @@ def place_in_steps(steps: Sequence[Placed]) -> Place:
 
 
 def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
-    """Return the geometry of a flat_curved part; what its table leaves out is taken from the platforms that have its nodes.
+    """Return the geometry of a flat_curved part; missing values come from the platforms that have its nodes.
 
     Raises
     ------
     InputError
-        If the table leaves something out, and no blades have nodes at its points.
+        If the table is incomplete and no blades have nodes at its points.
     """
     table: Any = tables.part[name]
     given: dict[str, Any] = {}
@@ -228,7 +228,7 @@ def _owners(table: Any) -> list[str]:
 
 
 def contact_nodes(tables: Tables, table: Any) -> ContactPoints:
-    """Return the points at which blades have nodes."""
+    """Return the points at which the blades of a table have contact nodes."""
     sides: list[str] = [word.partition(".")[2] for word in table.nodes_at]
     if not sides:
         return ContactPoints((), (), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
@@ -236,7 +236,7 @@ def contact_nodes(tables: Tables, table: Any) -> ContactPoints:
 
 
 def digest(tables: Tables, name: str, home: Path) -> str:
-    """Return the hash of all that a part depends on: tables and the content of files."""
+    """Return the hash of everything a part depends on: tables and the content of files."""
     related = _related(tables, name)
     given = {key: tables.part[key].model_dump(mode="json") for key in related}
     shared = tables.model_dump(mode="json", include={"material", "damping", "reduction"})

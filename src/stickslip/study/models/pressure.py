@@ -1,4 +1,4 @@
-"""Pressure fields from files: CSV with units in the names of columns, or a surface of VTK."""
+"""Pressure fields from files: CSV with units in the column names, or a VTK surface."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -27,7 +27,7 @@ UNIT = 1e-3  # by which the length of a normal may be off
 
 
 def pressure_refusals(tables: Tables, home: Path) -> Iterator[InputError]:
-    """Yield the complaints about files of pressures that are not there."""
+    """Yield errors about missing pressure files."""
     for name, load in tables.load.items():
         if load.pressure is not None and not (home / load.pressure).is_file():
             yield input_error(
@@ -43,11 +43,11 @@ def read_pressure(path: Path, length_unit: str, *, static: bool) -> PressureFiel
     Parameters
     ----------
     path
-        CSV, or ``.vtk`` and ``.vtu``.
+        A CSV, ``.vtk`` or ``.vtu`` file.
     length_unit
-        Of the places in a file of VTK: ``m`` or ``mm``; columns of CSV have their own.
+        Length unit of a VTK file: ``m`` or ``mm``; CSV columns carry their own.
     static
-        Whether it has no phase.
+        Whether the field is static and has no phase.
 
     Raises
     ------

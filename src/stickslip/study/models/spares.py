@@ -1,4 +1,4 @@
-"""Refusals without a mesh: [mistuning.NAME]; and parts that stand in single sectors alone."""
+"""Errors in [mistuning.NAME] that can be found without a mesh, and parts that occur in single sectors only."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +11,12 @@ from stickslip.study.file.tables import Tables, original
 
 
 def spare_parts(tables: Tables) -> set[str]:
-    """Return the parts that stand in single sectors alone."""
+    """Return the parts that occur in single sectors only."""
     return {table.by for table in tables.mistuning.values() if table.by is not None}
 
 
 def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
-    """Yield what is wrong with [mistuning] before any mesh is made."""
+    """Yield errors in [mistuning] that can be found before meshing."""
     yield from _spare_refusals(tables)
     for name, table in tables.mistuning.items():
         key = f"mistuning.{name}"

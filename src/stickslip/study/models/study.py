@@ -1,4 +1,4 @@
-"""A study: its analyses and the cases that [vary] spans."""
+"""A study: its analyses and the cases of [vary]."""
 
 import json
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ from stickslip.study.models.parts import Memo, digest, digest_of
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A study that has been read and found good as far as that is possible without a mesh.
+    """A study that has passed all checks that need no mesh.
 
     Parameters
     ----------
     file
-        Its content, one set of tables for each case.
+        The study file, with one set of tables for each case.
     memo
-        Parts that are built, shared by all cases.
+        Built parts, shared by all cases.
     """
 
     file: StudyFile
@@ -37,7 +37,7 @@ class Study:
 
     @property
     def path(self) -> Path:
-        """The file, by which messages call it."""
+        """Path of the file, as messages name it."""
         return self.file.path
 
     @property
@@ -52,26 +52,26 @@ class Study:
 
     @property
     def title(self) -> str:
-        """Title of a line; the name of the file's folder where it has none."""
+        """Title on one line; without a title the name of the file's folder."""
         return self.tables.title or self.file.home.name
 
     @property
     def folder(self) -> Path:
-        """Where results go, inside the file's folder."""
+        """Folder of the results, inside the file's folder."""
         return self.file.home / self.tables.output.folder
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """Names of the analyses that the file has tables of."""
+        """Names of the analyses whose tables are in the file."""
         return asked_of(self.tables)
 
     @property
     def measured(self) -> MeasuredPeaks | None:
-        """Measured peaks that the file names."""
+        """Measured peaks named by the file."""
         return measured_peaks(self.file)
 
     def cases(self) -> tuple[Case, ...]:
-        """Return what [vary] spans; one case without it. Models are built when they are asked for."""
+        """Return the cases of [vary], one without it. Models are built on request."""
         return tuple(self._case(i, case) for i, case in enumerate(self.file.cases))
 
     def model(self, case: int = 0) -> Model:
@@ -80,7 +80,7 @@ class Study:
         Raises
         ------
         InputError
-            If files cannot be read, or something does not fit.
+            If files cannot be read, or inputs are inconsistent.
         """
         tables = self.file.cases[case].tables
         try:
@@ -94,7 +94,7 @@ class Study:
         Raises
         ------
         InputError
-            If there is no such key, its value is refused, or it is varied.
+            If a key is unknown, a value is refused, or the key is varied.
         """
         raw = with_values(self.file.raw, values, keep_vary=True)
         found = validated(self.path, raw)
@@ -122,16 +122,16 @@ class Study:
 
 @dataclass(frozen=True, eq=False)
 class OtherModel:
-    """The model of a case with another value of a key; picklable.
+    """Function that returns the model of a case for another value of a key; picklable.
 
     Parameters
     ----------
     path
-        The file.
+        Path of the study file.
     raw
-        Its content with the varied keys of the case in place.
+        Content of the file with the values of the case.
     memo
-        Parts that are built; a copy in another process begins without them.
+        Built parts; empty in another process.
     """
 
     path: Path
@@ -144,7 +144,7 @@ class OtherModel:
         Raises
         ------
         InputError
-            If there is no such key, or its value is refused.
+            If the key is unknown, or its value is refused.
         """
         found = self.study(key, value)
         try:
@@ -153,12 +153,12 @@ class OtherModel:
             raise self._refused(key, value, error) from None
 
     def study(self, key: str, value: float) -> Study:
-        """Return the study of the model: read and found good as far as that is possible without a mesh.
+        """Return the study of the changed model, which has passed all checks that need no mesh.
 
         Raises
         ------
         InputError
-            If there is no such key, or its value is refused.
+            If the key is unknown, or its value is refused.
         """
         raw = {**self.raw, "vary": {key: [value]}}
         try:
@@ -176,7 +176,7 @@ class OtherModel:
 
 
 def read_study(path: Path) -> Study:
-    """Read a study file and refuse what can be refused without a mesh.
+    """Read a study file and make all checks that need no mesh.
 
     Raises
     ------
@@ -198,19 +198,19 @@ def _drive(tables: Tables) -> float:
 
 
 def judged(file: StudyFile) -> Study:
-    """Return the study of a file that `refuse` has found good.
+    """Return the study of a file that has passed `refuse`.
 
     Raises
     ------
     InputError
-        If the file of measured peaks that it names is not.
+        If the file of measured peaks cannot be used.
     """
     measured_peaks(file)
     return Study(file)
 
 
 def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
-    """Return the hash of all that a model depends on, and of what is left of it without harmonic loads and outputs."""
+    """Return two hashes of everything a model depends on: with and without harmonic loads and outputs."""
     own = tables.model_dump(mode="json", include=set(OF_THE_MODEL) - {"load"})
     parts = [digest(tables, name, home) for name in tables.part]
     loads = {name: [load.model_dump(mode="json"), newton(tables, load)] for name, load in tables.load.items()}

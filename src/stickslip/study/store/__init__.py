@@ -1,1 +1,1 @@
-"""Files of a run, whole whenever it is stopped."""
+"""Files of a run; none is ever partly written."""

@@ -20,7 +20,7 @@ FORMAT = 7  # of all that is kept: raised whenever tables, records or archives c
 
 
 def encode(values: Mapping[str, Any]) -> bytes:
-    """Return named arrays, numbers and texts as a NumPy archive and its checksum; entries that are None are left out."""
+    """Return named arrays, numbers and texts as a NumPy archive with checksum; None entries are left out."""
     stream = io.BytesIO()
     arrays: dict[str, Any] = {k: np.asarray(v) for k, v in values.items() if v is not None}
     np.savez(stream, allow_pickle=False, **arrays)
@@ -28,12 +28,12 @@ def encode(values: Mapping[str, Any]) -> bytes:
 
 
 def decode(payload: bytes) -> dict[str, Any]:
-    """Return what `encode` wrote; zero-dimensional arrays come back as Python scalars.
+    """Return the content written by `encode`; zero-dimensional arrays become Python scalars.
 
     Raises
     ------
     ValueError
-        If it differs by a single bit from what was written.
+        If the content does not agree with its checksum.
     """
     archive = checked(payload)
     try:
@@ -97,7 +97,7 @@ def _row_type(kind: type[Any], name: str) -> type[Any] | None:
 
 
 def decode_record(payload: bytes, kind: type[Any]) -> Any:
-    """Return the dataclass of type `kind` that `encode_record` wrote."""
+    """Return a record of class `kind` written by `encode_record`."""
     return _record(decode(payload), kind)
 
 

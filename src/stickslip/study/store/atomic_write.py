@@ -1,4 +1,4 @@
-"""Atomic writes, and messages where they fail."""
+"""Atomic writes, and the error messages when they fail."""
 
 import errno
 import os
@@ -34,13 +34,13 @@ REMEDIES = {
 
 
 def unwritable(path: Path, error: OSError) -> InputError:
-    """Return the refusal of a file that the system does not let us write."""
+    """Return the error for a file that the system cannot write."""
     remedy = REMEDIES.get(error.errno or 0, _PLACE)
     return input_error(str(path), f"cannot be written ({error.strerror or error})", remedy)
 
 
 def unwritable_database(path: Path, error: sqlite3.Error) -> InputError | None:
-    """Return the refusal of a file that SQLite cannot write, as it has no errno; None where its content is at fault."""
+    """Return the error for a file that SQLite cannot write, since SQLite gives no errno; None if the content is at fault."""
     name = getattr(error, "sqlite_errorname", None) or ""
     if name.startswith(("SQLITE_FULL", "SQLITE_IOERR")) and "READ" not in name:
         return input_error(str(path), f"cannot be written ({error})", _WRITTEN)
@@ -50,14 +50,14 @@ def unwritable_database(path: Path, error: sqlite3.Error) -> InputError | None:
 
 
 def beside(name: str, mark: str = "*") -> str:
-    """Return what a file is called until it is whole: libraries go by what a name ends in.
+    """Return the temporary name of a file while it is written; it keeps the suffix, because libraries go by it.
 
     Parameters
     ----------
     name
-        What it will be called.
+        Final name.
     mark
-        Of the process that writes it; left out: the pattern of all of them.
+        Mark of the writing process; left out: the pattern that matches all processes.
     """
     path = Path(name)
     return str(path.with_name(f"{path.stem}.{mark}.part{path.suffix}"))
@@ -65,7 +65,7 @@ def beside(name: str, mark: str = "*") -> str:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give the name to write to; the file is put in place when the block has ended, so that `path` is always whole.
+    """Yield a temporary name to write to, and move the file to `path` when the block ends; `path` is never partly written.
 
     A link in the way is replaced, not followed.
 
@@ -96,14 +96,14 @@ def _refuse_folder(path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; as `whole_file`."""
+    """Write a file atomically; see `whole_file`."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
 
 
 @contextmanager
 def interrupted_later() -> Iterator[None]:
-    """Let an interrupt by the user (Ctrl-C) wait for the end of the block: libraries swallow what is raised while they call back."""
+    """Delay an interrupt by the user (Ctrl-C) until the block ends, because libraries swallow exceptions raised in callbacks."""
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield

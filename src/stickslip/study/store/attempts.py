@@ -16,28 +16,28 @@ from stickslip.study.store.progress import LOG
 
 
 def file_at_work(sealed: Path, owner: str = "") -> Path:
-    """Return the name of the file of a job at work: ``KEY.part``, or ``KEY.OWNER.part``."""
+    """Return the name of the file of a running job: ``KEY.part``, or ``KEY.OWNER.part``."""
     return sealed.with_suffix(f".{owner}{AT_WORK}" if owner else AT_WORK)
 
 
 def new_owner() -> str:
-    """Return a name that no other process has."""
+    """Return a unique name for this process."""
     return uuid4().hex[:12]
 
 
 def left_behind(sealed: Path) -> list[Path]:
-    """Return all files of a job at work, the furthest first: they only grow."""
+    """Return all files of a running job, the one with most progress first."""
     found = [p for p in sealed.parent.glob(f"{sealed.stem}.*") if p.suffix == AT_WORK]
     return sorted(found, key=reached, reverse=True)
 
 
 def reached(path: Path) -> tuple[int, int, int]:
-    """Return how far a file has come: its size, and, as several small records fit into a page of it, what it holds."""
+    """Return the progress of a file: its size, then its number of records, since small records may not change the size."""
     return (_size(path), *read_place(path))
 
 
 def begin(sealed: Path, own: Path, record: type) -> None:
-    """Make a file of a job at work from the furthest that is there, of this process or of any other."""
+    """Create the file of a running job as a copy of the existing one with most progress, of any process."""
     for path in sorted([*left_behind(sealed), sealed], key=reached, reverse=True):
         if path == own or reached(path) <= reached(own):
             return
@@ -47,7 +47,7 @@ def begin(sealed: Path, own: Path, record: type) -> None:
 
 @contextmanager
 def until_sealed_elsewhere(sealed: Path, own: Path) -> Iterator[None]:
-    """End an attempt without an error where another process has sealed the job, and so removed this attempt's file."""
+    """End an attempt without an error when another process seals the job first and removes this attempt's file."""
     try:
         yield
     except InputError:
@@ -58,7 +58,7 @@ def until_sealed_elsewhere(sealed: Path, own: Path) -> Iterator[None]:
 
 
 def clear(sealed: Path) -> None:
-    """Remove what is left of a job that is sealed, files beside one that another process has removed meanwhile, too."""
+    """Remove all files left by the attempts at a sealed job; files already removed by another process are ignored."""
     for end in (AT_WORK, f"{AT_WORK}{BESIDE}"):
         for file in sealed.parent.glob(f"{sealed.stem}.*{end.removeprefix('.')}"):
             with suppress(OSError):  # the next run in the folder does

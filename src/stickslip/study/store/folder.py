@@ -28,12 +28,12 @@ HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, w
 
 @contextmanager
 def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Make the folder, hold it for one run, or for all shards of one, and make sure that a run's files fit into it.
+    """Create the results folder, lock it for one run or for all its shards, and check that a run's files fit into it.
 
     Raises
     ------
     InputError
-        If another run is at work in it, it cannot be made or written, or the disk is nearly full.
+        If another run uses it, it cannot be created or written, or the disk is nearly full.
     """
     try:
         for inner in (folder, folder / JOBS, folder / PARTS):
@@ -58,7 +58,7 @@ def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 @contextmanager
 def token_file(folder: Path) -> Iterator[Path]:
-    """Give a file that is there while the block runs: other machines see by it that they see the folder, and that the run goes on."""
+    """Yield a file that exists while the block runs; it shows other machines that they see the folder and that the run continues."""
     token = folder / f"run-{uuid4().hex[:12]}.on"
     try:
         token.touch(exist_ok=False)
@@ -70,21 +70,21 @@ def token_file(folder: Path) -> Iterator[Path]:
 
 
 def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] = ()) -> None:
-    """Remove what runs write, and no other file.
+    """Remove the files that runs write, and no others.
 
     Parameters
     ----------
     folder
-        A results folder that is locked.
+        A locked results folder.
     own
-        Names of further files that runs of this study write.
+        Names of additional files that runs of this study write.
     spared
-        Files that this run has written already.
+        Files already written by this run.
 
     Raises
     ------
     InputError
-        If a process of an earlier run is still at work on one of them; nothing is removed then.
+        If a process of an earlier run still uses one of them; nothing is removed then.
     """
     patterns = (*OWN, *own, *map(beside, own))
     found = [path for pattern in patterns for path in _found(folder, pattern)]

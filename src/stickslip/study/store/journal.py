@@ -35,14 +35,14 @@ create table if not exists note (name text primary key, payload blob not null);
 
 
 class JobJournal:
-    """The open file of a job at work; use as a context manager. It is the job's `Notes`.
+    """The open file of a running job; a context manager. It serves as the job's `Notes`.
 
     Parameters
     ----------
     path
-        The file, ``<key>.part``; created when it does not exist.
+        The file, ``<key>.part``; created if missing.
     record_type
-        Dataclass of the records, of arrays, numbers, texts, enumerations and None; where records are read.
+        Dataclass of the records, with fields of arrays, numbers, texts, enumerations and None; needed for reading.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class JobJournal:
             self._db.execute("insert into record (payload) values (?)", (payload,))
 
     def records(self) -> list[Any]:
-        """Return the finished records in the order in which they came."""
+        """Return the finished records in the order of solution."""
         with _named(self._path):
             return _records(self._db, self._type)
 
@@ -100,7 +100,7 @@ class JobJournal:
             self._db.execute("delete from note where name = ?", (name,))
 
     def get(self, name: str) -> dict[str, Any] | None:
-        """Return what `put` stored under `name`, or None."""
+        """Return what was stored under `name`; None for an unknown name."""
         with _named(self._path):
             return _note(self._db, name)
 
@@ -110,7 +110,7 @@ class JobJournal:
             return _notes(self._db)
 
     def check(self) -> None:
-        """Read everything, and refuse the file if any of it is damaged."""
+        """Read the whole file, and refuse it if any part is damaged."""
         with _named(self._path):
             (said,) = self._db.execute("pragma integrity_check").fetchone()
             if said != "ok":
@@ -119,7 +119,7 @@ class JobJournal:
             _notes(self._db)
 
     def died(self) -> int:
-        """Count one more end of the process at work; return how many there were since the last record or note."""
+        """Count one more abnormal end of the job's process; return the number of such ends since the last record or note."""
         with _named(self._path):
             (count,) = self._db.execute(PLACE).fetchone()
             kept = dict(self._db.execute("select key, value from meta"))
@@ -129,7 +129,7 @@ class JobJournal:
         return deaths
 
     def seal(self) -> None:
-        """Close the file and give it the name of a finished job."""
+        """Close the file and rename it to that of a finished job."""
         with _named(self._path):
             self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
             self._db.execute("insert into meta values (?, ?)", (WHOLE, _checksum(self._db)))
@@ -156,13 +156,13 @@ def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str
 
 
 def read_note(path: Path, name: str) -> dict[str, Any] | None:
-    """Return one note of a sealed job, or None; as `read_sealed`."""
+    """Return one note of a sealed job; None if it has none of this name. Errors as in `read_sealed`."""
     with _named(path), _reading(path) as db:
         return _note(db, name)
 
 
 def read_place(path: Path) -> tuple[int, int]:
-    """Return how many records the file of a job holds, and how many processes have ended after the last; zeros where it cannot be read."""
+    """Return the number of records in a job's file, and of abnormal ends since the last; zeros for an unreadable file."""
     try:
         with closing(_unlocked(path)) as db:
             (records,) = db.execute("select count(*) from record").fetchone()

@@ -1,4 +1,4 @@
-"""Labelled variables, and files of them that are always whole."""
+"""Labelled variables, and atomic writing and reading of their files."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
@@ -22,9 +22,9 @@ _MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": 
 
 
 def write_tree(tree: xr.DataTree, path: Path) -> None:
-    """Write netCDF-4 under another name, its sum behind it, and put it in place, so that `path` is always a whole file.
+    """Write netCDF-4 with a checksum at its end, under a temporary name, and move it to `path`.
 
-    Readers of HDF5 pass over what stands behind the end that the file names itself.
+    Readers of HDF5 ignore bytes behind the end of file that its header names.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
 
 
 def read_tree(path: Path) -> xr.DataTree:
-    """Read a file that `write_tree` wrote, or another of its kind, into memory.
+    """Read a result file into memory, written by `write_tree` or by another program.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is not what was written.
+        If it cannot be read, or does not agree with its checksum.
     """
     try:
         check_file(path)  # HDF5 may read damaged files for ever, or end the process
@@ -62,7 +62,7 @@ def read_tree(path: Path) -> xr.DataTree:
 
 
 def attributes_there(path: Path) -> dict[str, Any]:
-    """Return the attributes of the root of a file that `write_tree` wrote, whatever became of its checksum; none where there is no such file, or a damaged one."""
+    """Return the root attributes of a result file without verifying its checksum; empty for a missing or damaged file."""
     try:
         check_file(path)
     except Cut:
@@ -76,14 +76,14 @@ def attributes_there(path: Path) -> dict[str, Any]:
 
 
 def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
-    """Return a variable over the dimensions named in `dims`, separated by spaces."""
+    """Return a variable; `dims` holds the names of its dimensions, separated by spaces."""
     return xr.Variable(tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name})
 
 
 def stacked(cases: Sequence[Mapping[str, xr.Variable]]) -> dict[str, xr.Variable]:
     """Return the variables of all cases with the leading dimension ``case``.
 
-    Where cases differ in size, what is missing is NaN, -1 or an empty text; `one_case` leaves it out again.
+    Cases of different size are padded with NaN, -1 or empty texts; `one_case` removes the padding.
     """
     sizes: dict[Hashable, int] = {}
     for found in (v for case in cases for v in case.values()):
@@ -106,7 +106,7 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
 
 
 def alike(data: xr.Dataset) -> list[list[int]]:
-    """Return the cases of a dataset in groups of the same content, whatever they are called: what is varied may not concern it."""
+    """Return the cases of a dataset in groups of equal content, labels apart. The varied key may not affect an analysis."""
     plain = data.drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
     groups: list[list[int]] = []
     for i in range(data.sizes["case"]):
@@ -120,7 +120,7 @@ def alike(data: xr.Dataset) -> list[list[int]]:
 
 
 def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
-    """Return one case of a dataset, without what other cases have more of; single numbers and texts become attributes."""
+    """Return one case of a dataset without padding; single numbers and texts become attributes."""
     names = [name for name, v in data.variables.items() if "case" in v.dims]
     case = data.isel(case=index)
     kept: dict[Hashable, IntArray] = {}

@@ -99,7 +99,7 @@ def _attribute(of: h5py.HLObject, key: str, value: Any) -> None:
 
 
 def of_file(path: Path) -> xr.DataTree | None:
-    """Return the tree of a file that `to_bytes` made, in memory; None for a file of another program."""
+    """Return the tree of a file written by `to_bytes`, in memory; None for a file of another program."""
     with h5py.File(path, "r") as file:
         if WRITER not in _said(file).get(PROVENANCE, ""):
             return None

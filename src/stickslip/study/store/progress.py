@@ -26,18 +26,18 @@ class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
 
 
 def advance(fraction: float, text: str) -> None:
-    """Tell how much of the job at work is done, and its state in words."""
+    """Report the finished fraction of the running job, and its state in words."""
     LOG.info(text, extra={"fraction": fraction, "job": _JOB.get()})
 
 
 def tell(word: str, text: str) -> None:
-    """Tell a verdict with the word that begins it everywhere; a note is no warning."""
+    """Log a verdict under the word of its level; a note is no warning."""
     level = logging.INFO if word == "note" else logging.WARNING
     LOG.log(level, text, extra={"verdict": word.upper()})
 
 
 def sum_up(text: str, line: str) -> None:
-    """Tell what came out of the job at work: in few words, and as a line."""
+    """Report the outcome of the running job: in few words, and as a line."""
     LOG.info(line, extra={"sums_up": text})
 
 
@@ -52,7 +52,7 @@ LOG.addFilter(_of_job)
 
 
 def head(record: logging.LogRecord) -> str:
-    """Return what a line begins with: the word of a verdict, ``WARNING`` of other warnings, or nothing."""
+    """Return the beginning of a log line: the word of a verdict, ``WARNING`` for other warnings, or nothing."""
     plain = "WARNING" if record.levelno >= logging.WARNING else ""
     word = getattr(record, "verdict", plain)
     return f"{word}: " if word else ""
@@ -60,7 +60,7 @@ def head(record: logging.LogRecord) -> str:
 
 @contextmanager
 def at_work(job: str) -> Iterator[None]:
-    """Name the job whose progress is told."""
+    """Name the running job in all progress records of the block."""
     token = _JOB.set(job)
     advance(0.0, job)
     try:
@@ -72,7 +72,7 @@ def at_work(job: str) -> Iterator[None]:
 
 @contextmanager
 def written_down(path: Path) -> Iterator[None]:
-    """Write all lines of a run to a file; what tells progress alone stays out.
+    """Write all log lines of a run to a file, without pure progress records.
 
     Raises
     ------

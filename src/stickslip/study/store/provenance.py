@@ -20,19 +20,19 @@ class Provenance:
     Parameters
     ----------
     title
-        Of the study.
+        Title of the study.
     study_toml
-        Its text; empty for a model of Python.
+        Text of the study file; empty for a Python model.
     versions
-        Of the libraries that make numbers.
+        Versions of the libraries that affect numbers.
     model_tables
-        JSON of the tables that a study file would have of a model of Python; empty for a study.
+        Tables of an equivalent study file as JSON, for a Python model; empty for a study.
     study_file
-        Name of the study's file; empty for a model of Python.
+        Name of the study file; empty for a Python model.
     created
-        Beginning of the run that wrote the result.
+        Time at which the run started that wrote the result.
     began
-        The same on a clock that only runs forward, s.
+        The same time on a monotonic clock, s.
     """
 
     title: str
@@ -59,12 +59,12 @@ class Provenance:
 
 
 def as_text(name: str) -> str:
-    """Return the name of a file with letters for what is no UTF-8 in it, which neither results nor pages can hold."""
+    """Return a file name with replacements for bytes that are not UTF-8, which neither results nor pages can hold."""
     return name.encode("utf-8", "backslashreplace").decode()
 
 
 def library_versions() -> dict[str, str]:
-    """Return the versions of this package, Python and the libraries that make numbers."""
+    """Return the versions of this package, Python and the libraries that affect numbers."""
     found = {"stickslip": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         try:

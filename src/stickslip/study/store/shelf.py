@@ -13,16 +13,16 @@ from stickslip.study.store.progress import LOG
 
 @dataclass(frozen=True, eq=False)
 class PartStore:
-    """Named arrays, numbers and texts under the hash of what they were made from.
+    """Cache of named arrays, numbers and texts under the hash of their inputs.
 
     Parameters
     ----------
     folder
-        Where the files lie; None: nothing is kept.
+        Folder of the files; None: nothing is stored.
     fresh
-        Whether files of earlier runs are passed over.
+        Whether files of earlier runs are ignored.
     written
-        Files of this run.
+        Files written by this run.
     """
 
     folder: Path | None = None
@@ -30,7 +30,7 @@ class PartStore:
     written: set[Path] = field(default_factory=set)
 
     def kept(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        """Return what `make` makes, or what it made in an earlier run; `content` is all that this depends on."""
+        """Return the result of `make`, stored or new; `content` is everything that it depends on."""
         if self.folder is None:
             return make()
         named = sha256(f"{FORMAT} {content}".encode()).hexdigest()

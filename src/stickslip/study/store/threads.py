@@ -6,7 +6,7 @@ from stickslip.model.blas_threads import BLAS_THREADS
 
 
 def one_blas_thread() -> None:
-    """Give BLAS one thread, before NumPy is loaded, unless the user said how many.
+    """Set BLAS to one thread before NumPy is loaded, unless the user has set a number.
 
     The matrices of a run have a few hundred rows: more threads wait for each other, and where other programs want the cores they
     take ten times as long.

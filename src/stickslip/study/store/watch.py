@@ -1,4 +1,4 @@
-"""Watched job processes, on this machine or another."""
+"""Supervision of job processes, on this machine or another."""
 
 import logging
 import pickle
@@ -25,22 +25,22 @@ UNKNOWN = (ImportError, AttributeError, pickle.PicklingError)  # what is not ins
 
 @dataclass(frozen=True, eq=False)
 class Parcel:
-    """A job on its way: what solving it needs is unpacked in the process that solves it alone.
+    """A pickled job; only the process that solves it unpacks it.
 
     Parameters
     ----------
     content
-        What it is, and the function that solves it; pickled.
+        The job and the function that solves it; pickled.
     sealed
-        The file that it ends in.
+        File of the finished job.
     label
-        What is said of it.
+        Name of the job in the log.
     question
-        What it answers, in words.
+        Name of its analysis in words.
     limits
-        What it may take.
+        Limits on time and memory.
     owner
-        Of its file at work; empty: the only process that may write it.
+        Owner of the file at work; empty: no other process may write it.
     """
 
     content: bytes
@@ -52,13 +52,13 @@ class Parcel:
 
     @property
     def file(self) -> Path:
-        """Where it is at work."""
+        """File of the job at work."""
         return file_at_work(self.sealed, self.owner)
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What comes back from another machine: what the job said, and what it raised."""
+    """Reply of another machine: the log lines of the job, and the exception it raised."""
 
     host: str
     lines: list[dict[str, Any]]
@@ -68,7 +68,7 @@ class Answer:
 def watched(
     parcel: Parcel, cell: Cell, stopped: Callable[[], bool], hear: Callable[[logging.LogRecord], object]
 ) -> None:
-    """Solve a job in a process of its own; set it aside where that takes too long, or ends twice at the same place."""
+    """Solve a job in a process of its own. Set it aside if it takes too long, or if its process dies twice at the same place."""
     with until_sealed_elsewhere(parcel.sealed, parcel.file):
         while True:
             try:
@@ -89,7 +89,7 @@ def watched(
 
 
 def unpacked(parcel: Parcel) -> None:
-    """Solve a job; runs in the process of its own."""
+    """Unpack and solve a job; runs in the job's own process."""
     try:
         solve, order = pickle.loads(parcel.content)
     except UNKNOWN as error:
@@ -98,7 +98,7 @@ def unpacked(parcel: Parcel) -> None:
 
 
 def unknown(label: str, error: Exception) -> StickslipError:
-    """Return what is said where a job cannot be unpacked."""
+    """Return the error for a job that a worker cannot unpack."""
     return StickslipError(
         f"a worker cannot take {label}: {error}. The same versions of stickslip and of modules of your own have to be "
         "installed where workers run."
@@ -106,7 +106,7 @@ def unknown(label: str, error: Exception) -> StickslipError:
 
 
 def set_aside(parcel: Parcel, why: str) -> None:
-    """Seal a job as it is, with the reason; the next run goes on with it."""
+    """Seal an unfinished job with the reason; the next run continues it."""
     with until_sealed_elsewhere(parcel.sealed, parcel.file), JobJournal(parcel.file) as journal:
         journal.put(ASIDE, {"text": f"the {parcel.question} job was set aside: {why}"})
         journal.seal()
@@ -114,7 +114,7 @@ def set_aside(parcel: Parcel, why: str) -> None:
 
 
 def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: dict[str, str]) -> Answer:
-    """Solve a job on another machine, in a file of this attempt alone; end when the run has ended."""
+    """Solve a job on another machine, in a file used by this attempt only; stop when the run has ended."""
     lines: list[dict[str, Any]] = []
     host = socket.gethostname()
     own = replace(parcel, owner=new_owner())

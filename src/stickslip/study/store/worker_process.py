@@ -1,4 +1,4 @@
-"""A worker process, ended where a job takes too long or too much memory."""
+"""A worker process, terminated when a job exceeds its time or memory."""
 
 import logging
 import os
@@ -30,27 +30,27 @@ SERVE = "import sys; sys.path[:] = {!r}; from stickslip.study.store.worker_proce
 
 
 class Ended(StickslipError):  # noqa: N818  it tells what has happened
-    """The process of a job has ended before the job had."""
+    """The process ended before its job."""
 
 
 class OutOfTime(Ended):
-    """It was ended because the job took too long."""
+    """The process was terminated because the job took too long."""
 
 
 class Stopped(Ended):
-    """It was ended because the run was stopped."""
+    """The process was terminated because the run was stopped."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a job may take.
+    """Limits of a job.
 
     Parameters
     ----------
     seconds
-        On the clock, of each start of the job.
+        Wall-clock time from each start of the job, s.
     memory_gb
-        Of the process that computes it.
+        Memory of the computing process, GB.
     """
 
     seconds: float = inf
@@ -61,7 +61,7 @@ class Limits:
 
 
 def check_memory_limit(limits: Limits) -> None:
-    """Refuse a limit of memory where nothing tells how much a process takes."""
+    """Refuse a memory limit on systems that do not report the memory of a process."""
     if limits.memory_gb < inf and not (Path(STATM.format("self")).exists() or find_spec("psutil")):
         raise input_error(
             "limits.job_memory_gb",
@@ -71,14 +71,14 @@ def check_memory_limit(limits: Limits) -> None:
 
 
 class Cell:
-    """A process that does one piece of work after another; it is started when it is needed, and again when it has ended.
+    """A worker process that does one piece of work after another; it is started on demand, and again after an abnormal end.
 
     Parameters
     ----------
     threads
-        Environment variables that say how many threads BLAS takes; those left out are not set there.
+        Environment variables for the number of BLAS threads; variables not listed are unset.
     modules
-        What it imports at its start.
+        Modules imported at its start.
     """
 
     def __init__(self, threads: dict[str, str], modules: tuple[str, ...] = ()) -> None:
@@ -94,12 +94,12 @@ class Cell:
         stopped: Callable[[], bool],
         hear: Callable[[logging.LogRecord], object] = LOG.handle,
     ) -> Any:
-        """Return what ``work(given)`` returns in the process, or raise what it raises there; what it says is heard here.
+        """Return ``work(given)`` evaluated in the process, or raise its exception; log lines of the process are repeated here.
 
         Raises
         ------
         Ended
-            If the process has ended before, by itself or by the limits.
+            If the process ends before the work is done, by itself or because of the limits.
         """
         process = self.started()
         _send(process.stdin, pickle.dumps((work, given)))
@@ -123,7 +123,7 @@ class Cell:
                 self._look(process.pid, looked - began, limits, stopped)
 
     def close(self) -> None:
-        """End the process, whatever it does: journals hold whole records at any time."""
+        """End the process at once; journals hold only whole records, so nothing is lost."""
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -146,7 +146,7 @@ class Cell:
             raise Ended(f"took {taken:.2f} GB of memory, the limit of a job is {limits.memory_gb:g} GB")
 
     def started(self) -> subprocess.Popen[bytes]:
-        """Return the process, which is started where there is none; it may be given work before it is ready."""
+        """Return the process, started if necessary; it accepts work before it is ready."""
         if self._process is not None and self._process.poll() is None:
             return self._process
         self.close()
@@ -168,7 +168,7 @@ class Cell:
 
 
 def memory_gb(process: int) -> float:
-    """Return the memory that a process takes at the moment; 0 if it has ended."""
+    """Return the present memory of a process in GB; 0 if it has ended."""
     try:
         pages = int(Path(STATM.format(process)).read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e9
@@ -185,7 +185,7 @@ def memory_gb(process: int) -> float:
 
 
 def blas_threads() -> dict[str, str]:
-    """Return the environment variables by which this process says how many threads BLAS takes."""
+    """Return the environment variables that set the number of BLAS threads of this process."""
     return {name: os.environ[name] for name in BLAS_THREADS if name in os.environ}
 
 
@@ -226,7 +226,7 @@ def _understood(message: bytes) -> tuple[str, Any]:
 
 
 def serve() -> None:
-    """Do pieces of work until the other end is gone; what runs in the process of a `Cell`."""
+    """Main loop of the process of a `Cell`: do pieces of work until the connection closes."""
     with suppress(ValueError):  # of a thread that is not the first: there is none
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     heard: SimpleQueue[bytes] = SimpleQueue()

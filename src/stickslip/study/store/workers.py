@@ -1,4 +1,4 @@
-"""Places for jobs: this process, worker processes, other machines; the same numbers to the last bit.
+"""Executors of jobs: this process, worker processes, other machines; the same numbers to the last bit.
 
 Each executor is a function that gives `Hands`: what takes a job, and how many at a time.
 """
@@ -41,22 +41,22 @@ class InProcess(Executor):
 
 @dataclass(frozen=True, eq=False)
 class Hands:
-    """What jobs are given to.
+    """An executor of jobs and its capacity.
 
     Parameters
     ----------
     pool
-        Of the standard library's kind.
+        An executor like those of `concurrent.futures`.
     room
-        Jobs that it is given at a time.
+        Number of jobs submitted at a time.
     cell
-        Lends a process for a job to run in; None: it runs where it is submitted to.
+        Context manager that lends a process for a job; None: a job runs where it is submitted to.
     far
-        Whether jobs may run on other machines, and what they say comes back when they have ended.
+        Whether jobs may run on other machines, and their log lines come back when they have ended.
     over
-        Set when the run is.
+        Set at the end of the run.
     trouble
-        Says why nothing may be going on; empty where nothing is known to be wrong.
+        Function that says why there may be no progress; empty if no reason is known.
     """
 
     pool: Executor
@@ -69,13 +69,13 @@ class Hands:
 
 @contextmanager
 def here() -> Iterator[Hands]:
-    """Give this process."""
+    """Yield this process as the executor."""
     yield Hands(InProcess(), 1)
 
 
 @contextmanager
 def cells(workers: int) -> Iterator[Hands]:
-    """Give processes of this machine, which begin at once; they end with the block, and with this process however it ends."""
+    """Yield worker processes on this machine, started at once; they end with the block, and with this process however it ends."""
     one_blas_thread()  # the processes inherit it
     made = [Cell(blas_threads(), WARM) for _ in range(workers)]
     free: SimpleQueue[Cell] = SimpleQueue()
@@ -104,7 +104,7 @@ def cells(workers: int) -> Iterator[Hands]:
 
 @contextmanager
 def dask(address: str) -> Iterator[Hands]:
-    """Give the workers of a Dask cluster that is running."""
+    """Yield the workers of a running Dask cluster."""
     client_of = _imported("distributed", "distributed").Client
     try:
         client = client_of(address, timeout=PATIENCE, set_as_default=False)
@@ -136,7 +136,7 @@ def dask(address: str) -> Iterator[Hands]:
 
 @contextmanager
 def single_node(workers: int) -> Iterator[Hands]:
-    """Give processes of this machine that executorlib starts."""
+    """Yield processes on this machine that executorlib starts."""
     made = _imported("executorlib", "executorlib").SingleNodeExecutor
     with _bound(LOOPBACK):
         pool = made(max_workers=workers, hostname_localhost=True, disable_dependencies=True)
@@ -146,7 +146,7 @@ def single_node(workers: int) -> Iterator[Hands]:
 
 @contextmanager
 def allocated(kind: str, address: str, workers: int) -> Iterator[Hands]:
-    """Give what SLURM or Flux has allocated to this command: a step of it for each job."""
+    """Yield the SLURM or Flux allocation of this command: one step of it for each job."""
     library = _imported("executorlib", "executorlib")
     if kind == "slurm":
         workers = _in_allocation(address, workers)
@@ -230,17 +230,17 @@ KINDS = ("dask", "slurm", "flux", "executorlib")
 
 @contextmanager
 def executor(kind: "str | Executor", workers: int, *, apart: bool = False) -> Iterator[Hands]:
-    """Give what runs jobs.
+    """Yield the executor of a run.
 
     Parameters
     ----------
     kind
-        Empty: this machine. ``dask=ADDRESS``, ``slurm``, ``flux``, with ``=ADDRESS`` that they listen on, or ``executorlib``; or any
-        executor of the standard library's kind.
+        Empty: this machine. ``dask=ADDRESS``, ``slurm``, ``flux`` (the last two also with ``=ADDRESS`` to listen on), ``executorlib``, or
+        any executor like those of `concurrent.futures`.
     workers
-        Number of processes; 1: this one.
+        Number of processes; 1: this process.
     apart
-        Whether even one runs in a process of its own.
+        Whether a single worker is a process of its own.
     """
     if not isinstance(kind, str):
         one_blas_thread()
@@ -260,7 +260,7 @@ def executor(kind: "str | Executor", workers: int, *, apart: bool = False) -> It
 
 
 def check_kind(kind: str) -> None:
-    """Refuse an executor that is not known, or whose package is not there, before anything is computed."""
+    """Refuse an unknown executor, or one whose package is missing, before any computation."""
     word = kind.partition("=")[0]
     if kind and word not in KINDS:
         raise input_error(f"--executor {kind}", "is not known", did_you_mean(word, list(KINDS)))

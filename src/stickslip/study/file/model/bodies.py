@@ -19,7 +19,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def shape(name: str) -> tuple[Any, Any]:
-    """Return the key `shape` of the table of the shape `name`."""
+    """Return the key `shape` with the fixed value `name`."""
     return Literal[name], Field(description=f'shape = "{name}"')
 
 

@@ -156,11 +156,11 @@ class ContactBase(Pair):
 
     @property
     def preload(self) -> float:
-        """Normal force at rest of what `per` says, N or Pa."""
+        """Normal force at rest, N, or pressure, Pa, as `per` says."""
         return float(getattr(self, self._preload_key) or 0.0)
 
     def library(self) -> ContactLaw:
-        """Return the law, its parameters as given."""
+        """Return the law with the given parameters."""
         table = getattr(self, "population", None)
         given = {} if table is None else {"population": build(POPULATIONS[table.kind], table)}
         law: ContactLaw = build(ALL_LAWS[self.law], self, per_area=self.per == "area", **given)
@@ -169,7 +169,7 @@ class ContactBase(Pair):
 
 @cache
 def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
-    """Return the keys of a law and whether each is needed."""
+    """Return the keys of a law and whether each is required."""
     columns = columns_of(ALL_LAWS[law], per_area=per_area)
     others = ["preload_pa" if per_area else "preload_n", *(["population"] if law == "iwan" else [])]
     return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(others, False)

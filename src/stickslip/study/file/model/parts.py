@@ -67,7 +67,7 @@ class PartTable(Section):
     )
 
     def files(self) -> dict[str, str]:
-        """Return the keys that name files, and the names."""
+        """Return the keys that name files, and the file names."""
         return {}
 
 
@@ -242,12 +242,12 @@ class FileModel(PartTable):
         return self
 
     def files(self) -> dict[str, str]:
-        """Return the keys that name files, and the names."""
+        """Return the keys that name files, and the file names."""
         named = {key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")}
         return {key: name for key, name in named.items() if name is not None}
 
     def axis(self) -> Axis | None:
-        """Return the axis of rotation; None where the study names none."""
+        """Return the axis of rotation; None if the study names none."""
         if self.axis_direction is None:
             return None
         (a, b, c), (x, y, z) = self.axis_direction, self.axis_origin_m
@@ -302,7 +302,7 @@ def _known_kind(given: Any) -> Any:
 
 
 def union_of(kinds: dict[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
-    """Return the type of a table that is one of several kinds, told apart by `which`."""
+    """Return the union type of several kinds of a table; `which` tells the kind of a given table."""
     members = tuple(Annotated[table, Tag(kind)] for kind, table in kinds.items())
     joined: Any = members[0]
     for member in members[1:]:
