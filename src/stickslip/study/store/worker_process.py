@@ -226,7 +226,7 @@ def _understood(message: bytes) -> tuple[str, Any]:
 
 
 def serve() -> None:
-    """Main loop of the process of a `Cell`: do pieces of work until the connection closes."""
+    """Do pieces of work until the connection closes: the main loop of the process of a `Cell`."""
     with suppress(ValueError):  # of a thread that is not the first: there is none
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     heard: SimpleQueue[bytes] = SimpleQueue()
