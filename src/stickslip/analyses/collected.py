@@ -1,4 +1,4 @@
-"""Records of the jobs of an analysis put together: arrays, cases side by side, verdicts."""
+"""Joining of job records: arrays, cases side by side, verdicts."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -28,13 +28,13 @@ def of_cases(
     Parameters
     ----------
     solved
-        What the jobs found.
+        Content of the jobs.
     of_case
         Returns the variables of a case.
     verdicts
-        Returns what is to be thought of a case, by its label and its variables.
+        Returns the verdicts on a case from its label and its variables.
     lost
-        Returns how many of its points have no solution.
+        Returns the number of its points without a solution.
     """
     cases = [of_case(one) for one in solved]
     labels = [one.case.label for one in solved]
@@ -50,7 +50,7 @@ def of_answers(
     verdicts: Callable[[str, Any], Iterable[Verdict]],
     lost: Callable[[Any], int] = lambda _: 0,
 ) -> xr.Dataset:
-    """Return the node of all cases, as `of_cases`, from the record that `answer` makes of what the job of each case has found."""
+    """Return the node of all cases, as `of_cases`; `answer` turns the content of a job into one record."""
     answers = [answer(one) for one in solved]
     labels = [one.case.label for one in solved]
     models = [told(one.notes.get("model", {})) for one in solved]
@@ -61,18 +61,18 @@ def of_answers(
 
 
 def described(about: About, values: Mapping[str, Any], model: Mapping[str, Any]) -> Variables:
-    """Return the values that are not empty as variables, beside what is known of the model."""
+    """Return the nonempty values as variables, together with those of the model."""
     known = {name: value for name, value in values.items() if np.size(value) > 0}
     return told(model) | {name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()}
 
 
 def each(records: Sequence[object], name: str) -> Any:
-    """Return the array of an attribute of all records."""
+    """Return one attribute of all records as an array."""
     return np.array([getattr(one, name) for one in records])
 
 
 def rows(records: Sequence[object], name: str, missing: float = np.nan) -> FloatArray:
-    """Return an attribute of all records, arrays of different lengths, as rows that are filled up."""
+    """Return one attribute of all records as rows (records, n); shorter ones are padded."""
     every = [getattr(one, name) for one in records]
     out = np.full((len(every), max((own.size for own in every), default=0)), missing)
     for row, own in zip(out, every, strict=True):
@@ -81,7 +81,7 @@ def rows(records: Sequence[object], name: str, missing: float = np.nan) -> Float
 
 
 def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:
-    """Yield each different case once, with the head of its tables: the labels of all that are alike, nothing where all are."""
+    """Yield each different case once, with the heading of its tables: the labels of all equal cases; empty if all cases are equal."""
     groups = alike(data)
     for group in groups:
         labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]

@@ -8,7 +8,7 @@ from stickslip.assembly.model import Model
 
 
 def facts_of(model: Model, rpm: float) -> dict[str, Any]:
-    """Return numbers and texts of a model; `rpm` is the speed of the rotor, NaN for a range."""
+    """Return numbers and texts about a model; `rpm` is the speed of the rotor, NaN for a range."""
     facts = model.facts
     return {
         "sectors": model.sectors,

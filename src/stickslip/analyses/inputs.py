@@ -42,7 +42,7 @@ _LONGEST = 12  # entries of a list that are told
 
 
 def study_of(root: Node) -> Mapping[str, Any]:
-    """Return the tables of a result's study file, or those that a model of Python stands for; none where there are none."""
+    """Return the tables of a result's study file, or the equivalent tables of a Python model; empty for none."""
     try:
         return tomllib.loads(root.text("study_toml")) or json.loads(root.text("model_tables", "{}"))
     except ValueError:
@@ -50,14 +50,14 @@ def study_of(root: Node) -> Mapping[str, Any]:
 
 
 def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
-    """Return the tables of what went in.
+    """Return the tables of the inputs.
 
     Parameters
     ----------
     study
-        Tables of the study file, or those that a model made in Python stands for; empty where there are none.
+        Tables of the study file, or the equivalent tables of a Python model; empty for none.
     nodes
-        The analyses by their names.
+        Nodes of the analyses by name.
     """
     response = next((n for n in nodes.values() if isinstance(n, Response)), None)
     study = as_run(study)
@@ -67,13 +67,13 @@ def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
 
 @dataclass(frozen=True)
 class Varied:
-    """The values of a key that the cases of a study have, in place of the one that its table has."""
+    """All values of a varied key, one for each case."""
 
     values: tuple[Any, ...]
 
 
 def as_run(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of a study with all values of a varied key in place of the one that its table has."""
+    """Return the tables of a study; each varied key holds all its values."""
     found: dict[str, Any] = deepcopy(dict(study))
     varied = found.get("vary", {})
     for own in varied if isinstance(varied, list) else [varied]:

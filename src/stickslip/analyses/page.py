@@ -1,4 +1,4 @@
-"""The report: one HTML page of all analyses of a result, which needs neither network nor our package."""
+"""The page of a result: one HTML file of all analyses, which needs neither network nor this package."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -121,7 +121,7 @@ def _provenance(tree: xr.DataTree) -> list[Content]:
 
 
 def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
-    """Return every figure of the page by its name, in the order of the page."""
+    """Return every figure by its name, in the order of the page."""
     found: list[Content] = []
     for section, data in _shown(tree):
         parts = [part for block in section.blocks for part in block.parts]
@@ -132,12 +132,12 @@ def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
 
 
 def report_html(tree: xr.DataTree) -> str:
-    """Return the whole page.
+    """Return the whole page as HTML.
 
     Parameters
     ----------
     tree
-        A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
+        A result: one node an analysis, provenance in the attributes of the root. Missing parts are left out.
     """
     placing, nodes = Placing(), _nodes(tree)
     root = Node(tree.to_dataset())
@@ -169,7 +169,7 @@ def write_report(tree: xr.DataTree, path: Path) -> None:
 
 
 def report_file(path: Path, html_path: Path | None = None) -> Path:
-    """Write the page of a result file; return where it is.
+    """Write the page of a result file; return its path.
 
     Parameters
     ----------

@@ -25,13 +25,13 @@ SAMPLES = 256
 
 
 def represented(order: int, evaluator: Evaluator) -> Discretisation:
-    """Return how motions of so many harmonics are represented."""
+    """Return the discretisation of motions with harmonics up to `order`."""
     samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
     return Discretisation(order=order, samples=samples, evaluator=evaluator)
 
 
 def free_to_vibrate(model: Model, harmonics: int, store: Store) -> Assembled:
-    """Return a model without its harmonic loads, a tuned wheel with all its waves, the output whose peak counts first."""
+    """Return a model without its harmonic loads, with the output of the peak first; a tuned wheel has all its waves."""
     still = model.undriven
     wheel = still.sectors > 1 and still.mistuning is None
     wave = 0 if wheel else None
@@ -39,7 +39,7 @@ def free_to_vibrate(model: Model, harmonics: int, store: Store) -> Assembled:
 
 
 def refuse_rigid(analysis: str, model: Assembled) -> None:
-    """Refuse contacts whose force is no function of their gap."""
+    """Refuse rigid contacts, whose force is no function of the gap."""
     if model.system.interface.rigid:
         raise input_error(
             analysis,
@@ -49,7 +49,7 @@ def refuse_rigid(analysis: str, model: Assembled) -> None:
 
 
 def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> None:
-    """Refuse wave numbers of a model that is no tuned wheel, and those that it does not have."""
+    """Refuse wave numbers for a model that is no tuned wheel, and wave numbers that it lacks."""
     if wanted is None:
         return
     if model.sectors == 1 or model.mistuning is not None:
@@ -66,7 +66,7 @@ def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> N
 
 
 def no_such_mode(key: str, told: str, of: str = "the model") -> InputError:
-    """Return the refusal of the number of a mode."""
+    """Return the error for an unknown mode number."""
     return input_error(
         key,
         f"{told}, and {of} has no such mode that vibrates",
@@ -75,7 +75,7 @@ def no_such_mode(key: str, told: str, of: str = "the model") -> InputError:
 
 
 def require_flow(model: Assembled, modes: Sequence[StuckMode], most: int, what: str) -> None:
-    """Refuse modes beyond the frequencies of a table of aerodynamic coefficients, up to so many harmonics of the highest of them."""
+    """Refuse modes outside the frequencies of the aerodynamic coefficients, up to `most` harmonics of the highest mode."""
     force = model.system.structure.feedback_of(1)
     if force is not None and force.influence.refuses and modes:
         low, high = (f(m.omega for m in modes) for f in (min, max))
@@ -83,20 +83,20 @@ def require_flow(model: Assembled, modes: Sequence[StuckMode], most: int, what: 
 
 
 def as_wave(system: System, wave: int) -> System:
-    """Return what vibrates as a wave: a single structure as it is."""
+    """Return the system vibrating as a wave; a single structure is unchanged."""
     wheel = system.structure.wheel
     return system if wheel is None else replace(system, structure=wheel.travelling_as(wave))
 
 
 def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[StuckMode]:
-    """Return so many modes of a wave, or of that of the loads, what the static loads press together stuck."""
+    """Return the first modes of a wave, by default the wave of the loads, with contacts stuck if the static loads press them."""
     holds = pressed_by(model.system.springs.laws, model.static_force)
     system = model.system if wave is None else as_wave(model.system, wave)
     return stuck_modes(system, count, holds)
 
 
 def known_coordinates(model: Assembled) -> dict[str, Any]:
-    """Return positions and labels of what results keep of free motions: retained coordinates with that of the first output, and outputs."""
+    """Return indices and labels of the coordinates stored with free motions: retained ones including the first output, and outputs."""
     system = model.system
     retained = np.union1d(system.retained, coordinate(system))
     labels = system.structure.dofs.labels
@@ -110,7 +110,7 @@ def known_coordinates(model: Assembled) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class KeptMotions:
-    """Free motions as results keep them, for other programs, which expand them to all nodes."""
+    """Free motions in a result; other programs can expand them to all nodes."""
 
     retained_label: Any = column("1", "names of the retained coordinates", along="coordinate", default=None)
     output_label: Any = column("1", "names of the outputs", along="reported", default=None)
@@ -126,7 +126,7 @@ class KeptMotions:
 
 
 def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what results keep of motions (..., harmonics, n, 2) of all coordinates: for other programs, which expand them to all nodes."""
+    """Return the stored part of motions (..., harmonics, n, 2) of all coordinates: retained coordinates and outputs."""
     if not coefficients.shape[-2]:  # none was found
         return {}
     return {
@@ -138,5 +138,5 @@ def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str
 
 
 def coordinate(system: System) -> int:
-    """Return the coordinate whose amplitude is told: that of the first output."""
+    """Return the index of the coordinate whose amplitude is reported: the first output."""
     return int(np.asarray(system.outputs)[0])

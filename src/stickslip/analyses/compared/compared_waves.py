@@ -1,4 +1,4 @@
-"""Compared designs beside forced responses: nonlinear modes, flutter margins, limit cycles."""
+"""Other analyses of compared designs: nonlinear modes, flutter margins, limit cycles."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -27,7 +27,7 @@ _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 def told_by(
     designs: Sequence[Design], name: str, kind: type[View], needed: Sequence[str]
 ) -> list[tuple[Design, str, View]]:
-    """Return every case of the designs that have an analysis: design, label, view."""
+    """Return every case of the designs with an analysis: design, label, view."""
     found = []
     for design in designs:
         if name in design.tree.children:
@@ -40,7 +40,7 @@ def told_by(
 
 
 def stacked(views: Sequence[tuple[Design, str, View]], table: Callable[[View], Table | Words]) -> list[Content]:
-    """Return the rows of each case's table below each other, with the design and the case before them, and what is told in words where it has none."""
+    """Join the tables of all cases, with columns for design and case in front; texts of cases without a table follow as a list."""
     head: Sequence[str] = ()
     rows, words = [], []
     for design, label, view in views:
@@ -56,7 +56,7 @@ def stacked(views: Sequence[tuple[Design, str, View]], table: Callable[[View], T
 
 
 def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
-    """Return frequency and damping of the nonlinear modes over the amplitude, and a table."""
+    """Return figure and table of the nonlinear modes: frequency and damping over the amplitude."""
     needed = ("mode", "frequency_hz", "damping_ratio", "amplitude", "status")
     views = told_by(designs, "nonlinear_mode", Modes, needed)
     if not views:
@@ -94,7 +94,7 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
 
 
 def flutter(designs: Sequence[Design]) -> list[Content]:
-    """Return the damping in the flow over the phase angle, and the margins of all waves."""
+    """Return figure and table of the flutter margins: damping over the phase angle, and all waves."""
     views = told_by(designs, "flutter", Waves, ("phase_angle_deg", "damping", "frequency_hz"))
     if not views:
         return []

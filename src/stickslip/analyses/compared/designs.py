@@ -1,4 +1,4 @@
-"""Designs that are compared: their responses, peaks and inputs side by side."""
+"""Compared designs: responses, peaks and inputs."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -27,16 +27,16 @@ MISSING = "not given"
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A result under a name.
+    """A result with a name.
 
     Parameters
     ----------
     name
-        In legends and tables.
+        Name in legends and tables.
     tree
         The result.
     index
-        Its place in the comparison.
+        Index in the comparison.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Design:
 
     @property
     def colour(self) -> str:
-        """CSS colour of its lines."""
+        """CSS colour of its curves."""
         return colour(self.index)
 
     @cached_property
@@ -59,7 +59,7 @@ class Design:
 
     @cached_property
     def modes(self) -> Waves | None:
-        """Its modes, of the first case; None without them."""
+        """Its modes in the first case; None without them."""
         if "modes" not in self.tree.children:
             return None
         data = analysis(self.tree, "modes")
@@ -67,19 +67,19 @@ class Design:
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
-        """All values of its study file by their dotted keys; empty for a model of Python."""
+        """All values of its study file by their dotted keys; empty for a Python model."""
         try:
             return flattened(tomllib.loads(str(self.tree.attrs.get("study_toml", ""))))
         except tomllib.TOMLDecodeError:
             return {}
 
     def case(self, label: str) -> ShownCase | None:
-        """Return the case of a label; None where there is none."""
+        """Return the case with a label; None for an unknown one."""
         cases = self.response.cases if self.response else ()
         return next((c for c in cases if c.label == label), None)
 
     def held_against(self, case: ShownCase, other: "Design") -> ShownCase | None:
-        """Return the case that one of another design is held against: the only one, that of its label, or that whose varied values the other's study file has."""
+        """Return the case to compare with a case of another design: the only one, the one with its label, or the one with its varied values."""
         cases = self.response.cases if self.response else ()
         own = self.case(case.label)
         if self.response is None or own is not None or len(cases) == 1:
@@ -90,7 +90,7 @@ class Design:
         return None if case.label else next(same, None)
 
     def best(self, *, divided: bool) -> ShownCase | None:
-        """Of its cases with the best verdict, the one with the smallest peak, per newton of its load where it is `divided`."""
+        """Return the case with the smallest peak among those with the best verdict; with `divided` the peak per newton of its load."""
         if self.response is None or self.response.chosen < 0:
             return None
         first, own = self.response.cases[self.response.chosen], self.response
@@ -102,12 +102,12 @@ class Design:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredCurve:
-    """A response of a measurement or of another program.
+    """A response from a measurement or another program.
 
     Parameters
     ----------
     name
-        In legends and tables.
+        Name in legends and tables.
     hz
         (n,) frequencies, rising.
     amplitude
@@ -138,7 +138,7 @@ def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def differences(designs: Sequence[Design]) -> list[list[str]]:
-    """Return a row for each key of the study files that is not the same in all: the key, then its value in each design."""
+    """Return one row for each key whose values differ between the study files: the key, then its value in each design."""
     keys = dict.fromkeys(key for d in designs for key in d.inputs)
     rows = [[key, *(d.inputs.get(key, MISSING) for d in designs)] for key in keys]
     return [[row[0], *map(_plain, row[1:])] for row in rows if any(c != row[1] for c in row[2:])]
@@ -175,12 +175,12 @@ def read_curve(path: Path) -> MeasuredCurve:
 
 
 def per_force(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> bool:
-    """Say whether amplitudes are compared per newton of the excitation: where nothing stands against it.
+    """Return whether amplitudes are compared per newton of the excitation; true if all designs and curves allow it.
 
     Raises
     ------
     InputError
-        If curves cannot be compared with what the designs have, or the designs' outputs not with each other.
+        If curves and designs, or the outputs of the designs, have different units.
     """
     known = [d.response for d in designs if d.response]
     if curves and not known:

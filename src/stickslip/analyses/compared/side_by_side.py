@@ -1,4 +1,4 @@
-"""The page that holds designs against each other: peaks, responses, optimisation curves, inputs."""
+"""The page of a comparison of designs: peaks, responses, optimisation curves, inputs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ _MOST_INPUTS = 400  # characters of a value that a cell shows
 
 
 def amplitudes(design: Response, *, divided: bool) -> FloatArray:
-    """Return (point,) amplitudes in m, or per newton; NaN where a point did not converge."""
+    """Return (point,) amplitudes in m, or per newton; NaN at unconverged points."""
     whole = design.at_outputs(design.values("amplitude", "point", "output"))
     force = np.array([c.excitation for c in design.cases])[design.point_case]
     return np.where(design.converged, whole / force if divided else whole, np.nan)
@@ -49,12 +49,12 @@ def unit_of(designs: Sequence[Design], *, divided: bool) -> str:
 
 
 def over_first(value: float, first: float) -> float:
-    """Return how far a value is from the first one in percent; NaN where that is zero."""
+    """Return the difference of a value from the first one in percent; NaN if the first is zero."""
     return 100.0 * (value / first - 1.0) if first else float("nan")
 
 
 def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
-    """Return what the reader chooses between: the best case of each design, then each case that any of them has; nothing where each has one case."""
+    """Return the choices of the reader: the best case of each design, then each case of any design; none if each design has one case."""
     labels = dict.fromkeys(
         c.label for d in designs if d.response and len(d.response.cases) > 1 for c in d.response.cases
     )
@@ -70,9 +70,9 @@ def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | No
 
 
 def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool) -> ShownCase | None:
-    """Return the choice that the page opens on: a case that all designs have, that of the first one's smallest peak if it is one; else the best of each.
+    """Return the initial choice: a case common to all designs, preferably the first design's best; else the best case of each.
 
-    The best cases of two designs may be those of different loads, which say nothing of the designs.
+    The best cases of two designs may have different loads, and then do not compare the designs.
     """
     told = [d for d in designs if d.response is not None]
     common = [c for c in offered[1:] if all(_case(d, c, divided=divided) for d in told)]
@@ -82,7 +82,7 @@ def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided:
 
 
 def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plot | None:
-    """Draw the responses of all designs over each other, a case at a time."""
+    """Draw the responses of all designs together, one case at a time."""
     told = [d for d in designs if d.response is not None]
     if not told:
         return None
@@ -155,7 +155,7 @@ def _line(design: Design, response: Response, case: ShownCase, y: FloatArray, sc
 
 
 def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
-    """Draw the optimisation curves of all designs over each other, where two of them vary the same number."""
+    """Draw the optimisation curves of all designs together, if at least two vary the same number."""
     numbered = [(d, d.response, first_number(d.response.data)[0]) for d in designs if d.response]
     keys = [key for _, _, key in numbered]
     key = max(keys, key=keys.count, default="")
@@ -205,7 +205,7 @@ def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
 
 @dataclass(frozen=True)
 class PeakRow:
-    """The peak of a case of a design, in Hz and SI units, and how far it is from that of the first design: NaN where that has no such case."""
+    """The peak of a case of a design, in Hz and SI units, and its difference from the first design; NaN if that lacks the case."""
 
     case: str
     design: str
@@ -217,7 +217,7 @@ class PeakRow:
 
 
 def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
-    """Return a row for each case of each design, case by case in the order of the first that has it."""
+    """Return one row for each case of each design, in the order of cases."""
     told = [(d, d.response) for d in designs if d.response is not None]
     labels = dict.fromkeys(c.label for _, r in told for c in r.cases)
     found = []
@@ -236,7 +236,7 @@ def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
 
 
 def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
-    """Return a row for each case of each design: its peak, and how far it is from that of the first design."""
+    """Return a table with one row for each case of each design: the peak, and its difference from the first design."""
     found = peak_rows(designs, divided=divided)
     if not found:
         return None
@@ -260,7 +260,7 @@ def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
 
 
 def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Table | None:
-    """Return how far each case of each design is from each curve that was read: at the peak, and along it."""
+    """Return a table of differences between each case of each design and each reference curve: at the peak, and along the curve."""
     if not curves:
         return None
     divided, rows = per_force(designs, curves), []
@@ -303,7 +303,7 @@ def _along(response: Response, case: ShownCase, curve: MeasuredCurve, *, divided
 
 
 def frequencies(designs: Sequence[Design]) -> Table | None:
-    """Return the natural frequencies of the designs that have them, wave by wave, against the first."""
+    """Return a table of natural frequencies, wave by wave, compared with the first design."""
     told = [(d, d.modes) for d in designs if d.modes is not None]
     if len(told) < 2:
         return None
@@ -329,7 +329,7 @@ def frequencies(designs: Sequence[Design]) -> Table | None:
 
 
 def inputs(designs: Sequence[Design]) -> Table | Words:
-    """Return what differs between the study files."""
+    """Return a table of the differences between the study files."""
     rows, title = differences(designs), "What differs between the study files"
     without = [d.name for d in designs if not d.inputs]
     told = [f"Made without a study file, inputs not known: {', '.join(without)}."] if without else []
@@ -340,7 +340,7 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
 
 
 def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
-    """Return the numbers of the head: the best case of each design, then each design at the case that the page opens on, where all have it."""
+    """Return the boxes at the head: the best case of each design, and each design at the initial case if all have it."""
     offered = choices(designs)
     shown = opening(designs, offered, divided=divided)
     best = [(d, d.best(divided=divided)) for d in designs]
@@ -374,12 +374,12 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
 
 
 def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list[tuple[str, str, list[Content]]]:
-    """Return the chapters of a comparison: key, title, and what they show.
+    """Return the chapters of a comparison: key, title, and contents.
 
     Raises
     ------
     InputError
-        If curves cannot be compared with what the designs have.
+        If curves and designs have different units.
     """
     divided, offered = per_force(designs, curves), choices(designs)
     first = opening(designs, offered, divided=divided)
@@ -408,7 +408,7 @@ def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list
 
 
 def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] = ()) -> str:
-    """Return the page of a comparison; `InputError` if curves cannot be compared with the designs."""
+    """Return the page of a comparison; an `InputError` if curves cannot be compared with the designs."""
     placing = Placing()
     chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
     names = [d.name for d in designs]

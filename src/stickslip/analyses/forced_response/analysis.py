@@ -1,4 +1,4 @@
-"""The steady vibration under harmonic loads, friction and all: branches, peaks, and how far its harmonics are to be trusted."""
+"""The steady vibration under harmonic loads: branches, peaks, and the accuracy of the harmonics."""
 
 from collections.abc import Iterator, Sequence
 from time import perf_counter
@@ -304,7 +304,7 @@ def _compile(question: Question) -> None:
 
 
 def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
-    """Return how much of a case is done, and a line that says so."""
+    """Return the finished fraction of a case, and a line that states it."""
     first, last = sweep.ends
     along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}

@@ -21,32 +21,32 @@ NAMED = 4  # sets of harmonics that a sentence names
 
 
 def error_text(error: float) -> str:
-    """Return a predicted error (a fraction) as text: a linear prediction beyond the motion itself has no digits worth telling."""
+    """Return a predicted error (a fraction) as text; above 100 % as ``over 100 %``, since the prediction is linear."""
     return "over 100 %" if error > 1.0 else f"{100 * error:.2g} %"
 
 
 @dataclass(frozen=True)
 class Chooser:
-    """How the harmonics of a response are chosen.
+    """The selection of harmonics of a response.
 
     Parameters
     ----------
     name
-        Of the selection.
+        Name of the strategy.
     single
-        Whether each frequency is settled before the next one.
+        Whether each frequency gets its final harmonics before the next one.
     low, high
         Harmonics of the first passage and of the reference.
     threshold
-        Indicator above which more harmonics are asked for; NaN where nothing is decided.
+        Indicator above which more harmonics are requested; NaN if nothing is chosen.
     is_error
         Whether the indicator is the predicted error of the solution, a fraction.
     over
-        Labels of the dofs over which an error is taken.
+        Labels of the dofs in the error norm.
     harmonics
-        Harmonics of which it is taken.
+        Harmonics in the error norm.
     first
-        Harmonics with which the first passage is made.
+        Harmonics that the first passage uses.
     auto
         Whether harmonics are raised along the branch, up to the highest of `high`.
     """
@@ -64,17 +64,17 @@ class Chooser:
 
     @property
     def decides(self) -> bool:
-        """Whether anything is chosen: not with the same harmonics everywhere."""
+        """Whether the strategy chooses; false with the same harmonics at every frequency."""
         return bool(np.isfinite(self.threshold))
 
     @property
     def indicator(self) -> str:
-        """What the indicator is called."""
+        """Name of the indicator."""
         return "predicted error" if self.is_error else "indicator"
 
     @property
     def limit(self) -> str:
-        """The threshold as text, in percent where it is one of an error."""
+        """The threshold as text; in percent if it limits an error."""
         return f"{100 * self.threshold:g} %" if self.is_error else f"{self.threshold:g}"
 
     def shown(self, indicator: float) -> str:
@@ -84,7 +84,7 @@ class Chooser:
         return "beyond all bounds" if np.isinf(indicator) else f"{indicator:.3g}"
 
     def attributes(self) -> dict[str, Any]:
-        """Return it as attributes of a netCDF file: texts, numbers, lists of numbers."""
+        """Return the selection as attributes of a netCDF file: texts, numbers, lists of numbers."""
         own: dict[str, Any] = {
             "selection": self.name,
             "passages": "auto" if self.auto else "single" if self.single else "double",
@@ -100,12 +100,12 @@ class Chooser:
         return own | ({"alert_threshold_percent": 100 * self.threshold} if self.is_error else {})
 
     def lines(self, passages_asked: str) -> list[str]:
-        """Say what will be done, a line a thought.
+        """Describe the selection before the run, one statement a line.
 
         Parameters
         ----------
         passages_asked
-            What the study says under ``passages``.
+            Value of the key ``passages``.
         """
         if not self.decides:
             return [f"harmonics {named(self.first)} at every frequency ({self.name})"]
@@ -141,9 +141,9 @@ class Chooser:
         return said
 
     def sentence(self, response: Response) -> str:
-        """Say at which frequencies of a case more harmonics were asked for, and why.
+        """Say at which frequencies of a case the strategy requested more harmonics, and why.
 
-        An alert was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
+        An alert is evaluated at the points of the first passage, even if a repeat or a branch with many harmonics has replaced them.
         """
         if not self.is_error or self.auto:
             return f"{_kept(response)}{_audited(response)}."
@@ -189,16 +189,16 @@ def _points(n: int) -> str:
 
 
 def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Chooser:
-    """Return how the harmonics of a sweep are chosen.
+    """Return the selection of harmonics of a sweep.
 
     Parameters
     ----------
     sweep
         The sweep.
     over
-        Labels of the dofs over which an error is taken.
+        Labels of the dofs in the error norm.
     driven
-        Harmonics that the excitation drives: the error is taken of these where the sweep names none.
+        Harmonics of the excitation; the error norm takes these if the sweep names none.
     """
     strategy = sweep.strategy
     decides = always_kept(strategy) is None

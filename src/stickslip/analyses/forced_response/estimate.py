@@ -33,26 +33,26 @@ FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and th
 
 @dataclass(frozen=True)
 class Estimate:
-    """Cost of a case.
+    """Estimated cost of a case.
 
     Parameters
     ----------
     nodes
-        Of all parts.
+        Number of nodes of all parts.
     unknowns
-        Of a solution with all harmonics.
+        Number of unknowns with all harmonics.
     memory_gb
-        Largest memory.
+        Largest memory, GB.
     newton_steps
-        Of all points, at most.
+        Largest number of Newton steps over all points.
     model_seconds
-        Of one core, to mesh and reduce the parts and find their frequencies; cases with the same parts share it.
+        Time on one core to mesh and reduce the parts and find their frequencies, s; cases with the same parts share it.
     least_seconds, most_seconds
-        Of one core, to solve the response: where hardly a contact slips and the fewest harmonics do at every point, and where contacts slip
-        at all points and as many of these as may be need the most harmonics.
-        Stability and time integration are not counted.
+        Time on one core to solve the response, s. Least: contacts hardly slip, and the fewest harmonics suffice at every point. Most:
+        contacts slip at every point, and the largest plausible number of points needs all harmonics. Stability and time integration are not
+        counted.
     most
-        How many harmonics the most stands for, in words; empty where their number is fixed.
+        Assumption on harmonics behind the most, in words; empty if their number is fixed.
     """
 
     nodes: int
@@ -66,7 +66,7 @@ class Estimate:
 
     @property
     def seconds(self) -> float:
-        """What ``limits.work_s`` is held against: the model and the most that its response takes."""
+        """Time compared with ``limits.work_s``: model and largest time of the response, s."""
         return self.model_seconds + self.most_seconds
 
     def __str__(self) -> str:
@@ -82,7 +82,7 @@ class Estimate:
 
 
 def estimate(model: Model, sweep: Sweep) -> Estimate:
-    """Estimate memory and work of the response of a model that is not assembled yet: how many points slip nobody knows before."""
+    """Estimate memory and time for the response of a model before assembly, when the number of slipping points is still unknown."""
     sectors = 1 if model.mistuning is None else model.sectors
     whole = kept_whole(model)
     nodes, coordinates = nodes_of(model), whole or sectors * retained_of(model)
@@ -132,7 +132,7 @@ def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
 
 
 def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
-    """Return the sweep, its cap of ``auto`` lowered as far as the study's limits ask, but not below its second level; what is above them then is left to `check_limits`."""
+    """Return the sweep with the cap of ``auto`` lowered to the study's limits, but not below its second level; `check_limits` refuses the rest."""
     if not sweep.auto:
         return sweep
     for support in reversed(sweep.supports[1:] or sweep.supports):
@@ -149,7 +149,7 @@ def _flops(unknowns: int) -> int:
 
 
 def check_limits(limits: Limits, cost: Estimate) -> None:
-    """Refuse a case that is estimated above the study's limits.
+    """Refuse a case whose estimate exceeds the study's limits.
 
     Raises
     ------
@@ -166,12 +166,12 @@ def check_limits(limits: Limits, cost: Estimate) -> None:
 
 
 def nodes_of(model: Model) -> int:
-    """Return the number of nodes of all parts that are reduced; copies share the reduction of their template."""
+    """Return the number of nodes of all reduced parts; copies share the reduction of their original."""
     return sum(_nodes(part) for part in model.parts.values() if part.template is None)
 
 
 def retained_of(model: Model) -> int:
-    """Return how many coordinates stay unknown: of free rigid bodies, and dofs under contacts or the motion of contact points if that is less."""
+    """Return the number of retained coordinates: those of free rigid bodies, and the smaller of contact dofs and contact motions."""
     bodies = np.zeros(model.places.n, dtype=bool)
     bodies[model.places.bodies()] = True
     both = scipy.sparse.hstack([model.pairs.own, model.pairs.following], format="csr")

@@ -1,4 +1,4 @@
-"""``--verify-harmonics``: each accepted solution towards the judging set of the most harmonics that the study keeps."""
+"""``--verify-harmonics``: the predicted change of each accepted solution by twice the harmonics of the study."""
 
 from dataclasses import dataclass, replace
 
@@ -18,24 +18,24 @@ from stickslip.units import HZ
 
 @dataclass(frozen=True, eq=False)
 class ReferenceDoubt:
-    """What the harmonics of the judging set would change in a response.
+    """Predicted changes of a response by the harmonics of the judging set.
 
     Parameters
     ----------
     harmonics
-        Highest harmonic against which the solutions are held.
+        Highest harmonic of the judging set.
     high
-        Harmonics that the study keeps at most.
+        Highest harmonic that the study keeps.
     limit
-        Predicted change that is tolerated, a fraction.
+        Tolerated change, a fraction.
     errors
-        (accepted points,) predicted change, a fraction; NaN where there is no solution.
+        (accepted points,) predicted change, a fraction; NaN at points without a solution.
     frequency_hz
-        Where it is largest; NaN without a solution.
+        Frequency of the largest change; NaN without a solution.
     kept
-        Harmonics of the solution there, as text.
+        Harmonics of the solution at this frequency, as text.
     label
-        Where the change is taken that is largest there.
+        Dof with the largest change at this frequency.
     only
         Harmonics of every solution, if the selection keeps the low ones everywhere; else None.
     """
@@ -56,17 +56,17 @@ class ReferenceDoubt:
 
     @property
     def known(self) -> int:
-        """Number of solutions that were checked."""
+        """Number of solutions checked."""
         return int(np.sum(~np.isnan(self.errors)))
 
     @property
     def above(self) -> int:
-        """Number of solutions that would change by more than is tolerated."""
+        """Number of solutions whose predicted change exceeds the limit."""
         return int(np.sum(self.errors > self.limit))
 
     @property
     def sentence(self) -> str:
-        """What was checked and what came out."""
+        """The check and its outcome as a sentence."""
         if not self.known:
             return "no solution that could be checked."
         told = (
@@ -78,7 +78,7 @@ class ReferenceDoubt:
 
     @property
     def advice(self) -> str:
-        """Which harmonics to keep instead, and what that costs."""
+        """The harmonics to keep instead, and their cost."""
         if self.only is not None:
             return (
                 f'With harmonics.selection = "always_low" every solution keeps H = {named(self.only)}, whatever harmonics.high says. {MORE_THAN_LOW}, '
@@ -100,12 +100,12 @@ class ReferenceDoubt:
 
 
 def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
-    """Predict what the judging set of the most harmonics that the study keeps would change.
+    """Predict the change of a response by the judging set of the study's highest harmonics.
 
     Parameters
     ----------
     question, response
-        The model, and its finished response.
+        The case and its finished response.
     """
     problem = question.problem
     checks = check_support(problem, [a.point for a in response.accepted])

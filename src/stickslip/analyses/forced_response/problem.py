@@ -42,16 +42,16 @@ SINGLE_FREQUENCY_MARGIN = 1e-3  # of a frequency that stands alone: half the wid
 
 
 def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1,)) -> Sweep:
-    """Return the sweep that a study's tables ask for.
+    """Return the sweep defined by a study's tables.
 
     Parameters
     ----------
     settings
-        With the tables ``forced_response``, ``harmonics`` and ``solver``.
+        Settings with the tables ``forced_response``, ``harmonics`` and ``solver``.
     engine_order
-        Of the frequency, for a response over speed; None: the loads have none.
+        Engine order of the excitation, for a response over speed; None: the loads have none.
     driven
-        Harmonics that loads act in.
+        Harmonics of the loads.
 
     Raises
     ------
@@ -65,18 +65,18 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
 
 
 def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]) -> Sweep:
-    """Return the sweep of a table with ``direction``, ``points`` and ``peak_points``, harmonics and solver as the study says.
+    """Return the sweep of a table with ``direction``, ``points`` and ``peak_points``; harmonics and solver from the study.
 
     Parameters
     ----------
     settings
-        With the tables ``harmonics`` and ``solver``.
+        Settings with the tables ``harmonics`` and ``solver``.
     table
-        Whose response it is.
+        Table of the response.
     omega_range
         Lowest and highest frequency, rad/s.
     driven
-        Harmonics that loads act in.
+        Harmonics of the loads.
     """
     h = settings.harmonics
     low = h.beginning(driven)
@@ -99,7 +99,7 @@ def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], d
 
 
 def measured(sweep: Sweep, model: Model) -> Sweep:
-    """Return a sweep with the amplitudes that a model asks for, whose errors are those of the answer, or as published where the model names places over which they are taken."""
+    """Return a sweep with the amplitude and the error norm of a model; errors are relative to the answer, or as published if the model names places."""
     relative_to: RelativeTo = "answer" if model.alert_over in ANSWER else "each"
     return replace(sweep, amplitude_of=model.amplitude_of, relative_to=relative_to)
 
@@ -138,35 +138,35 @@ class Question:
     Parameters
     ----------
     label
-        Of the case; empty for a study without [vary].
+        Label of the case; empty for a study without [vary].
     model
-        The assembled model; its first output is the one whose peak is resolved.
+        The assembled model; its peak is that of the first output.
     sweep
         How the response is computed.
     limit
-        Change that more harmonics may make before there is a warning, a fraction.
+        Change by more harmonics above which there is a warning, a fraction.
     facts
-        What the result says of the model, see `facts_of`.
+        Facts about the model for the result, see `facts_of`.
     key
-        Of the table, that gives the range: ``speed_rpm`` where the frequencies are those of a range of speeds.
+        Key of the table for the range: ``speed_rpm`` for a response over speed.
     checks
-        Checks asked for beside the response.
+        Additional checks of this run.
     first
-        Whether it is the first case, which says what all have in common.
+        Whether this is the first case, which also stores what all cases share.
     examine
-        Of which points the stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
+        Points whose stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
     bifurcations
-        Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
+        Bifurcations located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and their side branches are followed.
     not_periodic_s
-        Seconds of a march where no periodic motion stands for the response; 0: none.
+        Work allowed for a time integration at a point without a stable periodic motion, in seconds of 4e9 operations; 0: none.
     not_periodic_points
-        Most points that are marched so.
+        Largest number of such points.
     rpm
         Speed of rotation, 1/min.
     richer
-        The model and its load with half again as many modes; None where there are no more, or nobody asked.
+        Model and load with 50 % more modes; None if there are no more modes, or the check is off.
     extent
-        Size and stiffness of its bodies; None where nobody asked.
+        Size and stiffness of its bodies; None if the check is off.
     """
 
     label: str
@@ -187,29 +187,29 @@ class Question:
 
     @property
     def over_speed(self) -> bool:
-        """Whether the frequencies are those of a range of speeds."""
+        """Whether the response is over speed."""
         return self.key == "speed_rpm"
 
     @cached_property
     def problem(self) -> ForcedProblem:
-        """What is solved."""
+        """The problem of the sweep."""
         return forced_problem(self.model.system, self.model.load, self.sweep)
 
     @property
     def driven(self) -> tuple[int, ...]:
-        """Harmonics that the load drives."""
+        """Harmonics of the load."""
         forces = self.model.load.harmonics
         return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
 
     @property
     def driven_names(self) -> tuple[str, ...]:
-        """What these harmonics are called: engine orders on a wheel."""
+        """Names of these harmonics: engine orders on a wheel."""
         orders = self.model.orders
         return tuple(f"engine order {orders[h]}" if h in orders else f"harmonic {h}" for h in self.driven)
 
     @property
     def orders_lines(self) -> tuple[str, ...]:
-        """What the frequency is where several engine orders act at once, in words."""
+        """Meaning of the frequency if several engine orders act at once, in words."""
         base, orders = self.model.engine_order, self.model.orders
         if len(orders) < 2 or not base:
             return ()
@@ -219,16 +219,16 @@ class Question:
 
     @property
     def chooser(self) -> Chooser:
-        """How harmonics are chosen."""
+        """The selection of harmonics."""
         return chooser_of(self.sweep, self.model.error_labels, self.driven)
 
     def said(self, text: str) -> str:
-        """Return a sentence about the case, see `said`."""
+        """Return a sentence about the case, preceded by its label."""
         return said(self.label, text)
 
 
 def too_large(question: Question) -> str:
-    """Return how many coordinates are too many to be integrated in time; empty where they are not."""
+    """Return why a model has too many coordinates for time integration; empty if it has not."""
     system = question.model.system
     if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"
@@ -240,7 +240,7 @@ def too_large(question: Question) -> str:
 
 
 def peak_first(model: Assembled) -> Assembled:
-    """Return the model with the output whose peak counts before the others: the solver resolves the peak of the first one."""
+    """Return the model with the output of the peak in first place; the solver resolves the peak of the first output."""
     first = model.peak_output
     if first == 0:
         return model
@@ -251,7 +251,7 @@ def peak_first(model: Assembled) -> Assembled:
 
 
 def with_comparisons(question: Question, case: Case, model: Model) -> Question:
-    """Return the question with what its peak is compared with: the model with more modes, and the extent of its bodies."""
+    """Return the question with the models for the checks of its peak: more modes, and the extent of its bodies."""
     order = question.sweep.high_harmonics[-1]
     more = more_modes(model, order, case.store)
     more = None if more is None else peak_first(more)
@@ -260,12 +260,12 @@ def with_comparisons(question: Question, case: Case, model: Model) -> Question:
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves; whatever can be refused is, before anything long is computed.
+    """Return the question of a job; raise all refusals before any long computation.
 
     Raises
     ------
     InputError
-        If the sweep is none, harmonics that loads drive are not kept, a check has no form for the model, or the estimated cost
+        If the sweep is empty, harmonics of the loads are not kept, a check does not apply to the model, or the estimated cost
         exceeds the study's limits.
     """
     settings = case.settings

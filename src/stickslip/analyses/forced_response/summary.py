@@ -23,7 +23,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     Parameters
     ----------
     data
-        Of `put_together`, with the label of each case.
+        Dataset of `put_together`, with the label of each case.
     """
     labels = [str(x) for x in data["case_label"].values]
     more, low = more_name(data), named(np.atleast_1d(data.attrs["low_harmonics"]))
@@ -62,7 +62,7 @@ MEASURED = {"half_peak_to_peak": "half of peak to peak", "rms": "root mean squar
 
 
 def amplitude_name(data: xr.Dataset) -> str:
-    """Return what amplitudes are: of the harmonics that the load drives, unless the study measures otherwise."""
+    """Return the name of the amplitude: of the driven harmonics, unless the study defines it otherwise."""
     if (told := MEASURED.get(str(data.attrs.get("amplitude_of", "first")))) is not None:
         return told
     driven = [int(h) for h in np.atleast_1d(data.attrs.get("driven_harmonics", [1]))]
@@ -75,12 +75,12 @@ def amplitude_name(data: xr.Dataset) -> str:
 
 
 def several_orders(data: xr.Dataset) -> list[int]:
-    """Return the engine orders that act at once; none where there is one."""
+    """Return the engine orders that act at once; none for a single one."""
     return [int(m) for m in np.atleast_1d(data.attrs.get("driven_engine_orders", []))]
 
 
 def orders_sentence(data: xr.Dataset) -> str:
-    """Say what the frequency is where several engine orders act at once."""
+    """State the meaning of the frequency if several engine orders act at once."""
     base = int(data.attrs["engine_order"])
     acts = [f"engine order {m} at {m // base} times that" for m in several_orders(data)]
     return f"Frequencies are those of engine order {base}, the common divisor: {', '.join(acts)}."
@@ -132,14 +132,14 @@ def _choice_title(data: xr.Dataset) -> str:
 
 
 def choices(data: xr.Dataset) -> tuple[str, ...]:
-    """Say case by case where more harmonics were asked for, and what choosing cost; nothing where nothing was decided."""
+    """List, for each case, the frequencies with more harmonics, and the work of the selection; empty without a choice."""
     labels = [str(x) for x in data["case_label"].values]
     told = _sentences(data, "choice_sentence", labels)
     return (*told, cost_sentence(data)) if told and data.sizes["point"] else told
 
 
 def cost_sentence(data: xr.Dataset) -> str:
-    """Say what choosing has cost beside the harmonics of the reference at every frequency."""
+    """Compare the work of the selection with the reference harmonics at every frequency."""
     high = np.atleast_1d(data.attrs["high_harmonics"])
     solved, points = int(data["unknowns_solved"].sum()), data.sizes["point"]
     each = data.sizes["retained"] * (2 * high.size - 1)
@@ -151,7 +151,7 @@ def cost_sentence(data: xr.Dataset) -> str:
 
 
 def more_name(data: xr.Dataset) -> str:
-    """Return what points with other harmonics than those of the first passage are called."""
+    """Return the name of points with other harmonics than those of the first passage."""
     kept = {tuple(np.flatnonzero(row)) for row in data["harmonic_kept"].values}
     supports = [tuple(np.atleast_1d(data.attrs[f"{w}_harmonics"])) for w in ("low", "high")]
     alike = kept <= set(supports) and np.isfinite(data.attrs["selection_threshold"])
@@ -181,14 +181,14 @@ def _millimetres(size: float) -> str:
 
 
 def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
-    """Return what was found of bifurcations and of branches that leave there, and where nobody looked; nothing where none were asked for."""
+    """Return the bifurcations and side branches found, and the limits of the search; empty if not asked for."""
     if "bifurcations_limits" not in data:
         return ()
     return (*_along(data, "bifurcation", labels), *beside_bifurcations(data, labels))
 
 
 def beside_bifurcations(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
-    """Return what became of the branches that leave at bifurcations, and where nobody looked for these."""
+    """Return the outcome of the side branches, and the limits of the search."""
     limits = _sentences(data, "bifurcations_limits", labels)
     return (*_along(data, "side_branch", labels), *limits)
 

@@ -78,7 +78,7 @@ class ForcedResponse(Section):
 
     @property
     def range_key(self) -> str:
-        """The key that says where: one of three."""
+        """The key that defines the range, one of three."""
         return next(key for key in RANGES if getattr(self, key) is not None)
 
     @model_validator(mode="after")

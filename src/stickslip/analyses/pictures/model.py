@@ -1,4 +1,4 @@
-"""The model: a picture of its skin and contact points, how well the reduced model stands for it, and its facts."""
+"""The model on the page: drawing of its skin and contact points, accuracy of the reduction, and facts."""
 
 from collections.abc import Mapping
 
@@ -19,13 +19,13 @@ _CHECKED = (
 
 
 def picture(nodes: Mapping[str, Node]) -> Plot | None:
-    """Return the picture of the skin with the contacts, where an analysis holds them."""
+    """Return the drawing of the skin with the contacts, if an analysis stores them."""
     found = (skin_picture(node) for node in nodes.values())
     return next((plot for plot in found if plot is not None), None)
 
 
 def reduction(nodes: Mapping[str, Node]) -> Table | None:
-    """Frequencies of the full against the reduced model."""
+    """Compare the frequencies of the full and the reduced model."""
     node = next((n for n in nodes.values() if n.has(*_CHECKED[0][1:])), None)
     if node is None:
         return None

@@ -1,4 +1,4 @@
-"""Picture of the skin of the model with the contact points; it turns with the mouse."""
+"""Three-dimensional drawing of the model's skin with the contact points."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray
     pairs
         (n, 2) nodes of each edge, once.
     sharp
-        (n,) True where the two faces make an angle of more than 30 degrees, or there is only one.
+        (n,) True if the two faces make an angle of more than 30 degrees, or there is only one face.
     """
     normal = np.cross(
         points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
@@ -250,7 +250,7 @@ def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
 
 
 def skin_picture(node: Node) -> Plot | None:
-    """Show the skin with its mesh, whole and near the contacts."""
+    """Draw the skin with its mesh, whole and near the contacts."""
     if not node.has("surface_point", "surface_triangle"):
         return None
     points, triangles = node.floats("surface_point") * 1e3, node.integers("surface_triangle")

@@ -27,18 +27,18 @@ def wave_analysis(
     *,
     compared: frozenset[str] = frozenset(),
 ) -> Analysis:
-    """Return an analysis of small vibrations, a record a wave.
+    """Return an analysis of small vibrations with one record a wave.
 
     Parameters
     ----------
     name, table, record, inputs, solve
-        As `Analysis` has them.
+        As in `Analysis`.
     variables
-        Returns the variables of a case beside those of its model and waves, and what the user should know.
+        Returns the variables of a case beside those of its model and waves, and its verdicts.
     tables
-        Returns what the terminal prints of a case.
+        Returns the terminal tables of a case.
     compared
-        Keys of the table that no record depends on: what the records are compared with.
+        Keys of the table for reference data, on which no record depends.
     """
     return Analysis(
         name=name,
@@ -55,12 +55,12 @@ def wave_analysis(
 
 
 def solved_by(of_wave: Callable[[Question, int], Any]) -> Solve:
-    """Return what yields the record of each wave that is not done."""
+    """Return a generator function for the records of unfinished waves."""
     return partial(each_wave, of_wave)
 
 
 def counted(name: str, asked: Any) -> str:
-    """Return the line of ``stickslip check`` that tells how many modes there will be."""
+    """Return the line of ``stickslip check`` with the number of modes."""
     return f"{name}: {asked.n_modes} modes of each of {len(asked.numbers)} waves"
 
 

@@ -1,4 +1,4 @@
-"""Natural frequencies against rotor speed, and where engine orders cross them."""
+"""Natural frequencies against rotor speed, and their crossings with engine orders."""
 
 from collections.abc import Sequence
 from typing import Any

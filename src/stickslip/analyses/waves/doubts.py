@@ -1,4 +1,4 @@
-"""Doubts about the results of a bladed disk: engine orders not judged, large displacements, poor bases."""
+"""Doubts about the results of a bladed disk: engine orders not judged, large displacements, inaccurate bases."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above whic
 
 
 def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[Verdict, ...]:
-    """Say where the basis of a Campbell diagram is too small for its digits."""
+    """Doubt a Campbell diagram whose reduced basis is too small."""
     remedy = "Ask for more campbell.modes, or for a narrower range of speeds."
     poor = [w for w in waves if not w.error <= BASIS_ERROR]
     said = [
@@ -27,7 +27,7 @@ def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[Verdict, ...]:
 
 
 def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple[Verdict, ...]:
-    """Say where displacements under the centrifugal load are too large for linear statics; those that `contacts` hold back count whole."""
+    """Doubt centrifugal displacements too large for linear statics; those restrained by `contacts` are included."""
     if state is None or not state.too_large:
         return ()
     alone = ", without what contacts hold back," if contacts else ""
@@ -42,7 +42,7 @@ def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple
 
 
 def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
-    """Say which engine orders excite above the computed modes of their nodal diameters, and how many modes it takes."""
+    """Doubt engine orders above the computed modes of their nodal diameters, and say how many modes are needed."""
     orders = found.not_judged
     if not orders:
         return ()
@@ -64,16 +64,16 @@ def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
 def campbell_doubts(
     unfollowed: Sequence[tuple[int, float]], unseen: Sequence[int], waves: Sequence[WaveBranches]
 ) -> tuple[Verdict, ...]:
-    """Say which engine orders leave the followed modes below them, and which excite nodal diameters that are left out.
+    """Doubt engine orders above the followed modes, and those that excite nodal diameters left out.
 
     Parameters
     ----------
     unfollowed
-        Engine order and speed in rpm from which it lies above the followed modes that it excites.
+        Engine order, and speed in rpm above which it lies over all followed modes that it excites.
     unseen
         Engine orders whose nodal diameter has no diagram.
     waves
-        All diagrams.
+        All waves with a diagram.
     """
     said = []
     if unfollowed:
@@ -94,7 +94,7 @@ def campbell_doubts(
 
 
 def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float | None:
-    """Return the speed in rpm from which an engine order lies above all modes, None if it does nowhere in the range.
+    """Return the speed in rpm above which an engine order lies over all modes; None if there is none in the range.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float 
 
 
 def in_ranges(numbers: Sequence[int] | set[int]) -> str:
-    """Write whole numbers with runs of three and more as ranges: 1, 2, 5-9."""
+    """Write whole numbers with ranges for three or more in a row: 1, 2, 5-9."""
     runs: list[list[int]] = []
     for number in sorted(set(numbers)):
         if runs and number == runs[-1][-1] + 1:

@@ -1,4 +1,4 @@
-"""Modes of a wheel whose sectors differ, beside the waves of the tuned one."""
+"""Modes of a mistuned wheel, next to the waves of the tuned one."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,14 +17,14 @@ MOST_ROWS = 40  # of modes on the screen
 
 
 def solved(question: Question) -> dict[str, Any]:
-    """Return the modes of the wheel as named arrays: as many a blade as a wave has."""
+    """Return the modes of the wheel as named arrays; the number of modes a blade is that of a wave."""
     model = question.model
     found = wheel_modes(model, question.n_modes * model.sectors, question.contacts)
     return {"mistuned_hz": found.frequencies_hz, "sector_share": found.sector_share, "wave_share": found.wave_share}
 
 
 def variables(note: Mapping[str, Any] | None) -> Variables:
-    """Return them as variables; none where the sectors are alike."""
+    """Return these modes as variables; none for a tuned wheel."""
     if not note:
         return {}
     hertz, sectors, waves = (np.asarray(note[n]) for n in ("mistuned_hz", "sector_share", "wave_share"))
@@ -44,7 +44,7 @@ def variables(note: Mapping[str, Any] | None) -> Variables:
 
 
 def table(case: Any) -> list[TextTable]:
-    """Return what the terminal prints of them."""
+    """Return the terminal table of these modes."""
     if "mistuned_hz" not in case:
         return []
     share, waves = case["sector_share"].values, case["wave_share"].values

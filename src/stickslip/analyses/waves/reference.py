@@ -1,4 +1,4 @@
-"""Frequencies to compare with, from a CSV file."""
+"""Reference frequencies from a CSV file."""
 
 import csv
 import re
@@ -30,16 +30,16 @@ class Row(BaseModel):
 
 @dataclass(frozen=True)
 class Reference:
-    """Frequencies to compare with.
+    """Reference frequencies of modes.
 
     Parameters
     ----------
     path
-        Their file.
+        Path of the file.
     frequencies_hz
-        (nodal diameter, mode from 1) -> Hz.
+        (nodal diameter, mode from 1) -> frequency, Hz.
     speeds_rpm
-        Those that the column ``speed_rpm`` tells, or else the name of the case, as ``prestressed_8000rpm``; none: not told.
+        Speeds in the column ``speed_rpm``, or else in the name of the case, as ``prestressed_8000rpm``; empty if unknown.
     """
 
     path: Path
@@ -47,18 +47,18 @@ class Reference:
     speeds_rpm: tuple[float, ...] = ()
 
     def not_at(self, rpm: float) -> tuple[float, ...]:
-        """Return the speeds of these frequencies that differ from one."""
+        """Return the speeds of these frequencies that differ from a given speed."""
         return tuple(s for s in self.speeds_rpm if abs(s - rpm) > SAME_SPEED * max(s, rpm))
 
     def of_waves(self, numbers: Sequence[int], n_modes: int, sectors: int) -> FloatArray:
-        """Return the (k, m) frequencies in Hz of wave numbers, NaN where there is none.
+        """Return (k, m) reference frequencies in Hz for wave numbers; NaN if unknown.
 
         Both directions of a nodal diameter are compared with the same frequencies.
 
         Raises
         ------
         InputError
-            If nothing is left to compare with.
+            If no reference frequency belongs to these waves.
         """
         diameters = [wave(k, sectors).nodal_diameter for k in numbers]
         modes = range(1, n_modes + 1)
@@ -78,7 +78,7 @@ def read_reference(path: Path, case: str | None) -> Reference:
     Raises
     ------
     InputError
-        If it is not there, columns are missing, or a line cannot be read.
+        If the file or a column is missing, or a line cannot be read.
     """
     if not path.is_file():
         raise input_error(

@@ -1,4 +1,4 @@
-"""The SAFE or interference diagram: modes that engine orders can excite at one speed."""
+"""The SAFE or interference diagram: modes excited by engine orders at one speed."""
 
 from collections.abc import Sequence
 
@@ -39,7 +39,7 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
 
 
 def interference(waves: Sequence[WaveModes], sectors: int, asked: SafeTable, speed: float) -> Safe:
-    """Return what the engine orders meet at a speed in rad/s."""
+    """Return the pairs of engine order and mode at a speed in rad/s."""
     known = {w.wave_number: w.frequencies_hz for w in waves}
     diameters = np.arange(sectors // 2 + 1)
     backward = np.array([known[int(d)] for d in diameters])

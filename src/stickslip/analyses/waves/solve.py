@@ -36,7 +36,7 @@ ALIKE = "mistuning plays no part: frequencies are those of the wheel with all se
 
 
 def in_still_fluid(model: Model) -> tuple[Model, tuple[Verdict, ...]]:
-    """Return the model of a diagram of tuned waves in still fluid, and what that leaves out."""
+    """Return the model of a diagram of tuned waves in still fluid, and a list of the neglected effects."""
     found = []
     if model.aerodynamics is not None:
         remedy = "[modes] has the frequencies in the flow at one speed, [flutter] the damping."
@@ -50,16 +50,16 @@ def in_still_fluid(model: Model) -> tuple[Model, tuple[Verdict, ...]]:
 def wave_in_flow(
     model: Model, contacts: ContactsAs, speed: float, wave_number: int, n_modes: int
 ) -> FlutterOfWave | None:
-    """Return the modes of a wave with the aerodynamic forces of the model; None where it has none.
+    """Return the modes of a wave with the aerodynamic forces of the model; None if it has none.
 
     Parameters
     ----------
     model, contacts
-        The model and what its contacts do.
+        The model, and the state of its contacts.
     speed
-        In rad/s.
+        Speed in rad/s.
     wave_number
-        Of the wave.
+        Wave number.
     n_modes
         Number of modes.
     """
@@ -87,30 +87,30 @@ W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What modes or branches are computed of; picklable.
+    """Inputs of a computation of modes or branches; picklable.
 
     Parameters
     ----------
     model
         The model.
     contacts
-        What its contacts do.
+        State of its contacts.
     wheel
-        Its sectors and directions.
+        Number of sectors, and whether directions are split.
     numbers
         Wave numbers.
     n_modes
         Modes of each wave.
     speeds
-        In rad/s; one for modes, ascending for branches.
+        Speeds in rad/s; one for modes, ascending for branches.
     rpm
-        What the result calls the speed; NaN for a range.
+        Speed as shown in the result; NaN for a range.
     shapes
         Whether mode shapes are kept.
     engine_orders
-        Whose crossings are looked for.
+        Engine orders whose crossings are sought.
     left_out
-        What is said of what the frequencies leave out.
+        Effects that the frequencies neglect, in words.
     """
 
     model: Model
@@ -126,12 +126,12 @@ class Question:
 
     @property
     def turning(self) -> bool:
-        """Whether Coriolis forces act at the first speed; forces of a flow part the directions of waves as well."""
+        """Whether Coriolis forces act at the first speed; aerodynamic forces split the directions of waves as well."""
         return self.model.coriolis and self.model.rotates and self.speeds[0] > 0
 
     @property
     def small(self) -> bool:
-        """Whether a wave may have fewer modes than are asked for, and is soon looked at."""
+        """Whether a wave may have too few modes, and can be checked quickly."""
         return own_dofs(self.model).size <= MANY
 
     def require(self, place: str) -> None:
@@ -147,7 +147,7 @@ class Question:
                 )
 
     def require_coefficients(self) -> None:
-        """Refuse aerodynamic coefficients that do not reach to the natural frequencies, where these are soon found."""
+        """Refuse aerodynamic coefficients that do not cover the natural frequencies, if these can be found quickly."""
         given = self.model.aerodynamics
         if given is None or not given.influence.refuses or own_dofs(self.model).size > FEW:
             return
@@ -159,28 +159,28 @@ class Question:
 
     @cached_property
     def holds(self) -> BoolArray:
-        """(p,) contact points that hold in these vibrations."""
+        """(p,) contact points that stick in these vibrations."""
         return holding_points(self.model, self.contacts)
 
     def at(self, speed: float, wave_number: int) -> Structure:
-        """Return the structure at a speed in rad/s as a wave."""
+        """Return the structure of a wave at a speed in rad/s."""
         return self.model.at(speed, wave_number, self.holds)
 
     @cached_property
     def stiffening(self) -> Matrix:
-        """The derivative by Ω² of the stiffness at the first speed, on the dofs of all parts, the same for all waves."""
+        """Derivative of the stiffness with respect to Ω² at the first speed, on the dofs of all parts; the same for all waves."""
         model, spin = self.model, self.model.spin(self.speeds[0])
         own = [stiffening(part, spin, model.steady[name]) for name, part in model.parts.items()]
         return scipy.sparse.block_diag(own, format="csr")
 
     @cached_property
     def family(self) -> WaveFamily:
-        """The waves at the first speed, which share what is alike in them."""
+        """The waves at the first speed; they share one factorisation of the interior."""
         return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
 
 
 def each_wave(solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes) -> Iterator[W]:
-    """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
+    """Yield the records of unfinished waves; the note about the model comes first."""
     if notes.get(ABOUT) is None:
         note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1], asked.left_out)
         note |= {"parted": asked.wheel.parted}

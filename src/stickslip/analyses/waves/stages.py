@@ -1,4 +1,4 @@
-"""Modes of wheels of different numbers of sectors that joins couple, a record a nodal diameter of the assembly."""
+"""Modes of coupled wheels with different numbers of sectors, one record a nodal diameter of the assembly."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -24,16 +24,16 @@ LEFT_OUT = 0.01  # of a frequency: so much harmonics that are not coupled may ch
 
 @dataclass(frozen=True, eq=False)
 class StagesQuestion:
-    """What modes are computed of; picklable.
+    """Inputs of a computation of coupled stages; picklable.
 
     Parameters
     ----------
     model
-        Of several stages.
+        A model of several stages.
     numbers
         Nodal diameters of the assembly.
     n_modes
-        Modes of each.
+        Number of modes of each nodal diameter.
     """
 
     model: Model
@@ -49,7 +49,7 @@ class StagesQuestion:
 
 
 def stages_question(model: Model, diameters: Sequence[int] | None, n_modes: int) -> StagesQuestion:
-    """Return the question, after a look at the nodal diameters; None of them: all that vibrate apart from each other."""
+    """Return the inputs after a check of the nodal diameters; None of them means all that vibrate independently."""
     assembly = model.stages
     assert assembly is not None
     unknown = sorted(set(diameters or ()) - set(assembly.harmonics))
@@ -64,7 +64,7 @@ def stages_question(model: Model, diameters: Sequence[int] | None, n_modes: int)
 
 
 def each_diameter(asked: StagesQuestion, done: Sequence[WaveModes], notes: Notes) -> Iterator[WaveModes]:
-    """Yield the modes of the nodal diameters that are not done; what is told of the model goes into the notes first."""
+    """Yield the modes of unfinished nodal diameters; the note about the model comes first."""
     if notes.get(ABOUT) is None:
         notes.put(ABOUT, _about(asked))
     known = {w.wave_number for w in done}
@@ -92,7 +92,7 @@ def _solved(asked: StagesQuestion, number: int) -> WaveModes:
 
 
 def flange_doubts(waves: Sequence[WaveModes]) -> list[Verdict]:
-    """Say where the harmonics that flanges do not couple could change the frequencies."""
+    """Doubt frequencies that the uncoupled harmonics of the flanges could change."""
     off = {w.wave_number: w.stiffest_hz / w.frequencies_hz - 1 for w in waves if w.stiffest_hz.size}
     poor = [f"{k} (up to {100 * d.max():.2g} %)" for k, d in off.items() if d.max() > LEFT_OUT]
     if not poor:
@@ -105,7 +105,7 @@ def flange_doubts(waves: Sequence[WaveModes]) -> list[Verdict]:
 
 
 def unreached(assembly: Multistage) -> list[Verdict]:
-    """Say which waves of the stages are in no list of modes, as no kept harmonic leads to them."""
+    """Name the waves of the stages that no kept harmonic excites and no list of modes holds."""
     own = _in_words(assembly, assembly.unreached)
     if not own:
         return []

@@ -74,7 +74,7 @@ class CampbellTable(WaveTable):
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """In rad/s."""
+        """Speeds in rad/s."""
         return tuple(RPM * np.linspace(self.speeds_rpm[0], self.speeds_rpm[1], self.points))
 
 

@@ -16,7 +16,7 @@ NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is 
 
 
 def of_cases(data: xr.Dataset, tables: Callable[[xr.Dataset], Sequence[TextTable]]) -> tuple[TextTable, ...]:
-    """Return the tables of each case, and what the centrifugal load does; cases that are alike share theirs."""
+    """Return the tables of each case, and the effects of the centrifugal load; equal cases share their tables."""
     found = []
     for case, head in told_apart(data):
         if not case.sizes.get("wave"):
@@ -75,7 +75,7 @@ def _stage_table(case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple
 
 
 def flutter_tables(case: xr.Dataset) -> list[TextTable]:
-    """Return the damping of each wave, and which is the least stable one."""
+    """Return the damping of each wave, and the least stable one."""
     labels, total = _labels(case), case["damping"].values
     i, m = int(case.attrs["least_wave"]), int(case.attrs["least_mode"])
     required = float(case.attrs["required_damping"])

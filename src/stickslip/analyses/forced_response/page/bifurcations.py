@@ -1,4 +1,4 @@
-"""Bifurcations of the response: marks on its curves, the branches that leave there, and a table."""
+"""Bifurcations of the response on the page: marks on its curves, side branches, and a table."""
 
 import numpy as np
 import plotly.graph_objects as go
@@ -21,14 +21,14 @@ ROWS = ("frequency_hz", "frequency_error_hz", "amplitude", "multiplier_error")
 
 
 def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str:
-    """Draw the branches that leave a response and its bifurcations; return what the caption says of them, nothing where there are none.
+    """Draw the bifurcations of a response and its side branches; return the sentence for the caption, empty for none.
 
     Parameters
     ----------
     figure, response
-        The curves, and what they show.
+        The figure of the curves, and their response.
     over
-        Abscissa for a frequency of one hertz.
+        Abscissa of a frequency of 1 Hz.
     """
     if not response.has("bifurcation_case", "bifurcation_kind"):
         return ""
@@ -96,7 +96,7 @@ def _divisor(response: Response, case: int) -> float:
 
 
 def bifurcations(response: Response) -> Table | Words | None:
-    """One row a bifurcation: where, what, and which multiplier crosses."""
+    """Return a table with one row a bifurcation: frequency, kind, and the crossing multiplier."""
     if not response.has("bifurcations_limits"):
         return None
     labels = [c.label for c in response.cases]

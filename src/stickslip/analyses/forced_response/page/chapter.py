@@ -42,7 +42,7 @@ DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def stability(response: Response) -> list[Table | Words]:
-    """One row a point that was examined: verdict and multiplier."""
+    """Return a table with one row an examined point: verdict and multiplier."""
     names = [f"stability_{word}" for word in ("case", "frequency_hz", "verdict", "multiplier", "multiplier_error")]
     if not response.has(*names):
         return []

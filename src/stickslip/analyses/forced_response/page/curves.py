@@ -23,7 +23,7 @@ from stickslip.study.verdict import POINT_LEVELS
 
 
 def where_friction_works(response: Response) -> Words | None:
-    """Say where all contacts stick, where friction works, and where it lets go."""
+    """State the values at which all contacts stick, friction works, or contacts slide freely."""
     lines = range_lines(response.data)
     if not lines:
         return None
@@ -31,7 +31,7 @@ def where_friction_works(response: Response) -> Words | None:
 
 
 def what_is_needed(response: Response) -> Words | None:
-    """Say what optimisation curves need where a number is varied with too few values."""
+    """State the values missing for an optimisation curve, if a number is varied with too few of them."""
     key, n = first_number(response.data)[0], len(response.cases)
     if not key or n >= MIN_PEAKS:
         return None
@@ -40,7 +40,7 @@ def what_is_needed(response: Response) -> Words | None:
 
 
 def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:
-    """Draw a band over each stretch of values at which friction works; return what the caption says of it, nothing where none is drawn."""
+    """Shade the values at which friction works; return the sentence for the caption, empty for none."""
     ranges = working_ranges(response.data)
     stretches = ranges[0].stretches if len(ranges) == 1 and ranges[0].judged else []
     if not stretches:
@@ -77,7 +77,7 @@ _BUTTONS = {
 
 
 def most(response: Response, size: FloatArray) -> list[ShownCase]:
-    """Return the `COMPARED` cases with the largest value of `size` (point,), those without a finite one left out."""
+    """Return the `COMPARED` cases with the largest value of `size` (point,); cases without a finite value are left out."""
     largest = {c: float(np.nanmax(size[response.point_case == c.index], initial=-np.inf)) for c in response.cases}
     known = [c for c in response.cases if np.isfinite(largest[c])]
     chosen = sorted(known, key=lambda c: largest[c])[-COMPARED:]
@@ -85,7 +85,7 @@ def most(response: Response, size: FloatArray) -> list[ShownCase]:
 
 
 def abscissa(response: Response) -> tuple[FloatArray, str, str]:
-    """Return what the response is drawn over (point,), its name and its unit: frequency, or speed where that was swept."""
+    """Return abscissa (point,), its name and its unit: frequency, or speed for a response over speed."""
     if response.has("speed_rpm"):
         return response.floats("speed_rpm"), "speed", "rpm"
     return response.hz, "frequency", "Hz"
@@ -234,7 +234,7 @@ def _caption(response: Response) -> str:
 
 
 def frequency_response(response: Response) -> Plot | None:
-    """Responses of all cases with the harmonics at which each point was accepted (Gastaldi and Berruti 2017, fig. 4b)."""
+    """Draw the responses of all cases, marked by the harmonics of each point (Gastaldi and Berruti 2017, fig. 4b)."""
     if not np.isfinite(response.accepted).any():
         return None
     scale = response.scale
@@ -280,7 +280,7 @@ def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) ->
 
 
 def low_order(response: Response) -> Plot | None:
-    """Low-order against accepted curves, where they differ most (Gastaldi and Berruti 2017, fig. 4a)."""
+    """Draw low-order against accepted curves for the cases with the largest difference (Gastaldi and Berruti 2017, fig. 4a)."""
     if not response.has("amplitude_low"):
         return None
     low, accepted, scale = response.response("amplitude_low"), response.accepted, response.scale
@@ -340,7 +340,7 @@ def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
 
 
 def optimisation(response: Response) -> Plot | None:
-    """Peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
+    """Draw peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
     key = first_number(response.data)[0]
     known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
     cases = sorted(known, key=lambda c: c.value)

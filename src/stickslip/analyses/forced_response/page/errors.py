@@ -1,4 +1,4 @@
-"""Figures of the strategy: predicted and real error of first solutions, or an indicator of its own."""
+"""Figures of the selection of harmonics: predicted and real error of first solutions, or the strategy's own indicator."""
 
 import numpy as np
 import numpy.typing as npt
@@ -109,7 +109,7 @@ def _all_rounding(response: Response) -> bool:
 
 
 def errors(response: Response) -> Plot | None:
-    """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
+    """Draw predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
     error, real = response.alert.error, response.floats("real_error_percent")
     if not error.size or not response.decides or _all_rounding(response):
         return None
@@ -158,7 +158,7 @@ def _scatter(response: Response, x: FloatArray, y: FloatArray, known: npt.NDArra
 
 
 def error_scatter(response: Response) -> Plot | None:
-    """Real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
+    """Draw real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
     predicted, real = (response.floats(f"{which}_error_percent") for which in ("predicted", "real"))
     known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
     if not response.is_error or not known.any():

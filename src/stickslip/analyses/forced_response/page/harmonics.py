@@ -1,4 +1,4 @@
-"""Harmonics kept over frequency, and the frequencies that needed more, with the reasons."""
+"""Harmonics over frequency on the page: those kept, frequencies that needed more, and the reasons."""
 
 from collections import Counter
 
@@ -94,7 +94,7 @@ _NAMED = 4  # sets of harmonics that a cell names
 
 
 def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, float]]:
-    """Ranges of frequency in which the alert asked for more harmonics.
+    """Return the frequency ranges in which the alert requested more harmonics.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def _why(response: Response, case: ShownCase) -> str:
 
 
 def choice(response: Response) -> list[Table | Words]:
-    """Where more harmonics were needed, what chose them, and why, in plain words."""
+    """Return words and a table: frequencies that needed more harmonics, the strategy, and the reasons."""
     if not response.decides:
         kept = _kept_where(response)
         return [Words((f"The same harmonics everywhere (`{response.selection}`): {kept}.",))]

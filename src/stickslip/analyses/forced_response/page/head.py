@@ -1,4 +1,4 @@
-"""The head of the page: four numbers of the forced response, and the doubts."""
+"""Boxes at the head of the page: the main numbers of the forced response, and its doubts."""
 
 import numpy as np
 
@@ -153,7 +153,7 @@ def _verdict_card(response: Response) -> Card | None:
 
 
 def cards(response: Response) -> list[Card]:
-    """Return the numbers that sum the response up."""
+    """Return the boxes at the head of the page."""
     first = (
         _peak_card(response),
         _damping_card(response),

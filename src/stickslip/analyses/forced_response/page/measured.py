@@ -26,15 +26,15 @@ class Measured:
     Parameters
     ----------
     response
-        With the computed peaks.
+        The response with the computed peaks.
     values
-        (n,) of the key that the curves are drawn over.
+        (n,) values of the varied key on the abscissa.
     others
-        (n,) what else was varied; empty where it is not told.
+        (n,) other varied keys with their values, as text; empty if unknown.
     amplitude, amplitude_error
-        (n,) as `Response.peak_response`; NaN where it is not known.
+        (n,) in the unit of `Response.peak_response`; NaN if unknown.
     hz, hz_error
-        (n,) peak frequency.
+        (n,) peak frequency, Hz.
     """
 
     response: Response
@@ -47,12 +47,12 @@ class Measured:
 
     @property
     def ends(self) -> FloatArray:
-        """Amplitudes and the upper ends of their bars, of which an axis must take account."""
+        """Amplitudes and upper ends of their error bars, for the range of an axis."""
         found = np.concatenate([self.amplitude, self.amplitude + np.nan_to_num(self.amplitude_error)])
         return np.asarray(found[np.isfinite(found)])
 
     def draw(self, figure: go.Figure, scale: Scale) -> None:
-        """Draw the points with their bars into both panels, a symbol for each value of what else was varied."""
+        """Draw the points with error bars into both panels, one symbol for each value of the other varied keys."""
         figure.update_layout(legend_groupclick="togglegroup")
         of_amplitude = (self.amplitude * scale.factor, self.amplitude_error * scale.factor)
         for k, name in enumerate(dict.fromkeys(self.others)):
@@ -85,7 +85,7 @@ class Measured:
         return points
 
     def caption(self, cases: Sequence[ShownCase]) -> str:
-        """Say where the points come from, what their bars are, and how many computed peaks agree with them."""
+        """State the source of the points, the meaning of their bars, and the number of computed peaks that agree."""
         source = self.response.text("measured_source")
         of = f" from {source}" if source else ""
         n = counted(len(self.values), "point")
@@ -131,7 +131,7 @@ class Measured:
 
 
 def measured_of(response: Response, key: str) -> Measured | None:
-    """Return what was measured over the key that the curves are drawn over; None for nothing."""
+    """Return the measurements over the abscissa of the curves; None for none."""
     if not response.has("measured_value") or response.text("measured_key") != key:
         return None
     values = response.values("measured_value")

@@ -14,7 +14,7 @@ NEEDED = ("not_periodic_case", "not_periodic_amplitudes")
 
 
 def amplitudes_in_time(response: Response) -> Plot | None:
-    """Show the amplitude of each of the last periods."""
+    """Draw the amplitude in each of the last periods."""
     if not response.has(*NEEDED):
         return None
     amplitudes = response.values("not_periodic_amplitudes", "not_periodic", "turn")
@@ -48,7 +48,7 @@ def amplitudes_in_time(response: Response) -> Plot | None:
 
 
 def statistics_in_time(response: Response) -> Table | None:
-    """One row a motion: envelope, root mean square, spectrum, whether it has settled."""
+    """Return a table with one row a motion: envelope, root mean square, spectrum, and whether it has settled."""
     if not response.has(*NEEDED):
         return None
     case, hz = response.integers("not_periodic_case"), response.floats("not_periodic_frequency_hz")

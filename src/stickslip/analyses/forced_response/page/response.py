@@ -1,4 +1,4 @@
-"""A forced response as figures and tables see it."""
+"""The dataset of a forced response with the accesses that figures and tables need."""
 
 import re
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _BLADE = re.compile(r"\[\d+\]")  # of the label of an output
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """The solutions about which the strategy was asked, one a frequency: the first one by an alert, else the accepted one."""
+    """The solutions judged by the strategy, one a frequency: the first one for an alert, else the accepted one."""
 
     case: IntArray
     hz: FloatArray
@@ -39,7 +39,7 @@ class Alert:
 
 @dataclass(frozen=True, eq=False)
 class Response(Node):
-    """Accepted points of all cases; any variable but those of `NEEDED` may be missing."""
+    """Accepted points of all cases. Only the variables in `NEEDED` must exist."""
 
     @cached_property
     def cases(self) -> tuple[ShownCase, ...]:
@@ -52,18 +52,18 @@ class Response(Node):
         return varied(self.data)
 
     def floats(self, name: str) -> FloatArray:
-        """Return the values of a variable as floats; NaN of the shape of ``point`` if it is missing."""
+        """Return the values of a variable as floats; NaN in the shape of ``point`` if it is missing."""
         if name not in self.data:
             return np.full(self.data.sizes["point"], np.nan)
         return self.values(name)
 
     def of_case(self, name: str, case: ShownCase, *dimensions: str) -> FloatArray:
-        """Return what a variable with the dimension ``case`` holds of one, its dimensions in the order named."""
+        """Return the values of a variable for one case, with the remaining dimensions in the order named."""
         found = self.data[name].isel(case=case.index)
         return np.asarray(found.transpose(*dimensions).values, dtype=np.float64)
 
     def number_of(self, name: str, case: ShownCase) -> float:
-        """Return the number that a variable along ``case`` holds of one; NaN where it is missing."""
+        """Return the value of a variable along ``case`` for one case; NaN if it is missing."""
         return float(self.values(name)[case.index]) if name in self.data else float("nan")
 
     @cached_property
@@ -78,17 +78,17 @@ class Response(Node):
 
     @cached_property
     def outputs(self) -> IntArray:
-        """(case,) position along ``output`` of the output whose peak counts in each case: that of the largest blade of a mistuned wheel."""
+        """(case,) index along ``output`` of the output with the peak; on a mistuned wheel this is the largest blade."""
         return np.array([peak_output(self.data, c.index) for c in self.cases])
 
     @property
     def mistuned(self) -> bool:
-        """Whether it is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+        """Whether the peak is that of the largest blade of a mistuned wheel."""
         return bool(self.peaked) and all(of_largest_blade(self.data, c.index) for c in self.peaked)
 
     @property
     def output_name(self) -> str:
-        """Label of the output whose peak counts; of a mistuned wheel with several cases it says of which blade."""
+        """Label of the output with the peak; for several cases of a mistuned wheel it names no single blade."""
         labels = self.labels("output")
         own = labels[int(self.outputs[0])]
         if not self.mistuned:
@@ -98,11 +98,11 @@ class Response(Node):
         return f"{_BLADE.sub('', own)} of the blade that is largest at the peak of each case"
 
     def blade_at_peak(self, case: ShownCase) -> str:
-        """Return `` (tip[7].y)`` of the peak of a case where the largest blade of a mistuned wheel counts, else nothing."""
+        """Return the blade at the peak as `` (tip[7].y)`` for a mistuned wheel, else an empty text."""
         return f" ({self.labels('output')[self.outputs[case.index]]})" if self.mistuned else ""
 
     def at_outputs(self, values: FloatArray) -> FloatArray:
-        """Return of values (point, ..., output) those of the output whose peak counts in the case of each point."""
+        """Return, from values (point, ..., output), those of the output with the peak in the case of each point."""
         return np.asarray(values[np.arange(len(values)), ..., self.outputs[self.point_case]])
 
     @property
@@ -112,7 +112,7 @@ class Response(Node):
 
     @property
     def per_force(self) -> bool:
-        """Whether responses are divided by the excitation: where every case has one."""
+        """Whether responses are divided by the excitation; true if every case has one."""
         return all(c.excitation > 0 for c in self.cases)
 
     @property
@@ -122,13 +122,13 @@ class Response(Node):
 
     @property
     def quantity(self) -> str:
-        """What `response` is called on an axis."""
+        """Name of `response` on an axis."""
         own = MEASURED.get(str(self.data.attrs.get("amplitude_of", "first")), "amplitude")
         return f"{own} / force" if self.per_force else own
 
     @cached_property
     def converged(self) -> npt.NDArray[np.bool_]:
-        """(point,) True where the point was accepted: the flag that means ``converged``, else zero."""
+        """(point,) True for accepted points, whose status is ``converged``."""
         attributes = self.data["status"].attrs
         meanings = str(attributes.get("flag_meanings", "")).split()
         values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
@@ -137,39 +137,39 @@ class Response(Node):
 
     @property
     def of_sector(self) -> str:
-        """`` of one sector`` where one sector answers for a tuned wheel; else empty."""
+        """`` of one sector`` for a tuned wheel solved by one sector; else empty."""
         tuned = int(self.data.attrs.get("sectors", 1)) > 1 and not self.has("amplification")
         return " of one sector" if tuned else ""
 
     @cached_property
     def levels(self) -> IntArray:
-        """(point,) level of the verdict on each point; a result that tells none trusts what converged."""
+        """(point,) level of the verdict on each point; results without verdicts trust converged points."""
         if self.has("verdict"):
             return self.integers("verdict")
         return np.where(self.converged, 0, 2)
 
     @cached_property
     def unstable(self) -> npt.NDArray[np.bool_]:
-        """(point,) whether the motion of a point is known to be unstable."""
+        """(point,) True for motions known to be unstable."""
         if not self.has("motion_stability"):
             return np.zeros(self.hz.size, dtype=bool)
         return np.asarray(self.integers("motion_stability") == MOTION["unstable"])
 
     def peak_is(self, case: ShownCase) -> str:
-        """Return what is known of the stability of the peak of a case, in a word or two."""
+        """Return the stability of a case's peak in a word or two."""
         return said_of(Curve(self.data, case.index).peak_stability)
 
     def level(self, case: ShownCase) -> str:
-        """Level of the verdict on a case; empty where the result tells none."""
+        """Return the level of the verdict on a case; empty for results without verdicts."""
         return LEVELS[int(self.number_of("case_verdict", case))] if self.has("case_verdict") else ""
 
     def trust(self, case: ShownCase) -> int:
-        """Position of the verdict on a case among `LEVELS`: 0 where it is trusted, or the result tells none."""
+        """Return the index of a case's verdict in `LEVELS`: 0 if it is trusted or the result has no verdicts."""
         return LEVELS.index(self.level(case)) if self.level(case) else 0
 
     @cached_property
     def alert(self) -> Alert:
-        """Where the strategy was asked; the accepted points that have an indicator where harmonics were raised, or the file does not say."""
+        """Solutions judged by the strategy; with raised harmonics, or if the file does not say, the accepted points that have an indicator."""
         if "alert_error_percent" in self.data and not self.auto:
             found = (self.values(f"alert_{name}") for name in ("frequency_hz", "error_percent"))
             return Alert(self.integers("alert_case"), *found)
@@ -190,24 +190,24 @@ class Response(Node):
 
     @property
     def decides(self) -> bool:
-        """Whether anything chose: not with the same harmonics at every frequency."""
+        """Whether the strategy chooses; false with the same harmonics at every point."""
         known = self.selection in STRATEGIES
         return not known or always_kept(strategy_named(self.selection)) is None
 
     @property
     def auto(self) -> bool:
-        """Whether harmonics were raised along the branch until each point's own error was small enough."""
+        """Whether harmonics were raised along the branch until the error of each point was small enough."""
         return self.text("passages") == "auto"
 
     @property
     def threshold(self) -> float:
-        """Threshold of the strategy; in percent where it is one of an error."""
+        """Threshold of the strategy; in percent if it limits an error."""
         if self.is_error:
             return self.scalar("alert_threshold_percent", 5.0)
         return self.scalar("selection_threshold")
 
     def shown(self, indicator: float) -> str:
-        """Write what `alert` holds: in percent where it is an error."""
+        """Write a value of `alert`; errors in percent."""
         if self.is_error:
             return predicted(indicator)
         return "beyond all bounds" if np.isinf(indicator) else number(indicator)
@@ -229,7 +229,7 @@ class Response(Node):
 
     @property
     def low_name(self) -> str:
-        """Few harmonics as text: those of the first passage, but with ``always_high``."""
+        """Low harmonics as text."""
         return named(self.low_harmonics)
 
     @property
@@ -255,20 +255,20 @@ class Response(Node):
 
     @property
     def more_name(self) -> str:
-        """What such points keep, as text: the harmonics of the reference where it is all of them."""
+        """Harmonics of these points as text: those of the reference if all points keep them all."""
         some = self.kept[self.more]
         own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
         return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"
 
     def response(self, name: str = "amplitude") -> FloatArray:
-        """(point,) amplitude of the report output, divided by the excitation where there is one."""
+        """Return (point,) amplitude of the report output, divided by the excitation if every case has one."""
         values = self.at_outputs(self.values(name, "point", "output"))
         force = np.array([c.excitation for c in self.cases])[self.point_case]
         return np.asarray(values / force) if self.per_force else values
 
     @cached_property
     def accepted(self) -> FloatArray:
-        """(point,) response, NaN where the point did not converge."""
+        """(point,) response; NaN at unconverged points."""
         return np.where(self.converged, self.response(), np.nan)
 
     @property
@@ -287,16 +287,16 @@ class Response(Node):
         items: Sequence[str] = (),
         folded: str = "",
     ) -> Table:
-        """Return a table whose first column names the case; without it where there is one case."""
+        """Return a table whose first column names the case; without this column for a single case."""
         first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
         cells = [list(row)[first:] for row in rows]
         return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
 
     def points(self, case: ShownCase) -> IntArray:
-        """Points of a case in the order in which a curve joins them, the unconverged ones included.
+        """Return the points of a case in the order of the curve, unconverged ones included.
 
-        A branch that folds back keeps its order and leaves out the peak refinements behind its end, whose place on it is
-        not stored; otherwise the order is that of frequency.
+        A folded branch keeps its order and leaves out the peak refinements stored behind its end, whose place on the branch is
+        unknown. Other branches are sorted by frequency.
         """
         index = np.flatnonzero(self.point_case == case.index)
         branch = index[: branch_length(self.floats("refinement")[index])]
@@ -320,19 +320,19 @@ class Response(Node):
         return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
 
     def resonates(self, case: ShownCase) -> bool:
-        """Whether the peak of a case is known and lies within its sweep: at the end of it the largest amplitude is no resonance."""
+        """Return whether the peak of a case lies inside its sweep; at an end of the sweep the largest amplitude is no resonance."""
         own = Curve(self.data, case.index)
         known = self.peak(case) >= 0 and np.isfinite(self.peak_response(case))
         return bool(known and not own.at_the_end and not own.outside)
 
     @cached_property
     def peaked(self) -> tuple[ShownCase, ...]:
-        """The cases that have a peak."""
+        """The cases with a peak."""
         return tuple(c for c in self.cases if self.peak(c) >= 0)
 
     @property
     def chosen(self) -> int:
-        """The case whose contacts are shown first: of those with the best verdict the one with the smallest peak of resonance; -1 for none."""
+        """Index of the case whose contacts are shown first: among those with the best verdict the smallest resonance peak; -1 for none."""
         if not self.peaked:
             return -1
 
@@ -343,7 +343,7 @@ class Response(Node):
 
     @cached_property
     def groups(self) -> dict[str, list[int]]:
-        """Contact points by the contact of the model that they belong to; by contact line in files which do not say."""
+        """Contact points by contact of the model; by contact line in older files."""
         names = self.labels("contact")
         if self.has("contact_group"):
             names = tuple(f"{v}." for v in self.data["contact_group"].values)

@@ -1,4 +1,4 @@
-"""Tables of a forced response: cases, everything that was solved, and the checks of the numbers."""
+"""Tables of a forced response: cases, all solutions, and the checks."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from stickslip.study.verdict import said
 
 
 def peaks(response: Response) -> Table:
-    """One row a case: peak, points, work."""
+    """Return a table with one row a case: peak, points, work."""
     cases = response.cases
     value = np.array([response.peak_response(c) for c in cases])
     force = np.array([c.excitation for c in cases])
@@ -75,7 +75,7 @@ def _work_sentence(response: Response) -> list[str]:
 
 
 def attempts(response: Response) -> Table | None:
-    """One row a case and set of harmonics: what it cost, those solutions included that nothing came of."""
+    """Return a table with one row a case and set of harmonics: the work, including discarded solutions."""
     if not response.has("attempt_case", "attempt_kept"):
         return None
     case = response.integers("attempt_case")
@@ -102,7 +102,7 @@ def attempts(response: Response) -> Table | None:
 
 
 def sentences(response: Response, name: str) -> list[str]:
-    """List what each check said, in words."""
+    """List the outcome of each check in words."""
     if not response.has(name):
         return []
     each = [str(s) for s in response.data[name].values]
@@ -113,7 +113,7 @@ def sentences(response: Response, name: str) -> list[str]:
 
 
 def more_harmonics(response: Response) -> Table | None:
-    """Say what twice as many harmonics would change."""
+    """Report the predicted change by twice as many harmonics."""
     names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
     if not response.has(*names):
         return None
@@ -131,7 +131,7 @@ def more_harmonics(response: Response) -> Table | None:
 
 
 def time_integration(response: Response) -> Table | None:
-    """Time integration against harmonic balance."""
+    """Compare time integration with harmonic balance."""
     words = ("case", "frequency_hz", "transient", "balance", "difference_percent")
     names = [f"verify_{word}" for word in words]
     if not response.has(*names):
@@ -167,7 +167,7 @@ def time_integration(response: Response) -> Table | None:
 
 
 def retention(response: Response) -> Table | None:
-    """How much the small retention stiffness of rigid bodies moves the peak."""
+    """Report the change of the peak by the retention stiffness of rigid bodies."""
     shift = {c: response.number_of("retention_peak_shift", c) for c in response.cases}
     known = [c for c in response.cases if np.isfinite(shift[c])]
     if not known:

@@ -1,4 +1,4 @@
-"""Figures of a wheel whose sectors differ: every blade over frequency, its peak, the wheel at the peak and in motion, its waves."""
+"""Figures of a mistuned wheel: every blade over frequency, peaks of blades, the wheel at the peak and in motion, its waves."""
 
 import numpy as np
 import plotly.graph_objects as go
@@ -18,12 +18,12 @@ BLADE = "rgba(0, 114, 178, 0.25)"
 
 
 def mistuned(response: Response) -> bool:
-    """Whether the result is of a wheel whose sectors differ."""
+    """Return whether the wheel is mistuned."""
     return response.has("blade_peak_amplitude") and bool(response.peaked)
 
 
 def blades(response: Response) -> Plot | None:
-    """Draw the amplitude of every blade over frequency, the largest one, and the wheel with all sectors alike."""
+    """Draw the amplitude of every blade over frequency, the largest amplitude, and the tuned wheel."""
     if not mistuned(response):
         return None
     count = response.data.sizes["blade"]
@@ -93,7 +93,7 @@ def _amplified(response: Response, case: ShownCase) -> str:
 
 
 def peaks_of_blades(response: Response) -> Plot | None:
-    """Draw each blade's own peak and what it deviates by."""
+    """Draw the peak of each blade, and its deviation."""
     if not mistuned(response):
         return None
     size = response.values("blade_peak_amplitude", "case", "blade")
@@ -153,7 +153,7 @@ def peaks_of_blades(response: Response) -> Plot | None:
 
 
 def wheel_at_peak(response: Response) -> Plot | None:
-    """Draw all blades at the peak, as a polar plot of amplitudes at two instants, and the waves that they make."""
+    """Draw all blades at the peak as a polar plot at two instants, with the amplitudes of the travelling waves."""
     if not mistuned(response):
         return None
     parts = response.values("blade_motion", "case", "blade", "part")
@@ -223,7 +223,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
 
 
 def statistics(response: Response) -> Plot | None:
-    """Draw how often which amplification occurs, where there are enough cases, as of several seeds."""
+    """Draw the distribution of the amplification, if there are enough cases, such as several seeds."""
     if not mistuned(response) or len(response.peaked) < MIN_HISTOGRAM_CASES:
         return None
     factors = np.array([response.number_of("amplification", case) for case in response.peaked])
@@ -248,7 +248,7 @@ MILLISECONDS = 60  # a frame
 
 
 def leaning(motion: ComplexArray, phase: float) -> tuple[FloatArray, FloatArray]:
-    """Return the lines (hub, tip, gap for each blade) of blades that lean by their motion at a phase of the period."""
+    """Return lines (hub, tip, gap for each blade) of blades inclined by their motion at a phase of the period."""
     count = motion.size
     angle = 2 * np.pi * np.arange(count) / count
     lean = np.real(motion * np.exp(1j * phase)) / np.abs(motion).max() * REACH * 2 * np.pi / count
@@ -259,7 +259,7 @@ def leaning(motion: ComplexArray, phase: float) -> tuple[FloatArray, FloatArray]
 
 
 def wheel_in_motion(response: Response) -> Plot | None:
-    """Draw all blades at the peak, leaning by their motion, over a period."""
+    """Draw all blades at the peak over a period, inclined by their motion."""
     if not mistuned(response):
         return None
     parts = response.values("blade_motion", "case", "blade", "part")

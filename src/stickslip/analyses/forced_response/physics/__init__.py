@@ -1,1 +1,1 @@
-"""Physical limits of a response, and what the model itself changes in it."""
+"""Physical limits of a response, and the sensitivity of its peak to the model."""

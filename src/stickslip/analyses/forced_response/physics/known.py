@@ -1,4 +1,4 @@
-"""Verdicts that need the model, put down by the job, and the warnings of ``stickslip check``."""
+"""Verdicts that need the model; the job stores them. Also the warnings of ``stickslip check``."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,14 +18,14 @@ LISTED = 5  # natural frequencies that a line names
 
 
 def known(question: Question, response: Response, shift: tuple[float, float]) -> tuple[Verdict, ...]:
-    """Return the verdicts on a whole case that its numbers alone do not tell, without the case's label.
+    """Return the verdicts on a whole case that need the model, without the label of the case.
 
     Parameters
     ----------
     question, response
-        The case.
+        The case and its response.
     shift
-        What `peak_shift` found.
+        Return value of `peak_shift`.
     """
     return (
         *(doubt(text) for text in doubts_of_model(question)),
@@ -38,7 +38,7 @@ def known(question: Question, response: Response, shift: tuple[float, float]) ->
 
 
 def doubts_of_model(question: Question) -> list[str]:
-    """Return what the assembled model warns of; of modes that the reduction misses those that the load can reach."""
+    """Return the warnings of the assembled model; of modes missed by the reduction only those that the load excites."""
     known = question.model.frequencies
     reach = question.driven[-1] * max(question.sweep.omega_range) / HZ
     others = set(known.warnings())
@@ -46,7 +46,7 @@ def doubts_of_model(question: Question) -> list[str]:
 
 
 def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
-    """Doubt where an error is taken over rotations and displacements together."""
+    """Doubt an error norm that mixes rotations and displacements."""
     rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
     others = [label for label in labels if label not in rotations]
     if not rotations or not others:
@@ -59,7 +59,7 @@ def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
 
 
 def inside(question: Question) -> list[str]:
-    """Return the natural frequencies beside the range of the sweep, and the normal forces at rest."""
+    """Return the natural frequencies near the range of the sweep, and the normal forces at rest."""
     lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
     known, normal = question.model.frequencies, -question.model.static_force[:, 2]
     told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
@@ -81,7 +81,7 @@ def inside(question: Question) -> list[str]:
 
 
 def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
-    """Doubt where friction under a normal force finds none in the static state."""
+    """Doubt a model whose friction contacts carry no normal force in the static state."""
     laws, normal = question.model.contacts.laws, -question.model.static_force[:, 2]
     rubs = np.array([law in COULOMB for law in laws], dtype=bool)
     if not rubs.any() or np.any(normal[rubs] > 0):
@@ -95,7 +95,7 @@ def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
 
 
 def off_engine_order(question: Question) -> tuple[Verdict, ...]:
-    """Note where an engine order at the speed of rotation excites outside the range of frequencies."""
+    """Note an engine order whose frequency at the speed of rotation lies outside the sweep."""
     rpm, order = question.rpm, question.model.engine_order
     if question.over_speed or not order or not rpm:
         return ()
@@ -120,7 +120,7 @@ def off_engine_order(question: Question) -> tuple[Verdict, ...]:
 
 
 def no_resonance(question: Question) -> tuple[Verdict, ...]:
-    """Doubt where no natural frequency, contacts open or stuck, lies in the range of the sweep."""
+    """Doubt a sweep without any natural frequency, with contacts open or stuck."""
     if len(question.driven) > 1:  # known are the frequencies of one harmonic
         return ()
     lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)

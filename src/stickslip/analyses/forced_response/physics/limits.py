@@ -1,4 +1,4 @@
-"""Physical limits of a case: undamped modes, parts held by contacts alone, the most that friction can do, linear kinematics at the peak."""
+"""Physical limits of a case: undamped modes, parts held by contacts alone, the bound on friction damping, linear kinematics at the peak."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,16 +27,16 @@ GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a 
 
 @dataclass(frozen=True, eq=False)
 class Physics:
-    """What is known of the modes of a case without solving its response.
+    """Properties of the modes of a case, known without its response.
 
     Parameters
     ----------
     stuck, sliding
-        Modes that the load passes within the range, with contacts that stick, and that slide freely where they can.
+        Excited modes in the range, with stuck contacts, and with contacts sliding freely where they can.
     friction
-        Of the contacts under the static loads.
+        Friction forces of the contacts under the static loads.
     damped
-        What friction can do to each mode.
+        Effect of friction on each mode.
     """
 
     stuck: tuple[RangeMode, ...]
@@ -46,31 +46,31 @@ class Physics:
 
     @property
     def undamped(self) -> list[RangeMode]:
-        """Modes that the load drives and nothing damps while contacts stick."""
+        """Excited modes without damping while contacts stick."""
         return [m for m in self.stuck if m.undamped]
 
     @property
     def unbounded(self) -> list[tuple[RangeMode, float]]:
-        """Modes without damping whose load is more than friction can bound, and how many times."""
+        """Undamped modes whose load exceeds the bound on friction, with the ratio of both."""
         each = [(m, m.excess(self.friction)) for m in self.sliding if m.undamped]
         return [(m, excess) for m, excess in each if 1.0 < excess < np.inf]
 
     @property
     def driven(self) -> RangeMode | None:
-        """The mode whose linear resonance is largest with contacts stuck; None where the load drives none in the range."""
+        """The mode with the largest linear resonance with contacts stuck; None if the load excites none in the range."""
         known = [m for m in self.stuck if m.force > 0.0]
         return max(known, key=lambda m: m.resonance) if known else None
 
     def ends(self, mode: RangeMode) -> float:
-        """Return the frequency that friction leads a mode to, rad/s: its own where there is none."""
+        """Return the frequency of a mode with contacts sliding freely, rad/s; its own frequency if friction does not change it."""
         near = [d for d in self.damped if abs(d.stuck - mode.omega) <= 1e-6 * mode.omega]
         return near[0].ends if near else mode.omega
 
 
 def physics_of(question: Question) -> Physics | None:
-    """Return what is known of the modes of a case; None without a reduction, or where aerodynamic coefficients end within the range.
+    """Return the properties of the modes of a case; None without a reduction, or if aerodynamic coefficients end inside the range.
 
-    A wheel whose sectors differ is looked at with all of them alike.
+    A mistuned wheel is replaced by the tuned one.
     """
     model = question.model if question.model.blades is None else question.model.blades.tuned
     system, load = model.system, model.load
@@ -90,12 +90,12 @@ def physics_of(question: Question) -> Physics | None:
 
 
 def beforehand(physics: Physics) -> Iterator[Verdict]:
-    """Yield what ``stickslip check`` says of a case that is not solved yet.
+    """Yield the verdicts of ``stickslip check`` on a case before its solution.
 
     Parameters
     ----------
     physics
-        Of its modes.
+        Properties of its modes.
     """
     if physics.undamped:
         slip = "only slip bounds it" if physics.friction.any else "nothing bounds it"
@@ -107,7 +107,7 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
 
 
 def driven_line(physics: Physics) -> list[str]:
-    """Say which mode in the range counts: the one that the load drives most with the contacts stuck that are pressed."""
+    """Name the mode in the range with the largest excitation, pressed contacts stuck."""
     top = physics.driven
     if top is None:
         return []
@@ -119,14 +119,14 @@ def driven_line(physics: Physics) -> list[str]:
 
 
 def afterwards(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
-    """Yield the verdicts on a solved case: by the balance of energy at its peak, and by what needs no response.
+    """Yield the verdicts on a solved case: from the energy balance at its peak, and from its modes.
 
     Parameters
     ----------
     question, physics
-        The case and its modes.
+        The case and the properties of its modes.
     response
-        Of the case.
+        The response of the case.
     """
     yield from _of_energy(question, physics, response)
     yield from _of_bounds(physics)
@@ -135,7 +135,7 @@ def afterwards(question: Question, physics: Physics, response: Response) -> Iter
 
 
 def of_physics(question: Question, response: Response) -> Values:
-    """Return the values that a job puts down of the physics of its case."""
+    """Return the variables of a case about its physics."""
     physics = physics_of(question)
     told = () if physics is None else afterwards(question, physics, response)
     return {"physics_verdicts": to_json(told)}
@@ -255,10 +255,10 @@ ROTATIONS = ("rx", "ry", "rz")
 
 
 def motion_at_peak(question: Question, response: Response) -> Values:
-    """Return how large the motion at the peak is, in what linear kinematics is limited by; NaN where that is not known.
+    """Return rotations and strains of the motion at the peak, which limit linear kinematics; NaN if unknown.
 
-    Rotations are those of rigid bodies and of nodes that have some, and the mean slope of a meshed part from its clamp to an output, which its
-    steepest slope is above. The strain is the root mean square over the elastic parts, which the largest one is above.
+    Rotations are those of rigid bodies and of nodes with rotational dofs, and the mean slope of a meshed part from its clamp to an output; its
+    steepest slope is larger. The strain is the root mean square over the elastic parts; the largest strain is larger.
     """
     none = float("nan")
     found = {"peak_rotation_rad": none, "peak_strain_rms": none, "peak_slip_facets": none}

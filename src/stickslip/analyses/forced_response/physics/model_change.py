@@ -1,4 +1,4 @@
-"""Sensitivity of a peak to the model: reduction, contact points, contact stiffness and retention stiffness are each changed, and the peak is found again."""
+"""Sensitivity of a peak to the model: the peak is found again after a change of reduction, contact points, contact or retention stiffness."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ AT_AN_END = 1e-9  # relative distance from an end of the sweep: no resonance, co
 
 
 def model_changes(question: Question, response: Response) -> Values:
-    """Return by how much the peak changes with half again as many modes, and with half the points of meshed contacts; NaN where that says nothing."""
+    """Return the change of the peak with 50 % more modes, and with half the points of meshed contacts; NaN if unknown."""
     more = fewer = UNKNOWN
     left_out = 0
     richer, coarser = _richer(question), _coarser(question)
@@ -57,7 +57,7 @@ def model_changes(question: Question, response: Response) -> Values:
 
 
 def stiffness_changes(question: Question, response: Response) -> Values:
-    """Return by how much the peak changes with the stiffness of all contacts; NaN where that is not known."""
+    """Return the derivative of the peak with respect to the stiffness of all contacts; NaN if unknown."""
     top, slope = response.top, None
     if top is not None and top.point.converged:
         resonance = _at_resonance(question, top.point)
@@ -135,7 +135,7 @@ WEAKER = (0.5, 0.2, 0.1)
 
 
 def peak_shift(question: Question, response: Response) -> tuple[float, float]:
-    """Follow the peak to a tenth of the retention stiffness.
+    """Follow the peak while the retention stiffness is reduced to a tenth.
 
     Returns
     -------

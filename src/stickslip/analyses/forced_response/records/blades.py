@@ -15,7 +15,7 @@ from stickslip.units import HZ
 
 
 def tuned_response(question: Question) -> Response:
-    """Solve the same wheel with all sectors alike."""
+    """Solve the same wheel with equal sectors."""
     blades = question.model.blades
     assert blades is not None
     tuned = blades.tuned
@@ -27,7 +27,7 @@ def tuned_response(question: Question) -> Response:
 
 
 def of_blades(question: Question, response: Response) -> Values:
-    """Return the variables of a wheel whose sectors differ; the tuned one is solved here."""
+    """Return the variables of a mistuned wheel; this solves the tuned wheel."""
     blades = question.model.blades
     assert blades is not None
     where = blades.same_in_all(int(question.model.peak_of[0]))
@@ -63,7 +63,7 @@ def of_blades(question: Question, response: Response) -> Values:
 
 
 def sentence(blades: int, factor: float, largest: int) -> str:
-    """Say what the amplification is, and what it may be compared with."""
+    """State the amplification and its reference values."""
     bound = whitehead(blades)
     return f"largest blade {largest}, amplification {factor:.4g} over the wheel with all sectors alike; {BOUND} is {bound:.3g}"
 

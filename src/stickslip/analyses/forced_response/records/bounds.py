@@ -8,12 +8,12 @@ BOUND = "Whitehead's (1 + √n)/2, a bound for one family of modes, equal dampin
 
 
 def whitehead(blades: int) -> float:
-    """Return Whitehead's (1 + √n)/2, the largest amplification of one family of modes of equal damping in all waves, without friction."""
+    """Return Whitehead's (1 + √n)/2: largest amplification of one family of modes with equal damping in all waves, without friction."""
     return 0.5 * (1.0 + float(np.sqrt(blades)))
 
 
 def localisation(amplitudes: FloatArray) -> float:
-    """Return the localisation factor of amplitudes (n,): 0 where all are alike, 1 where one blade alone moves."""
+    """Return the localisation factor of amplitudes (n,): 0 if all are equal, 1 if a single blade moves."""
     largest = float(np.max(amplitudes))
     others = np.delete(amplitudes, int(np.argmax(amplitudes)))
     if not largest or not others.size:

@@ -46,14 +46,14 @@ AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"
 def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     """Return the dataset of finished cases.
 
-    What some cases lack (a contact with other points, a higher harmonic) is filled: with zero for harmonics not kept, else NaN or -1.
+    Cases of different size are padded: with zero for harmonics not kept, else with NaN or -1.
 
     Parameters
     ----------
     cases
-        Values of each case by name; the first one gives what is not told case by case, such as the places of contacts.
+        Values of each case by name. The first case gives everything that all cases share, such as the positions of contacts.
     labels
-        What is varied in each, as text; empty for a study without [vary].
+        Varied keys of each case as text; empty for a study without [vary].
     """
     before = np.cumsum([0, *(int(c["points"]) for c in cases)])
     each = _aligned([_of_case(i, c, int(before[i])) for i, c in enumerate(cases)])
@@ -146,7 +146,7 @@ DIM = "measured"
 
 
 def with_measured(data: xr.Dataset, found: MeasuredPeaks | None) -> xr.Dataset:
-    """Return the dataset of a forced response with what was measured, along the dimension ``measured``."""
+    """Return the dataset of a forced response with the measured peaks, along the dimension ``measured``."""
     if found is None:
         return data
     variables: dict[str, Any] = {

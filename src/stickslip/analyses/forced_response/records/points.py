@@ -21,30 +21,30 @@ FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak ar
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A frequency of the response, with the solution that stands for it.
+    """One frequency of the response with its accepted solution.
 
     Parameters
     ----------
     point
-        The solution with most harmonics; not a solution where its status says so.
+        The solution with the most harmonics; its status says whether it converged.
     low
-        The first solution at the same frequency, or None (peak refinements, points of a branch with many harmonics).
+        The first solution at the same frequency; None for peak refinements and for points of a branch with many harmonics.
     fields, low_fields
-        What they look like everywhere; None where the point did not converge.
+        Motion of all dofs of both solutions; None for an unconverged point.
     real_error
-        Difference between both, a fraction; NaN unless the point repeats the first one.
+        Relative difference of both solutions; NaN unless the point is a repeat of the first one.
     driven
-        Harmonics that the load drives: those of its amplitudes.
+        Harmonics of the load, which define the amplitude.
     amplitude_of
-        What an amplitude is, as of a `Sweep`.
+        Definition of the amplitude, as in `Sweep`.
     own_error
-        Bound of its own error, a fraction: 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
+        Bound of the point's own error, a fraction: 0 if no force acts on the harmonics left out, NaN if unknown.
     audit_error
-        Difference from the same motion solved with more harmonics to compare, a fraction; NaN where it was not.
+        Relative difference from a solution of the same motion with more harmonics; NaN without such an audit.
     audit
-        That solution.
+        The solution of the audit.
     audit_place
-        Of what differs so much, in what the error is taken over; -1 without one.
+        Index of the component with this difference in the error norm; -1 without an audit.
     """
 
     point: ForcedPoint
@@ -61,26 +61,26 @@ class Accepted:
 
     @property
     def exact(self) -> bool:
-        """Whether no force acts on the harmonics left out: with however many it stays the same, and no audit is needed."""
+        """Whether no force acts on the harmonics left out; more harmonics then change nothing, and no audit is needed."""
         return self.own_error == 0.0
 
     @property
     def indicator(self) -> float:
-        """What the strategy said of the first solution: of an alert the predicted error, a fraction; NaN where it was not asked."""
+        """Indicator of the strategy at the first solution, for an alert the predicted error, a fraction; NaN if not evaluated."""
         return (self.low or self.point).predicted_error
 
     def amplitudes(self, n_outputs: int) -> FloatArray:
-        """Return the (n_outputs,) amplitudes, m; NaN where the point did not converge."""
+        """Return (n_outputs,) amplitudes, m; NaN for an unconverged point."""
         return _amplitudes(self.fields, n_outputs, self.driven, self.amplitude_of)
 
     def driven_amplitudes(self, n_outputs: int) -> FloatArray:
-        """Return the (driven, n_outputs) amplitudes of each driven harmonic, m; NaN where the point did not converge."""
+        """Return (driven, n_outputs) amplitudes of each driven harmonic, m; NaN for an unconverged point."""
         if self.fields is None:
             return np.full((len(self.driven), n_outputs), np.nan)
         return np.asarray(np.abs(self.fields.outputs[list(self.driven), :n_outputs]))
 
     def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
-        """Return the same of the first solution, NaN where that had other harmonics than these."""
+        """Return (n_outputs,) amplitudes of the first solution, m; NaN if it has other harmonics than these."""
         known = self.low is not None and self.low.support == harmonics
         first = self.low_fields if known else None
         return _amplitudes(first, n_outputs, self.driven, self.amplitude_of)
@@ -93,17 +93,17 @@ class Response:
     Parameters
     ----------
     solved
-        Every point that was solved, accepted or not, in the order of solution.
+        All points solved, accepted or not, in the order of solution.
     accepted
-        One entry a frequency, along the branch, peak refinements last.
+        One entry a frequency along the branch, peak refinements last.
     peak
-        Position in `accepted` of the largest amplitude of the report output that is not known to be unstable, -1 if nothing converged.
+        Index in `accepted` of the largest amplitude of the report output that is not known to be unstable; -1 if nothing converged.
     output
-        Position of the output whose peak counts.
+        Index of the output with the peak.
     low_harmonics
         Harmonics of the first passage.
     unstable_peak
-        Position of a larger amplitude whose motion is unstable, so that it is not the peak; -1 where there is none.
+        Index of a larger but unstable amplitude; -1 for none.
     """
 
     solved: tuple[ForcedPoint, ...]
@@ -115,11 +115,11 @@ class Response:
 
     @property
     def top(self) -> Accepted | None:
-        """The peak; None if nothing converged."""
+        """The accepted point at the peak; None if nothing converged."""
         return None if self.peak < 0 else self.accepted[self.peak]
 
     def amplitude(self, accepted: Accepted) -> float:
-        """Return the amplitude of the report output, m; NaN where the point did not converge."""
+        """Return the amplitude of the report output, m; NaN for an unconverged point."""
         return float(accepted.amplitudes(self.output + 1)[self.output])
 
     @property
@@ -144,7 +144,7 @@ class Response:
 
     @property
     def unknowns(self) -> int:
-        """Unknowns of all solutions together, accepted or not: the work in harmonics, whatever chose them."""
+        """Total number of unknowns of all solutions, accepted or not: a measure of work that does not depend on the strategy."""
         return sum(p.unknowns for p in self.solved)
 
     @property
@@ -161,7 +161,7 @@ class Response:
 
     @property
     def flanks(self) -> tuple[Accepted, ...]:
-        """On either side of the peak the point whose amplitude is nearest to a share of the peak's."""
+        """The points on either side of the peak whose amplitude is nearest to a given fraction of the peak."""
         if self.top is None:
             return ()
         here, wanted = self.top.point.omega, FLANK * self.peak_amplitude
@@ -170,16 +170,16 @@ class Response:
 
 
 def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) -> Response:
-    """Put the points of a case in order and recover what they look like.
+    """Sort the points of a case and expand their solutions to all dofs.
 
     Parameters
     ----------
     problem
-        What was solved.
+        The problem of the sweep.
     points
         All points in the order of solution.
     output
-        Position of the output whose peak counts; of the largest of several, where the system says so.
+        Index of the output with the peak; if the system takes the largest of several, its first output.
     """
     audits = audits_by_frequency(points)
     accepted = []
@@ -212,7 +212,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
 
 
 def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
-    """Return the point at which a response ended that could not begin: no solution, like any that did not converge."""
+    """Return an unconverged point for a response that could not start."""
     sweep, harmonics = problem.sweep, np.array(problem.sweep.first_harmonics, dtype=np.int64)
     shape = (int(harmonics[-1]) + 1, problem.system.retained.size)
     return ForcedPoint(

@@ -20,7 +20,7 @@ MODES = 3  # whose modal force is told where a study does not say
 
 
 def pressure_lines(model: Model, modes: Mapping[str, int]) -> tuple[str, ...]:
-    """Return sentences about the pressure fields of a model; `modes` says of how many modes of each load."""
+    """Return sentences about the pressure fields of a model, with the modal forces of `modes` modes for each load."""
     found: list[str] = []
     for name, load in model.loads.items():
         if load.field is not None:

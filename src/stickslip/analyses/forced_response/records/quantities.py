@@ -21,7 +21,7 @@ MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutra
 
 @dataclass(frozen=True)
 class Quantity:
-    """A variable of the dataset: its dimensions, unit and meaning."""
+    """A variable of the dataset: dimensions, unit and meaning."""
 
     dims: tuple[str, ...]
     units: str
@@ -348,7 +348,7 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def flags(name: str) -> dict[str, IntArray | str]:
-    """Return the attributes that say what the numbers of a variable mean, none where they are no flags."""
+    """Return the netCDF attributes that explain coded values; none for a variable without codes."""
     meanings = {
         "status": {s.name.lower(): int(s) for s in Status},
         "attempt_status": {s.name.lower(): int(s) for s in Status},

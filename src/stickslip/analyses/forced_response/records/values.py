@@ -1,4 +1,4 @@
-"""Variables of one case, as a job puts them down for the dataset."""
+"""Variables of one case, stored by its job for the dataset."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ Values = dict[str, Any]
 
 
 def of_model(question: Question, output: int) -> Values:
-    """Return what is known of the model, and the `output` whose peak counts: labels, contacts, static state, natural frequencies, skin."""
+    """Return the variables of the model: labels, contacts, static state, natural frequencies, skin; `output` is the output with the peak."""
     model, skin = question.model, question.model.skin
     found = {
         "output": model.output_labels,
@@ -77,9 +77,9 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
     Parameters
     ----------
     question, response
-        The case.
+        The case and its response.
     shift
-        What `peak_shift` found.
+        Return value of `peak_shift`.
     """
     return (
         _of_case(question, response, shift)
@@ -91,7 +91,7 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
 
 
 def of_checks(checks: Sequence[Check]) -> Values:
-    """Return comparisons with time integration."""
+    """Return the variables of the comparisons with time integration."""
     real = ("frequency_hz", "transient", "balance", "difference_percent", "outputs_percent", "scatter", "refined")
     columns = {f"verify_{name}": np.array([getattr(c, name) for c in checks]) for name in real}
     return columns | {
@@ -103,7 +103,7 @@ def of_checks(checks: Sequence[Check]) -> Values:
 
 
 def of_examined(examined: Sequence[Examined], count: int) -> Values:
-    """Return what is known of the stability: of points that were looked at row by row, and of each of `count` points of the response."""
+    """Return the variables of the stability: one row an examined point, and one value for each of the `count` points of the response."""
     rows = [e for e in examined if e.basis == "examined" or e.position < 0 or len(examined) == 1]
     word = np.full(count, MOTION["not examined"], dtype=np.int64)
     basis = np.zeros(count, dtype=np.int64)
@@ -121,7 +121,7 @@ def of_examined(examined: Sequence[Examined], count: int) -> Values:
 
 
 def of_doubt(doubt: ReferenceDoubt) -> Values:
-    """Return what more harmonics would change."""
+    """Return the variables of the check with more harmonics."""
     return {
         "reference_error_percent": 100 * doubt.errors,
         "reference_worst_percent": 100 * doubt.worst,
@@ -254,7 +254,7 @@ def _of_attempts(question: Question, response: Response) -> Values:
 
 
 def highest(response: Response) -> int:
-    """Return the highest harmonic that any solution keeps."""
+    """Return the highest harmonic of all solutions."""
     return max((p.order for p in response.solved), default=1)
 
 
@@ -277,7 +277,7 @@ def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> C
 
 
 def texts(values: Iterable[str]) -> npt.NDArray[np.str_]:
-    """Return texts as an array, which may be empty."""
+    """Return texts as an array, also for an empty list."""
     return np.array(list(values), dtype=str)
 
 

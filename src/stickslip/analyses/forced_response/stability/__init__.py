@@ -1,1 +1,1 @@
-"""Stability of a response: which points are examined, and motions in time beside them."""
+"""Stability of a response: choice of points, examination, and time integration."""

@@ -1,4 +1,4 @@
-"""Bifurcations of a response and the branches that leave there, as notes of a job."""
+"""Bifurcations of a response and their side branches, stored as notes of a job."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,14 +33,14 @@ NOT_FOLLOWED = "what leaves there is not followed: every sector of so large a wh
 
 @dataclass(eq=False)
 class Remembered:
-    """Multipliers in the order in which they are asked for; what an interrupted run has asked for is not done again, nor pieces of Hill's method."""
+    """Multipliers in the order of requests. Those found before an interruption are taken from the notes, as are pieces of Hill's method."""
 
     notes: Notes
     hill: bool = False
     count: int = 0
 
     def __call__(self, problem: ForcedProblem, point: ForcedPoint) -> Stability:
-        """Return what becomes of disturbances of a motion."""
+        """Return the stability of a motion."""
         self.count += 1
         name = f"bifurcations.{self.count}"
         known = self.notes.get(name)
@@ -66,7 +66,7 @@ class Remembered:
 
 
 def located(question: Question, response: Response, notes: Notes) -> Bifurcations:
-    """Return the bifurcations along the branch of a response: all that were asked for, folds alone where nothing can be examined."""
+    """Return the bifurcations along the branch of a response: the kinds asked for; only folds if no multipliers are available."""
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
     branch = [a.point for a in every[:along]]
@@ -99,7 +99,7 @@ def _most(question: Question) -> int:
 
 
 def followed(question: Question, found: Bifurcations) -> list[tuple[Bifurcation, SideBranch]]:
-    """Return the branches that leave the response, each with where it does."""
+    """Return the side branches of the response, each with its bifurcation."""
     if question.bifurcations != "branches":
         return []
     own = [b for b in found.found if b.kind in LEAVES][: _most_followed(question)]
@@ -119,7 +119,7 @@ def of_bifurcations(
     sides: Sequence[tuple[Bifurcation, SideBranch]],
     examined: Sequence[Examined] = (),
 ) -> Values:
-    """Return bifurcations and the branches that leave there as values of the dataset, and what is known of the stability of points by them or before."""
+    """Return the variables of bifurcations and side branches, and the stability of points known from both examination and branch."""
     own, problem = found.found, question.problem
     points = [(n, side, p) for n, (_, side) in enumerate(sides) for p in side.points]
     output = response.output
@@ -148,7 +148,7 @@ def of_bifurcations(
 
 
 def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
-    """Return what was not looked at, and what looking took."""
+    """Return the limits of the search for bifurcations: kinds not sought, method, branches not followed."""
     why = why_not(question) if question.bifurcations != "folds" else ""
     alone = [f"folds alone were looked for: {why}"] * bool(why)
     hill = by_hill(question.model.system)
@@ -159,7 +159,7 @@ def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
 
 
 def bifurcations_line(question: Question) -> tuple[str, ...]:
-    """Return what ``stickslip check`` says of the search for bifurcations."""
+    """Return the line of ``stickslip check`` about the search for bifurcations."""
     if question.bifurcations == "off":
         return ()
     why, system = why_not(question), question.model.system

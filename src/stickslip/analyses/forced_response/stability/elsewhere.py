@@ -1,4 +1,4 @@
-"""Other motions at the peak and beside it, told where they are stable or not known to be unstable."""
+"""Other motions at the peak and beside it, and their stability."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ ALIKE = 0.03  # relative difference of its amplitude
 
 
 def motions_elsewhere(question: Question, response: Response) -> Values:
-    """Return other motions at the peak and at the points beside it: where, how large, what they were found from, and whether they are stable."""
+    """Return other motions at the peak and the points beside it: frequency, amplitude, origin, stability."""
     found: list[tuple[OtherMotion, str]] = []
     if response.top is not None and response.top.point.converged:
         points = [a.point for a in (response.top, *response.flanks)]

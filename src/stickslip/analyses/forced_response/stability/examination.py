@@ -1,4 +1,4 @@
-"""Estimated cost of a stability examination, and whether it is begun; all sectors of a wheel count."""
+"""Estimated cost of a stability examination, and the decision to begin it; all sectors of a wheel count."""
 
 from stickslip.assembly.sides.unreduced import KEPT
 from stickslip.response.stability.flow_map.contact_states import is_located
@@ -17,10 +17,10 @@ MOTIONS = 2.0  # that with more harmonics, and as it was solved
 
 
 def examination_work(system: System) -> float:
-    """Return the operations of one examination, which looks at two motions; of a wheel at those of all its sectors.
+    """Return the operations of one examination of two motions; on a wheel of all its sectors.
 
-    A travelling motion repeats itself in other sectors, so that a share of the period is enough; modes and multipliers of all
-    coordinates are found in any case, and take about as much as one interval.
+    A travelling motion repeats itself in other sectors, so a fraction of the period suffices. Modes and multipliers of all
+    coordinates are needed in any case and cost about as much as one interval.
     """
     side, sectors, shares = system.structure, 1, 1
     if side.wheel is not None:
@@ -31,14 +31,14 @@ def examination_work(system: System) -> float:
 
 
 def too_long(system: System, *, forced: bool) -> str:
-    """Return why no examination is begun, by the size of what is marched; empty where it is soon done.
+    """Return why an examination would take too long, by the size of the model; empty if it would not.
 
-    Which waves of a wheel there are makes no difference: harmonics may have led to all of them without making the wheel any smaller.
+    The cost does not depend on the waves that the harmonics excite, because all sectors are integrated.
 
     Parameters
     ----------
     system
-        What vibrates.
+        The vibrating system.
     forced
         Whether a load drives it.
     """
@@ -62,7 +62,7 @@ def too_long(system: System, *, forced: bool) -> str:
 
 
 def hill_work(system: System) -> float:
-    """Return the most operations that an examination of a wheel by Hill's method takes, one sector at a time, whatever contacts slip."""
+    """Return the largest number of operations of an examination by Hill's method, sector by sector."""
     side = system.structure
     sectors = 1 if side.wheel is None else side.wheel.sectors
     rows = min(MAX_ROWS, (2 * MAX_HILL_HARMONICS + 1) * 3 * system.interface.n_contacts)
@@ -71,7 +71,7 @@ def hill_work(system: System) -> float:
 
 
 def by_hill(system: System) -> bool:
-    """Whether forced motions are examined by Hill's method: those of a wheel that is too large for its multipliers, and with structural damping."""
+    """Return whether forced motions are examined by Hill's method: on a wheel too large for its multipliers, and with structural damping."""
     interface, side = system.interface, system.structure
     large = side.wheel is not None and bool(too_long(system, forced=True))
     return (
@@ -84,7 +84,7 @@ def by_hill(system: System) -> bool:
 
 
 def examines_every_wave(system: System) -> bool:
-    """Whether the stability of the forced motions of a tuned wheel is examined against every wave."""
+    """Return whether the stability of forced motions of a tuned wheel is examined for every wave."""
     if system.structure.wheel is None:
         return False
     return not too_long(system, forced=True) or by_hill(system)

@@ -1,4 +1,4 @@
-"""Choice of the points whose stability is examined, and the verdicts that follow for the others."""
+"""Choice of the points whose stability is examined, and the verdicts inferred for the others."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -30,14 +30,14 @@ Examine = Callable[[Accepted], Examined]
 
 
 def examined_points(question: Question, response: Response, examine: Examine) -> list[Examined]:
-    """Return what is known of the stability of points, in the order of the branch.
+    """Return the known stability of points in the order of the branch.
 
     Parameters
     ----------
     question, response
-        A case.
+        The case and its response.
     examine
-        Looks at a point of it.
+        Function that examines a point.
     """
     if question.examine == "off" or response.top is None:
         return []
@@ -58,7 +58,7 @@ def examined_points(question: Question, response: Response, examine: Examine) ->
 def neighbours_of(
     question: Question, response: Response, examined: list[Examined], attained: list[float]
 ) -> list[Examined]:
-    """Return the same with those undecided points stable that stand beside one that a motion in time has attained, on the same branch, where nothing changes between."""
+    """Return the points with undecided ones set to stable next to a point confirmed in time, on the same branch and with the same transitions."""
     known = [e for e in examined if e.omega in attained]
     if not known or not any(e.verdict == "undecided" for e in examined):
         return examined
@@ -258,7 +258,7 @@ def _inside_between(one: Examined, other: Examined) -> bool:
 
 
 def largest(response: Response, known: list[Examined]) -> int:
-    """Return the position of the largest motion that is not known to be unstable; -1 where there is none."""
+    """Return the index of the largest motion not known to be unstable; -1 for none."""
     off = {e.position for e in known if e.verdict == "unstable"}
     sizes = [
         (response.amplitude(a), -i) for i, a in enumerate(response.accepted) if i not in off and a.fields is not None
@@ -267,7 +267,7 @@ def largest(response: Response, known: list[Examined]) -> int:
 
 
 def with_stable_peak(response: Response, known: list[Examined]) -> Response:
-    """Return the response whose peak is its largest motion that is not known to be unstable, the larger unstable one being remembered."""
+    """Return the response whose peak is the largest motion not known to be unstable; a larger unstable one is noted in it."""
     position = largest(response, known)
     unstable = {e.position for e in known if e.verdict == "unstable"}
     if response.peak not in unstable or position < 0:

@@ -1,4 +1,4 @@
-"""The check inside a run (``--verify``): the same reduced model integrated in time at the peak, and beside it; numbers and sentence."""
+"""The check ``--verify``: time integration of the same reduced model at the peak and beside it, in numbers and words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -43,37 +43,37 @@ def off_percent(value: float, true: float) -> float:
 
 @dataclass(frozen=True)
 class Check:
-    """Amplitude of the report output, of the harmonics that the load drives, by balance and by time integration.
+    """Amplitude of the report output in the driven harmonics, by harmonic balance and by time integration.
 
     Parameters
     ----------
     frequency_hz
-        Where.
+        Frequency of the point.
     balance, transient
-        Amplitudes in m; of the integration the average over its last third where it did not become periodic.
+        Amplitudes, m; that of the integration is the average over its last third if it did not become periodic.
     settled
         Whether the integration became periodic.
     periods
         Periods integrated.
     outputs_percent
-        Largest difference of an output, as the vector of its driven harmonics with their phases, by the measure of errors; NaN where it was not taken.
+        Largest difference of an output in percent, driven harmonics with their phases, in the error norm; NaN if not evaluated.
     scatter
-        Largest distance of a period's harmonics from that average, relative to it; over all outputs.
+        Largest distance of a period's harmonics from that average over all outputs, relative to the average.
     drifting
-        Names of the coordinates whose mean moves on from period to period, with commas between them.
+        Names of the coordinates whose mean drifts from period to period, separated by commas.
     order
-        Harmonics of the balance.
+        Highest harmonic of the balance.
     steps
-        Steps in a period of the integration: more than usual where these were too few.
+        Time steps a period; more than usual if these were too few.
     step_percent
-        By how much the amplitude changed with the last doubling of the steps; 0 where it was not needed.
+        Change of the amplitude by the last doubling of the steps, percent; 0 if there was none.
     refined_order, refined
-        Harmonics and amplitude of the balance repeated with more of them; NaN where it was not needed or failed.
+        Highest harmonic and amplitude of a balance repeated with more harmonics; NaN if not needed or failed.
     motion
-        What the motion in time did that began with the balance's state: *attained* it, *left* it for another one or without bound,
-        is *not periodic*, or has *not settled* so far.
+        Outcome of an integration from the balance's state: it *attained* that motion, *left* it for another one or without bound, is *not
+        periodic*, or has *not settled*.
     shows_after
-        Periods in which a disturbance changes a thousandfold by the multiplier that was found; 0 where that was not asked for.
+        Periods in which a disturbance changes a thousandfold by the multiplier; 0 if not asked for.
     """
 
     frequency_hz: float
@@ -94,18 +94,18 @@ class Check:
 
     @property
     def difference_percent(self) -> float:
-        """Of the balance against the integration; see `off_percent`."""
+        """Difference of the balance from the integration, percent."""
         return off_percent(self.balance, self.transient)
 
     @property
     def wanders_near(self) -> bool:
-        """Whether a motion in time that is not periodic stays within 1 % of the balance's amplitude."""
+        """Whether a motion that is not periodic stays within 1 % of the balance's amplitude."""
         near = max(100 * self.scatter, abs(self.difference_percent)) <= LARGE
         return self.motion == "not periodic" and near
 
     @property
     def sentence(self) -> str:
-        """What was compared and what happened."""
+        """The comparison and its outcome as a sentence."""
         return (
             f"{self.frequency_hz:.3f} Hz: balance {metres(self.balance)} (H = {self.order}), "
             f"time integration {metres(self.transient)}{self._difference}; "
@@ -186,7 +186,7 @@ MOST_STEPS = (
 
 
 def chosen(question: Question, response: Response) -> list[Accepted]:
-    """Return the points that are integrated: the peak of each case, and where there is one case alone its flanks, too."""
+    """Return the points to integrate: the peak of each case; for a single case also its flanks."""
     if response.top is None:
         return []
     beside = () if question.label else response.flanks
@@ -199,12 +199,12 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
     Parameters
     ----------
     question, response
-        The model, and its finished response.
+        The case and its finished response.
     accepted
-        One of its points.
+        One point of the response.
     multiplier
-        Modulus of the multiplier of a point that is not known to be stable, NaN where none is known: the motion then begins with
-        disturbed speeds and is followed for as long as these need to show. None: neither.
+        Modulus of the multiplier of a point not known to be stable, NaN if unknown. The motion then starts with disturbed velocities and is
+        followed until the disturbance shows. None: neither.
     """
     point = accepted.point
     after = 0 if multiplier is None else shows_after(multiplier)
@@ -232,12 +232,12 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
 
 
 def shows_after(multiplier: float) -> int:
-    """Return the periods in which a disturbance grows or decays a thousandfold by a multiplier; more than are ever followed where it does neither.
+    """Return the number of periods in which a disturbance changes a thousandfold; for a modulus of 1 more than are ever integrated.
 
     Parameters
     ----------
     multiplier
-        Its modulus; NaN: not known.
+        Modulus of the multiplier; NaN: unknown.
     """
     rate = abs(log(multiplier)) if isfinite(multiplier) and multiplier > 0.0 else float("nan")
     if multiplier == 0.0:
@@ -246,7 +246,7 @@ def shows_after(multiplier: float) -> int:
 
 
 def seconds_in_time(system: System) -> float:
-    """Return about how long an integration takes that does not settle, s, by the size of all sectors that are marched."""
+    """Return the estimated time of an integration that does not settle, s, by the size of all integrated sectors."""
     sectors = sectors_in_time(system)
     rows, gaps = 2 * sectors * system.structure.n, 3 * sectors * system.interface.n_contacts
     return PATIENCE * STEPS * (2.0 * rows**2 + float(gaps) ** 3) / FLOPS
@@ -359,24 +359,24 @@ def integrated(
     kick: float = 0.0,
     least: int = 1,
 ) -> TransientResult:
-    """Integrate in time from the balance's state at t = 0: near what is judged, so that little has to settle.
+    """Integrate in time from the balance's state at t = 0, which is close to the periodic motion.
 
     Parameters
     ----------
     problem, point
-        What was solved, and the solution.
+        The problem and its solution.
     load
-        Its loads.
+        Loads of the model.
     periods
-        Give up settling after so many.
+        Largest number of periods to settle.
     begin
-        Where to begin instead, as where an integration with fewer steps has ended.
+        Other initial state, such as the end of an integration with fewer steps.
     steps
-        Steps in a period.
+        Time steps a period.
     kick
-        Disturbance of the speeds at the beginning, a fraction of the amplitude that each of them has.
+        Disturbance of the initial velocities, as a fraction of the amplitude of each.
     least
-        Go on for so many periods in any case.
+        Smallest number of periods.
     """
     system = problem.system
     motion = problem.low.linear.recover(point.omega, point.coefficients)
@@ -422,16 +422,16 @@ def _kicked(start: TransientStart, speeds: FloatArray) -> TransientStart:
 
 
 def refined(question: Question, point: ForcedPoint, order: int) -> ForcedPoint | None:
-    """Solve the balance with `order` harmonics; None if it does not converge.
+    """Solve the balance with harmonics up to `order`; None if it does not converge.
 
     Parameters
     ----------
     question
-        The model and how it is solved.
+        The case.
     point
-        A solution with fewer harmonics, where Newton begins.
+        A solution with fewer harmonics, the start of Newton's method.
     order
-        Harmonics; the samples grow with them.
+        Highest harmonic; the number of samples grows with it.
     """
     sweep = replace(question.sweep, high=order, samples=(MORE + 1) * question.sweep.samples)
     balance = forced_problem(question.model.system, question.model.load, sweep).high

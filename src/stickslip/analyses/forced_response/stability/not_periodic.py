@@ -1,4 +1,4 @@
-"""Motions in time where no periodic motion was found, or none is stable."""
+"""Time integration at points without a periodic motion, or without a stable one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,28 +30,28 @@ MULTIPLE = 0.02  # of the frequency: a line of the spectrum that is farther from
 
 @dataclass(frozen=True)
 class Answer:
-    """What a motion in time is like where no balance stands for it.
+    """The motion in time at a frequency without a valid balance solution.
 
     Parameters
     ----------
     omega
-        Where, rad/s.
+        Frequency, rad/s.
     why
-        Why it was marched.
+        Reason for the integration.
     largest, least, mean, rms, extreme
-        Of each output, see `Statistics`; NaN where nothing is known.
+        (n_outputs,) statistics, see `Statistics`; NaN if unknown.
     spread, periods, seconds
-        Between windows, in the later half; marched.
+        Relative difference between windows in the later half; number of periods integrated; CPU time, s.
     settled
-        Whether windows are alike.
+        Whether the windows agree.
     periodic
-        Whether every period is like the one before: then a periodic motion exists, and it is another one than the balance's.
+        Whether every period equals the one before; the integration has then found a periodic motion other than the balance's.
     line_hz, line_amplitude
         Peaks of the spectrum of the report output, Hz and m.
     amplitudes
-        (TURNS,) of the report output in the last periods, m; NaN where there were fewer.
+        (TURNS,) amplitudes of the report output in the last periods, m; NaN if there are fewer periods.
     sentence
-        All this in words.
+        The result as a sentence.
     """
 
     omega: float
@@ -90,7 +90,7 @@ class _March:
 def without_periodic(
     question: Question, response: Response, examined: Sequence[Examined]
 ) -> list[tuple[float, str, float]]:
-    """Return where no balance stands for the motion (rad/s), why, and the modulus of its multiplier: the peak first, then the nearest to it."""
+    """Return frequency (rad/s), reason and multiplier modulus of points without a valid balance solution, those nearest to the peak first."""
     found = {
         a.point.omega: ("no periodic motion was found", np.nan) for a in response.accepted if not a.point.converged
     }
@@ -121,20 +121,20 @@ def _alone(response: Response, examined: Sequence[Examined], one: Examined) -> b
 def in_time_instead(
     question: Question, response: Response, omega: float, why: str, work: float, multiplier: float = np.nan
 ) -> Answer:
-    """March at a frequency and say what the motion is like.
+    """Integrate in time at a frequency and describe the motion.
 
     Parameters
     ----------
     question, response
-        The model, and its finished response.
+        The case and its finished response.
     omega
-        rad/s.
+        Frequency, rad/s.
     why
-        Why it is asked for.
+        Reason for the integration.
     work
-        Floating point operations of the march, and of what is looked at with half the step.
+        Floating point operations allowed, for the integration and for the check with half the step.
     multiplier
-        Modulus of that of the balance's motion, which says how long its disturbances take to grow; NaN where it is not known.
+        Modulus of the multiplier of the balance's motion, which gives the growth time of disturbances; NaN if unknown.
     """
     count = question.problem.system.outputs.size
     if large := too_large(question):
@@ -314,7 +314,7 @@ def _nothing(omega: float, why: str, count: int, said: str) -> Answer:
 
 
 def of_answers(answers: Sequence[Answer]) -> dict[str, object]:
-    """Return the values of the dataset."""
+    """Return the variables of these motions."""
     named = (
         "largest",
         "least",

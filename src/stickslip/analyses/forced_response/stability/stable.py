@@ -37,33 +37,33 @@ BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not per
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """What was found of the stability of a point.
+    """Stability of one point.
 
     Parameters
     ----------
     omega
-        Where, rad/s.
+        Frequency, rad/s.
     verdict
-        In one of four words.
+        One of four words.
     multiplier, error
-        Modulus of the multiplier that decides and its error; NaN where none is known.
+        Modulus of the decisive multiplier and its error; NaN if unknown.
     reason
-        What the verdict rests on.
+        Basis of the verdict, in words.
     motion
-        What the motion in time did where the multipliers left the verdict undecided; empty where it was not asked.
+        Outcome of a time integration, made if the multipliers left the verdict undecided; else empty.
     large
-        Why the model is not integrated in time; empty where it can be.
+        Why the model cannot be integrated in time; empty if it can.
     basis
-        Whether the point itself was examined, or its verdict follows from others: carried along between two of them, or by the sign of the
+        Whether the point itself was examined or its verdict was inferred: from two examined points around it, or from the sign of the
         determinant of the balance's Jacobian.
     position
-        Of the point in the response.
+        Index of the point in the response.
     work
-        Floating point operations that the examination took.
+        Floating point operations of the examination.
     multipliers
-        All that are known, so that it can be said whether one may pass the unit circle on the way to another point.
+        (m,) all known multipliers, for the check that none crosses the unit circle between two points.
     raised
-        The motion with more harmonics that the verdict is of, where the point as it was solved has another one; else None.
+        The solution with more harmonics to which the verdict applies, if it differs from the point as solved; else None.
     """
 
     omega: float
@@ -81,11 +81,11 @@ class Examined:
 
     @property
     def doubted(self) -> bool:
-        """Whether the multipliers were looked at and do not show that disturbances die."""
+        """Whether the verdict is unstable or undecided."""
         return self.verdict in ("unstable", "undecided")
 
     def linear(self, size: float) -> str:
-        """Return why another point is stable whose contacts rest in the states of this one, its largest multiplier having a modulus."""
+        """Return why a point is stable whose contacts stay in the states of this point; `size` is the modulus of its largest multiplier."""
         return (
             f"no contact changes its state, as at {self.omega / HZ:.3f} Hz, so that the exponents are the same: the largest multiplier has the "
             f"modulus {modulus_text(size)}"
@@ -93,7 +93,7 @@ class Examined:
 
     @property
     def sentence(self) -> str:
-        """What was found and why."""
+        """Verdict and reason as a sentence."""
         told = f"{self.omega / HZ:.3f} Hz: {self.verdict}"
         if self.verdict == "undecided" and not self.motion:
             if self.large:
@@ -105,7 +105,7 @@ class Examined:
 
 
 def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Examined:
-    """Return what the multipliers say of a point, or why they say nothing; `keep` keeps pieces of a long examination."""
+    """Return the stability of a point by its multipliers, or why there are none; `keep` stores pieces of a long examination."""
     omega = accepted.point.omega
     why, hill = why_not(question), by_hill(question.model.system)
     if why:
@@ -134,14 +134,14 @@ def _of_motion(question: Question, seen: Examined, motion: ForcedPoint) -> Exami
 
 
 def with_raised(points: Sequence[ForcedPoint], examined: Sequence[Examined]) -> list[ForcedPoint]:
-    """Return the motions whose stability is told, where the points as they were solved have another: points that take their places.
+    """Return the solutions with more harmonics that the verdicts apply to; they replace the points as solved.
 
     Parameters
     ----------
     points
-        That stand in the response, by position.
+        Points of the response.
     examined
-        What is known of them.
+        Stability of the points.
     """
     raised = []
     for one in examined:
@@ -153,7 +153,7 @@ def with_raised(points: Sequence[ForcedPoint], examined: Sequence[Examined]) -> 
 
 
 def as_note(examined: Examined) -> dict[str, Any]:
-    """Return what a job puts down of an examined point."""
+    """Return an examined point as a note of the job."""
     note = asdict(replace(examined, raised=None))
     del note["raised"], note["multipliers"]
     note |= {"re": examined.multipliers.real, "im": examined.multipliers.imag}
@@ -170,7 +170,7 @@ def as_note(examined: Examined) -> dict[str, Any]:
 
 
 def from_note(note: Mapping[str, Any], point: ForcedPoint) -> Examined:
-    """Return an examined point from what a job has put down of it."""
+    """Return an examined point from a note of the job."""
     apart = ("re", "im", "raised_re", "raised_im", "raised_harmonics", "raised_error")
     own = Examined(**{name: value for name, value in note.items() if name not in apart})
     own = replace(own, multipliers=_complex(note, ""))
@@ -223,7 +223,7 @@ def _named(question: Question, wave: WaveDisturbance) -> str:
 
 
 def with_motion(examined: Examined, check: Check | None) -> Examined:
-    """Return what was found with what the motion in time did, where the multipliers do not decide."""
+    """Return the stability with the outcome of a time integration, if the multipliers left it undecided."""
     if check is None or examined.verdict != "undecided" or not check.motion:
         return examined
     verdict = BY_MOTION.get(check.motion, examined.verdict)
@@ -236,7 +236,7 @@ def with_motion(examined: Examined, check: Check | None) -> Examined:
 
 
 def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
-    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done."""
+    """Return whether the peak is integrated in time without being asked for: it is undecided, and the integration is short."""
     return (
         response.top is not None
         and any(e.position == response.peak and e.verdict == "undecided" and not e.motion for e in examined)
@@ -245,14 +245,14 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
 
 
 def integrable(question: Question) -> bool:
-    """Whether motions are integrated in time without being asked to: where their stability can be examined and that is soon done; not with structural damping."""
+    """Return whether motions are integrated in time without being asked for: examination is possible and short, and there is no structural damping."""
     system = question.model.system
     can = not why_not(question) and system.structure.of_harmonic(1).loss is None
     return can and seconds_in_time(system) < MOST_IN_TIME
 
 
 def why_not(question: Question) -> str:
-    """Return why no point of a case is examined; empty where the multipliers, or Hill's method, can be had."""
+    """Return why no point of a case can be examined; empty if multipliers or Hill's method are available."""
     system = question.model.system
     if not by_hill(system):
         return unexaminable(question)
@@ -261,7 +261,7 @@ def why_not(question: Question) -> str:
 
 
 def unexaminable(question: Question) -> str:
-    """Return why no point of a case has all its multipliers; empty where nothing is known against it."""
+    """Return why no point of a case has all its multipliers; empty if no reason is known."""
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
@@ -272,7 +272,7 @@ def unexaminable(question: Question) -> str:
 
 
 def cost_line(question: Question) -> str:
-    """Return what ``stickslip check`` says of the examination."""
+    """Return the line of ``stickslip check`` about the examination."""
     if question.examine == "off":
         return 'stability: not examined, forced_response.stability is "off"'
     why = why_not(question)

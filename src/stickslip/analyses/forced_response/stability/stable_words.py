@@ -1,4 +1,4 @@
-"""The stability of a response in words: point by point where few were examined, else in runs along the branch."""
+"""The stability of a response in words: point by point for few points, else in ranges along the branch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,20 +21,20 @@ MOST_SENTENCES = 10
 
 @dataclass(frozen=True)
 class Point:
-    """What was found of the stability of a point.
+    """Stability of a point, as texts and numbers of the dataset.
 
     Parameters
     ----------
     hz
-        Where.
+        Frequency, Hz.
     verdict
-        In a word.
+        One word.
     multiplier, error
-        Modulus of the multiplier that decides and its error; NaN where none is known.
+        Modulus of the decisive multiplier and its error; NaN if unknown.
     sentence
-        What was found and why.
+        Verdict and reason.
     basis
-        Whether it was examined itself, or follows from others.
+        Whether the point was examined or its verdict was inferred.
     """
 
     hz: float
@@ -46,18 +46,18 @@ class Point:
 
 
 def point_of(examined: Examined) -> Point:
-    """Return what is told of a point."""
+    """Return a point from the stability of an examined one."""
     e = examined
     return Point(e.omega / HZ, e.verdict, e.multiplier, e.error, e.sentence, e.basis)
 
 
 def peak_word(response: Response, examined: Sequence[Examined]) -> str:
-    """Return in a word or two what is known of the stability of the peak."""
+    """Return the stability of the peak in a word or two."""
     return next((said_of(e.verdict) for e in examined if e.position == response.peak), said_of(""))
 
 
 def said_of(verdict: str) -> str:
-    """Return a verdict on the stability as it stands beside a peak."""
+    """Return a stability verdict as a phrase beside a peak."""
     return (
         {"undecided": "stability undecided"}.get(verdict, verdict)
         if verdict not in ("", "not examined")
@@ -66,12 +66,12 @@ def said_of(verdict: str) -> str:
 
 
 def stability_log(points: Sequence[Point]) -> list[str]:
-    """Return what the log says of the points of a case: a sentence for each of few, of many their runs."""
+    """Return the log lines on the stability of a case: a sentence for each of few points, ranges for many."""
     return [p.sentence for p in points] if len(points) <= FEW else [runs_line(points)]
 
 
 def stability_lines(points: Sequence[Point], peak_hz: float) -> tuple[str, ...]:
-    """Return what is told of a case: a sentence for each of few points; of many their runs, and sentences for the peak and what is not stable."""
+    """Return the lines on the stability of a case: a sentence for each of few points; for many, ranges and sentences on the peak and on unstable points."""
     if len(points) <= FEW:
         return tuple(p.sentence for p in points)
     at = int(np.argmin([abs(p.hz - peak_hz) for p in points])) if np.isfinite(peak_hz) else -1
@@ -84,7 +84,7 @@ def stability_lines(points: Sequence[Point], peak_hz: float) -> tuple[str, ...]:
 
 
 def runs_line(points: Sequence[Point]) -> str:
-    """Return from where to where points are alike, in the order of the branch, or of the frequency where that is shorter."""
+    """Return the ranges of points with equal verdicts, in the order of the branch or of the frequency, whichever is shorter."""
     by_hz = sorted(points, key=lambda p: p.hz)
     own = min((_runs(points), _runs(by_hz)), key=len)
     told = "; ".join(map(_run, own[:MOST_RUNS]))
@@ -93,7 +93,7 @@ def runs_line(points: Sequence[Point]) -> str:
 
 
 def of_case(data: xr.Dataset, case: int) -> list[Point]:
-    """Return the points of a case that were examined."""
+    """Return the examined points of a case."""
     if "stability_sentence" not in data:
         return []
     names = ("frequency_hz", "verdict", "multiplier", "multiplier_error", "sentence")
@@ -106,7 +106,7 @@ def of_case(data: xr.Dataset, case: int) -> list[Point]:
 
 
 def counts_line(data: xr.Dataset, case: int) -> str:
-    """Say of how many points of a case the stability is known, and from what; empty where the dataset does not say, or every point was examined."""
+    """State the number of points with known stability and its basis; empty if unknown, or if every point was examined."""
     if "motion_stability_basis" not in data:
         return ""
     own = data["motion_stability_basis"].values[data["point_case"].values == case]
@@ -119,7 +119,7 @@ def counts_line(data: xr.Dataset, case: int) -> str:
 
 
 def all_lines(data: xr.Dataset, labels: Sequence[str]) -> tuple[str, ...]:
-    """Return what is told of all cases, each line with the label of its case."""
+    """Return the lines of all cases, each with the label of its case."""
     return tuple(
         said(label, line)
         for i, label in enumerate(labels)

@@ -1,4 +1,4 @@
-"""The response of a case with the stability of its points: examined once, undecided ones integrated in time, motions raised to more harmonics."""
+"""The response of a case with the stability of its points. Undecided points are integrated in time, some are solved with more harmonics."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -36,18 +36,18 @@ SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
 
 @dataclass(eq=False)
 class Looked:
-    """Examines points in the order in which they are asked for.
+    """Examination of points in the order of requests, with memory over interruptions.
 
     Parameters
     ----------
     question
-        Of the case.
+        Question of the case.
     notes
-        Of the job.
+        Notes of the job.
     count
-        Points that were asked for.
+        Number of points requested.
     taken
-        Those of them that a stopped run had examined.
+        Number of those that an interrupted run had examined.
     """
 
     question: Question
@@ -56,7 +56,7 @@ class Looked:
     taken: int = 0
 
     def __call__(self, accepted: Accepted) -> Examined:
-        """Return what is found of the stability of a point."""
+        """Return the stability of a point."""
         name, self.count = f"{STABLE}.{self.count}", self.count + 1
         known, pieces = self.notes.get(name), Pieces(self.notes, name)
         one = from_note(known, accepted.point) if known else examine(self.question, accepted, pieces.keep)
@@ -68,7 +68,7 @@ class Looked:
         return one
 
     def tell(self) -> None:
-        """Say how many points were known."""
+        """Log the number of points known from an interrupted run."""
         if self.taken:
             self._say(f"{self.taken} points that were examined before are taken over from a run that was stopped")
 
@@ -79,7 +79,7 @@ class Looked:
 def with_stability(
     question: Question, points: Sequence[ForcedPoint], notes: Notes
 ) -> Generator[ForcedPoint, None, tuple[Response, list[Examined]]]:
-    """Return the response with its stable peak and what is known of the stability; yield motions that take the place of points whose stability they tell."""
+    """Return the response with its stable peak and the stability of its points; yield solutions that replace points."""
     ended = notes.get("finished") or {"points": len(points)}
     notes.put("finished", ended)
     solved, raised = list(points[: ended["points"]]), list(points[ended["points"] :])
@@ -163,7 +163,7 @@ def _open_places(question: Question, response: Response, examined: Sequence[Exam
 def integrated(
     question: Question, response: Response, accepted: Accepted, examined: Sequence[Examined], notes: Notes
 ) -> Check:
-    """Integrate in time; what an interrupted run has integrated is not done again."""
+    """Integrate in time; results of an interrupted run are used again."""
     omega = accepted.point.omega
     name = f"{IN_TIME}.{omega!r}"
     known = notes.get(name)

@@ -25,7 +25,7 @@ from stickslip.study.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A case, and what each rule has found of it."""
+    """A case with the findings of each rule."""
 
     label: str
     case: Curve
@@ -33,13 +33,13 @@ class Judged:
 
     @property
     def level(self) -> Level:
-        """The case is as bad as its peak and as what holds for all of it."""
+        """Level of the case: the worst of the findings on the whole case and on its peak."""
         every = (f for own in self.findings for f in own)
         return worst(f.level for f in every if not f.points or self.case.peak in f.points)
 
     @property
     def of_points(self) -> tuple[IntArray, list[str]]:
-        """(n,) number of the level of each point among `POINT_LEVELS`, and why, empty where it is trusted."""
+        """(n,) index of the level of each point in `POINT_LEVELS`, and the reasons; empty for trusted points."""
         levels = np.zeros(self.case.at.size, dtype=np.int64)
         reasons: list[list[str]] = [[] for _ in levels]
         for found, i in ((f, i) for own in self.findings for f in own for i in f.points):
@@ -53,7 +53,7 @@ class Judged:
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """The worst first; a case that is trusted says what it was examined for."""
+        """Verdicts, the worst first; for a trusted case with the list of checks."""
         found = sorted((v for own in self.findings for v in self._of_rule(own)), reverse=True)
         if self.level == "trusted":
             hz = self.case.peak_hz if self.case.peak >= 0 else None
@@ -89,7 +89,7 @@ class Judged:
 
 
 def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
-    """Return verdicts of a case without what one before says whole, as a part of a sentence: the same march in time is a doubt of a point and belongs to a note."""
+    """Return verdicts of a case without clauses that an earlier one contains as its whole reason."""
     told: list[Verdict] = []
     for v in verdicts:
         known = [before.why for before in told if len(before.why) >= ALIKE]
@@ -121,14 +121,14 @@ def _examined(case: Curve) -> str:
 
 
 def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
-    """Return what the rules find of each case of a finished dataset.
+    """Return the findings of the rules for each case of a finished dataset.
 
     Parameters
     ----------
     data
-        Of `put_together`.
+        Dataset of `put_together`.
     labels
-        Of the cases.
+        Labels of the cases.
     """
     curves = [Curve(data, i) for i in range(len(labels))]
     return tuple(
@@ -138,12 +138,12 @@ def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
 
 
 def verdicts(data: xr.Dataset, labels: Sequence[str]) -> tuple[Verdict, ...]:
-    """Return the verdicts of all cases; what holds for each of several is said once."""
+    """Return the verdicts of all cases; a verdict common to all cases appears once."""
     return of_all_cases([v for own in judged(data, labels) for v in own.verdicts], labels)
 
 
 def with_levels(data: xr.Dataset, labels: Sequence[str]) -> dict[str, tuple[str, object]]:
-    """Return the level of each case and of each point, and why, as variables: dimension and values."""
+    """Return level of each case and point, and reasons, as variables: dimension and values."""
     every = judged(data, labels)
     found: dict[str, tuple[str, object]] = {
         "case_verdict": ("case", np.array([LEVELS.index(own.level) for own in every]))

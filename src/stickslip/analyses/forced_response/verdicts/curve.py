@@ -1,4 +1,4 @@
-"""One case of a finished dataset, for the rules of its verdicts; missing variables are NaN, empty or absent. Jumps of its branch."""
+"""One case of a finished dataset, as the rules of its verdicts see it; missing variables are NaN or empty. Also jumps of its branch."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ LOSS_SEEN = 1e-6  # share of the energy that the contacts store below which it i
 
 @dataclass(frozen=True)
 class Jump:
-    """A step of a branch from one motion to another.
+    """A step of a branch between two different motions.
 
     Parameters
     ----------
     step
-        Position of the point before it.
+        Index of the point before it.
     what
-        What jumps, in words.
+        Name of the quantity that jumps.
     size
-        By which factor.
+        Factor of the jump.
     """
 
     step: int
@@ -48,14 +48,14 @@ def jumps(amplitude: FloatArray, loss: FloatArray, few: BoolArray, elastic: floa
     Parameters
     ----------
     amplitude
-        (n,) of neighbours on a branch, m.
+        (n,) amplitudes of consecutive points, m.
     loss
-        (n,) energy that all contacts dissipate in a cycle, J.
+        (n,) energy dissipated by all contacts in a cycle, J.
     few
-        (n,) whether a point keeps the harmonics of the first passage: those are connected by arc length, while what was solved
-        with more may stand anywhere.
+        (n,) whether a point keeps the harmonics of the first passage. Such points are connected by arc length; points solved with more may
+        lie anywhere.
     elastic
-        Largest energy that the contacts store, J, beside which the rounding of `loss` is seen.
+        Largest energy stored by the contacts, J, a scale for the rounding of `loss`.
     """
     of_loss = {j.step: j for j in _of_loss(np.maximum(loss, 0.0), elastic)}
     return tuple(sorted((of_loss | _of_amplitude(amplitude, few)).values(), key=lambda j: j.step))
@@ -85,7 +85,7 @@ def _of_loss(loss: FloatArray, elastic: float) -> list[Jump]:
 
 
 def stored_energy(gap: FloatArray | ComplexArray, force: FloatArray | ComplexArray) -> float:
-    """Return the largest energy of order π |force| |gap| of all contacts together in a cycle, J.
+    """Return the largest energy of all contacts together in a cycle, of order π |force| |gap|, J.
 
     Parameters
     ----------
@@ -108,25 +108,25 @@ FREQUENCY_RTOL = 1e-9  # relative difference of frequencies that are one
 
 
 def motion_of(said: Mapping[str, Any]) -> str:
-    """Return what the motion in time did by the row of a check; files that do not tell it say whether it settled."""
+    """Return the outcome of an integration from a row of a check; older files hold only whether it settled."""
     settled = "attained" if int(said["verify_settled"]) else "not settled"
     return str(said.get("verify_motion", "")) or settled
 
 
 def branch_length(refinement: FloatArray) -> int:
-    """Return how many points stand along the branch; behind them stand those that were added to resolve the peak.
+    """Return the number of points along the branch; points added to resolve the peak are stored behind them.
 
     Parameters
     ----------
     refinement
-        (n,) 1 for points of the peak; one in the place of a point of the branch keeps the place.
+        (n,) 1 for points added at the peak; one that replaces a point of the branch keeps its place.
     """
     along = np.flatnonzero(np.nan_to_num(refinement) == 0)
     return int(along[-1]) + 1 if along.size else 0
 
 
 def peak_output(data: xr.Dataset, case: int) -> int:
-    """Return the position of the output whose peak counts in a case: of a wheel whose sectors differ that of the blade which attains it."""
+    """Return the index of the output with the peak of a case; on a mistuned wheel the blade that attains it."""
     labels = [str(x) for x in data["output"].values] if "output" in data.coords else []
     wanted = str(data.attrs.get("report_output", ""))
     named = labels.index(wanted) if wanted in labels else 0
@@ -138,7 +138,7 @@ def peak_output(data: xr.Dataset, case: int) -> int:
 
 
 def of_largest_blade(data: xr.Dataset, case: int) -> bool:
-    """Whether the peak of a case is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+    """Return whether the peak of a case is that of the largest blade of a mistuned wheel."""
     if "blade_peak_amplitude" not in data or "largest_blade" not in data:
         return False
     each = data.sizes["output"] // data.sizes["blade"]
@@ -147,14 +147,14 @@ def of_largest_blade(data: xr.Dataset, case: int) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A case.
+    """One case of the dataset.
 
     Parameters
     ----------
     data
         The dataset of all cases.
     case
-        Position along ``case``.
+        Index along ``case``.
     """
 
     data: xr.Dataset
@@ -166,27 +166,27 @@ class Curve:
 
     @cached_property
     def at(self) -> IntArray:
-        """(n,) the points of the case along ``point``."""
+        """(n,) indices of the case's points along ``point``."""
         if "point_case" not in self.data:
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(self.data["point_case"].values == self.case)
 
     def floats(self, name: str) -> FloatArray:
-        """Return the (n,) values of a variable along ``point``; NaN where there is none."""
+        """Return (n,) values of a variable along ``point``; NaN if it is missing."""
         if not self.has(name):
             return np.full(self.at.size, np.nan)
         return np.asarray(self.data[name].values[self.at], dtype=float)
 
     def number(self, name: str) -> float:
-        """Return the value of a variable along ``case``; NaN where there is none."""
+        """Return the value of a variable along ``case``; NaN if it is missing."""
         return float(self.data[name].values[self.case]) if self.has(name) else float("nan")
 
     def text(self, name: str) -> str:
-        """Return the text of a variable along ``case``; empty where there is none."""
+        """Return the text of a variable along ``case``; empty if it is missing."""
         return str(self.data[name].values[self.case]) if self.has(name) else ""
 
     def texts(self, name: str) -> list[str]:
-        """Return the texts of a variable along ``point``; empty ones where there is none."""
+        """Return the texts of a variable along ``point``; empty if it is missing."""
         if not self.has(name):
             return [""] * self.at.size
         return [str(text) for text in self.data[name].values[self.at]]
@@ -198,7 +198,7 @@ class Curve:
 
     @cached_property
     def status(self) -> IntArray:
-        """(n,) how the solver ended."""
+        """(n,) status of the solver."""
         return np.nan_to_num(self.floats("status")).astype(np.int64)
 
     @cached_property
@@ -208,17 +208,17 @@ class Curve:
 
     @cached_property
     def branch(self) -> IntArray:
-        """Positions of the points in the order of the branch; those that resolve the peak and stand behind its end are left out."""
+        """Indices of the points in the order of the branch, without the peak refinements behind its end."""
         return np.arange(branch_length(self.floats("refinement")))
 
     @cached_property
     def output(self) -> str:
-        """Label of the output whose peak counts."""
+        """Label of the output with the peak."""
         return str(self.data["output"].values[peak_output(self.data, self.case)])
 
     @cached_property
     def amplitude(self) -> FloatArray:
-        """(n,) amplitude of that output, m; of the largest blade at each point where the largest of a mistuned wheel counts."""
+        """(n,) amplitude of that output, m; on a mistuned wheel of the largest blade at each point."""
         column, size = peak_output(self.data, self.case), self.data["amplitude"].values[self.at]
         if not of_largest_blade(self.data, self.case):
             return np.asarray(size[:, column])
@@ -227,14 +227,14 @@ class Curve:
 
     @cached_property
     def dissipation(self) -> FloatArray:
-        """(n,) energy that all contacts dissipate in a cycle, J; zero where the dataset does not say."""
+        """(n,) energy dissipated by all contacts in a cycle, J; zero if the dataset has none."""
         if not self.has("dissipated_energy"):
             return np.zeros(self.at.size)
         return np.asarray(np.nansum(self.data["dissipated_energy"].values[self.at], axis=1))
 
     @cached_property
     def elastic(self) -> float:
-        """Largest energy that the contacts store, J: beside it the rounding of `dissipation` is seen."""
+        """Largest energy stored by the contacts, J: a scale for the rounding of `dissipation`."""
         if not self.has("gap") or not self.has("contact_force"):
             return 0.0
         gap, force = (self.data[name].values[self.at, 1:] for name in ("gap", "contact_force"))
@@ -242,14 +242,14 @@ class Curve:
 
     @cached_property
     def peak(self) -> int:
-        """Position of the peak, -1 if there is none."""
+        """Index of the peak; -1 for none."""
         top = self.number("peak_point")
         found = np.flatnonzero(self.at == top)
         return int(found[0]) if found.size else -1
 
     @cached_property
     def hump(self) -> int:
-        """Position of the largest maximum inside the sweep, -1 if there is none that stands out on both sides."""
+        """Index of the largest maximum inside the sweep; -1 if none is distinct on both sides."""
         order = np.flatnonzero(self.converged & np.isfinite(self.amplitude))
         order = order[np.argsort(self.hz[order], kind="stable")]
         size = self.amplitude[order]
@@ -262,7 +262,7 @@ class Curve:
 
     @property
     def peak_hz(self) -> float:
-        """Frequency of the peak; NaN if there is none."""
+        """Frequency of the peak; NaN for none."""
         return float(self.hz[self.peak]) if self.peak >= 0 else float("nan")
 
     @cached_property
@@ -273,7 +273,7 @@ class Curve:
 
     @cached_property
     def kept(self) -> list[str]:
-        """The same as texts."""
+        """Harmonics of each point as text."""
         return [named(own) for own in self.supports]
 
     @cached_property
@@ -284,12 +284,12 @@ class Curve:
 
     @property
     def low(self) -> str:
-        """These as text."""
+        """Harmonics of the first passage as text."""
         return named(np.atleast_1d(self.data.attrs.get("low_harmonics", [0, 1])))
 
     @property
     def decides(self) -> bool:
-        """Whether anything chose the harmonics."""
+        """Whether the strategy chose the harmonics."""
         return bool(np.isfinite(self.data.attrs.get("selection_threshold", np.nan)))
 
     @property
@@ -299,7 +299,7 @@ class Curve:
 
     @cached_property
     def own_error(self) -> FloatArray:
-        """(n,) error predicted of each point's own solution, a fraction; NaN where it was not judged."""
+        """(n,) predicted error of each point's own solution, a fraction; NaN if not evaluated."""
         return self.floats("own_error_percent") / 100
 
     @property
@@ -309,17 +309,17 @@ class Curve:
 
     @cached_property
     def audit(self) -> FloatArray:
-        """(n,) difference from a solution with more harmonics, a fraction; NaN where none was made."""
+        """(n,) relative difference from a solution with more harmonics; NaN without an audit."""
         return self.floats("audit_error_percent") / 100
 
     @cached_property
     def reference(self) -> FloatArray:
-        """(n,) change that the judging set of the most harmonics is predicted to make, a fraction; NaN where it was not asked for."""
+        """(n,) predicted relative change by the largest judging set; NaN if not asked for."""
         return self.floats("reference_error_percent") / 100
 
     @cached_property
     def unstable(self) -> IntArray:
-        """Positions of points whose motion is known to be unstable."""
+        """Indices of points known to be unstable."""
         off = self.floats("motion_stability") == UNSTABLE
         for point, row in self.examined("stability_verdict"):
             off[point] |= str(row["stability_verdict"]) == "unstable"
@@ -327,7 +327,7 @@ class Curve:
 
     @cached_property
     def sure(self) -> BoolArray:
-        """(n,) whether a point is known to be stable, and its harmonics to be enough: by an audit, else by prediction, or by a motion in time."""
+        """(n,) whether a point is known to be stable with enough harmonics, by an audit, a prediction or a time integration."""
         error = np.where(np.isnan(self.audit), self.own_error, self.audit)
         return np.asarray(
             (self.floats("motion_stability") == MOTION["stable"]) & (self.attained | (error <= self.limit))
@@ -335,13 +335,13 @@ class Curve:
 
     @cached_property
     def known(self) -> frozenset[int]:
-        """Positions of points whose stability follows from others, whatever their own multipliers leave open."""
+        """Indices of points whose stability is inferred from others, even if their own multipliers leave it open."""
         carried = self.floats("motion_stability_basis") == CARRIED
         return frozenset(np.flatnonzero(carried).tolist())
 
     @property
     def peak_stability(self) -> str:
-        """What is known of the stability of the peak, in a word; of files that hold rows of examined points alone what its row says."""
+        """Stability of the peak in one word; in older files from the row of the examined point."""
         rows = [row for point, row in self.examined("stability_verdict") if point == self.peak]
         known = [str(row["stability_verdict"]) for row in rows]
         word = self.floats("motion_stability")[self.peak] if self.peak >= 0 else np.nan
@@ -355,7 +355,7 @@ class Curve:
 
     @property
     def forward(self) -> float:
-        """1 where the frequencies were asked for upwards, -1 downwards."""
+        """1 for an upward sweep, -1 for a downward one."""
         return -1.0 if self.data.attrs.get("direction", "up") == "down" else 1.0
 
     @property
@@ -365,45 +365,45 @@ class Curve:
 
     @property
     def cap(self) -> int:
-        """Highest harmonic that the response might keep."""
+        """Highest harmonic allowed in the response."""
         return int(self.data.attrs.get("high_order", max(s[-1] for s in self.supports)))
 
     @property
     def stepped(self) -> bool:
-        """Whether frequencies were given, instead of a branch followed."""
+        """Whether the frequencies were listed; no branch is followed then."""
         return bool(self.data.attrs.get("stepped", 0))
 
     @property
     def outside(self) -> bool:
-        """Whether the peak lies beyond the frequencies that were asked for, where a branch goes round a fold."""
+        """Whether the peak lies outside the requested frequencies, where a branch turns round a fold."""
         low, high = self.number("lowest_hz"), self.number("highest_hz")
         return bool(self.peak_hz < low * (1 - FREQUENCY_RTOL) or self.peak_hz > high * (1 + FREQUENCY_RTOL))
 
     @property
     def at_the_end(self) -> bool:
-        """Whether the peak is the end of the sweep, or the last point that was found there."""
+        """Whether the peak is at the end of the sweep, or at the last point found."""
         ends = [self.hz.min(), self.hz.max(), self.number("lowest_hz"), self.number("highest_hz")]
         return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= FREQUENCY_RTOL * self.peak_hz))
 
     @property
     def range_key(self) -> str:
-        """Key of the study that says where the response is."""
+        """Key of the study for the range of the response."""
         known = "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
         return str(self.data.attrs.get("range_key", known))
 
     @property
     def nearer(self) -> str:
-        """What gives more points."""
+        """Keys that give more points."""
         listed = self.range_key == "frequencies_hz"
         return "nearer forced_response.frequencies_hz" if listed else "more forced_response.points"
 
     def examined(self, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield the points that a check looked at, with what its row says.
+        """Yield the points of a check, each with its row.
 
         Parameters
         ----------
         name
-            A variable of the check, such as ``verify_settled``: the first word begins the names of all.
+            A variable of the check, such as ``verify_settled``; all its variables begin with the same word.
         """
         yield from self._looked_at.get(name.partition("_")[0], ()) if self.has(name) else ()
 
@@ -424,7 +424,7 @@ class Curve:
                 yield point, said
 
     def rows(self, word: str) -> Iterator[dict[str, Any]]:
-        """Yield what is told of the case along the dimension `word`, whose variables begin with it."""
+        """Yield the rows of the case along the dimension `word`, from the variables whose names begin with it."""
         if f"{word}_case" not in self.data:
             return
         own = self.data[f"{word}_case"].dims
@@ -434,17 +434,17 @@ class Curve:
 
     @cached_property
     def attained(self) -> BoolArray:
-        """(n,) whether a time integration settled to the same amplitude, and to the same outputs within the error that is tolerated."""
+        """(n,) whether a time integration settled to the same amplitude and, within the tolerated error, to the same outputs."""
         near = [abs(off) <= self.allowed_in_time(i) for i, off in enumerate(self.integrated)]
         return np.array(near, dtype=bool) & ~(self.outputs_off > self.limit)
 
     def allowed_in_time(self, point: int) -> float:
-        """Return the difference from a time integration up to which a point stands, percent: of the peak `ATTAINED`, of others the error that is tolerated."""
+        """Return the tolerated difference from a time integration, percent: `ATTAINED` at the peak, else the tolerated error."""
         return ATTAINED if point == self.peak else 100 * self.limit
 
     @cached_property
     def left_out(self) -> tuple[int, float, float] | None:
-        """Of the peak the largest harmonic that its amplitude leaves out, the mean apart, its share of half of peak to peak, and that, m; None where none is."""
+        """The largest harmonic at the peak outside its amplitude (mean excluded), its ratio to half of peak to peak, and that value, m; None for none."""
         if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has("output_displacement"):
             return None
         parts = self.data["output_displacement"].values[self.at[self.peak]]
@@ -460,7 +460,7 @@ class Curve:
 
     @cached_property
     def outputs_off(self) -> FloatArray:
-        """(n,) largest difference of an output from a time integration that attains the motion, with its phase, a fraction; NaN where none was taken."""
+        """(n,) largest relative difference of an output, phase included, from a time integration that attains the motion; NaN without one."""
         found = np.full(self.at.size, np.nan)
         for point, said in self.examined("verify_difference_percent"):
             if motion_of(said) == "attained":
@@ -469,7 +469,7 @@ class Curve:
 
     @cached_property
     def integrated(self) -> FloatArray:
-        """(n,) difference from a time integration that attains the motion, percent; NaN where none did."""
+        """(n,) difference from a time integration that attains the motion, percent; NaN without one."""
         found = np.full(self.at.size, np.nan)
         for point, said in self.examined("verify_difference_percent"):
             if motion_of(said) == "attained":

@@ -22,18 +22,18 @@ IN_TIME = "--verify integrates in time at the peak"
 
 @dataclass(frozen=True)
 class Finding:
-    """What a rule finds.
+    """A finding of a rule.
 
     Parameters
     ----------
     level, why, remedy
-        As of a `Verdict`; ``trusted`` is told without doubt.
+        As in `Verdict`; a ``trusted`` finding is a note without doubt.
     points
-        Positions of its points within the case; none: the case as a whole.
+        Indices of its points in the case; none: the case as a whole.
     size
-        Of several findings of a rule the largest stands for all.
+        Rank among several findings of a rule; the largest is shown for all.
     value
-        Its size as text, where a sentence about several points tells the largest.
+        The size as text, for a sentence about several points.
     """
 
     level: Level
@@ -48,14 +48,14 @@ Rule = Callable[[Curve], Iterator[Finding]]
 
 
 def in_time_there(case: Curve, point: int) -> str:
-    """Say how a point is integrated in time: of a sweep it is the peak that is."""
+    """Say how to integrate in time at a point; in a sweep ``--verify`` integrates only at the peak."""
     if point == case.peak or case.range_key == "speed_rpm":
         return IN_TIME
     return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
 
 
 def without_place(sentence: str) -> str:
-    """Return the sentence of a check without the frequency at its head, which a verdict names itself, and without its full stop."""
+    """Return the sentence of a check without the leading frequency, which the verdict states itself, and without its full stop."""
     head, found, rest = sentence.partition(" Hz: ")
     return (rest if found and head.replace(".", "").isdigit() else sentence).removesuffix(".")
 
@@ -71,7 +71,7 @@ IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdi
 
 
 def stability(case: Curve) -> Iterator[Finding]:
-    """Doubt what the multipliers leave open, and take no unstable motion for a peak; an unstable stretch of the branch is an answer."""
+    """Doubt a peak with undecided multipliers, and reject an unstable motion as peak; an unstable range elsewhere is an answer."""
     for point, said in case.examined("stability_verdict"):
         word, why = said["stability_verdict"], without_place(said["stability_sentence"])
         why = why.removesuffix(IN_TIME_TELLS)
@@ -91,7 +91,7 @@ def stability(case: Curve) -> Iterator[Finding]:
 
 
 def unstable_stretches(case: Curve) -> Iterator[Finding]:
-    """Tell where the branch is unstable, and what larger motion is: neither marks the case."""
+    """Report unstable ranges of the branch and larger unstable motions; neither affects the level of the case."""
     off = case.unstable
     larger, hz = case.number("unstable_peak_amplitude"), case.number("unstable_peak_frequency_hz")
     if np.isfinite(larger):
@@ -109,7 +109,7 @@ def unstable_stretches(case: Curve) -> Iterator[Finding]:
 
 
 def bifurcated(case: Curve) -> Iterator[Finding]:
-    """Tell where the branch loses its stability."""
+    """Report the loss of stability at bifurcations of the branch."""
     unjudged = case.floats("motion_stability") == UNDECIDED
     if unjudged.any() and case.has("bifurcations_limits"):
         judged = np.isin(case.floats("motion_stability"), (0, 1, UNDECIDED))
@@ -131,7 +131,7 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
 
 
 def fewer(sentence: str) -> str:
-    """Return what to do where a model has too many coordinates to be integrated in time, which no more time helps; empty where it has not."""
+    """Return the remedy for a model with too many coordinates for time integration; empty for smaller ones."""
     if f"coordinates {TOO_MANY} {MOST_IN_TIME}" not in sentence:
         return ""
     return OPEN if ALONE in sentence else FEWER
@@ -147,13 +147,13 @@ LARGEST_SLIP_FACETS = 0.5  # of a facet: contact points stay opposite each other
 
 
 def physics(case: Curve) -> Iterator[Finding]:
-    """Return what the modes say of the physics of the case."""
+    """Return the findings of the job about modes and loads."""
     for v in from_json(case.text("physics_verdicts") or "[]"):
         yield Finding(v.level, v.why, v.remedy)
 
 
 def small_motions(case: Curve) -> Iterator[Finding]:
-    """Doubt motions that linear kinematics does not describe."""
+    """Doubt motions too large for linear kinematics."""
     rotation, strain, slip = (case.number(f"peak_{name}") for name in ("rotation_rad", "strain_rms", "slip_facets"))
     told = [f"a part turns by {rotation:.2g} rad, more than {LARGEST_ROTATION_RAD:g}"] * bool(
         rotation > LARGEST_ROTATION_RAD
@@ -173,7 +173,7 @@ def small_motions(case: Curve) -> Iterator[Finding]:
 
 
 def model_itself(case: Curve) -> Iterator[Finding]:
-    """Doubt a peak that more modes, or fewer contact points, would move by more than the threshold."""
+    """Doubt a peak that changes by more than the threshold with more modes or fewer contact points."""
     for name, what, remedy in (
         ("modes", "with half again as many modes in the reduction", "Keep more modes ([reduction] modes)."),
         (
@@ -189,7 +189,7 @@ def model_itself(case: Curve) -> Iterator[Finding]:
 
 
 def other_motions(case: Curve) -> Iterator[Finding]:
-    """Tell of motions beside that of the response; doubt a peak that one of them is larger than."""
+    """Report other motions at the peak; doubt the peak if one of them is larger."""
     for said in case.rows("another"):
         size, hz = float(said["another_amplitude"]), float(said["another_frequency_hz"])
         larger = size > (1.0 + LARGER) * float(np.nan_to_num(case.number("peak_amplitude")))
@@ -208,7 +208,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
 
 
 def contact_stiffness(case: Curve) -> Iterator[Finding]:
-    """Tell of a peak that contacts a tenth softer would move by more than `DECIDED`: no doubt, the number is only as good as its stiffness."""
+    """Note a peak that changes by more than `DECIDED` with contacts 10 % softer; its accuracy is that of the contact stiffness."""
     if abs(SOFTER * case.number("stiffness_peak_slope")) > DECIDED:
         yield Finding(
             "trusted",
@@ -229,7 +229,7 @@ def _softer(case: Curve) -> str:
 
 
 def told_of_model(case: Curve) -> list[str]:
-    """Return what the modes, the contact points and the contact stiffness of a model change at a peak that is trusted."""
+    """Return the changes of a trusted peak by modes, contact points and contact stiffness."""
     told = []
     for name, what in (("modes", "half again as many modes"), ("points", "half the contact points")):
         change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))
@@ -246,7 +246,7 @@ STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid 
 
 
 def unsolved(case: Curve) -> Iterator[Finding]:
-    """Take no point that did not converge for one, and doubt a peak that is only the largest of the others."""
+    """Mark unconverged points as wrong, and doubt a peak found among the remaining points."""
     lost = np.flatnonzero(~case.converged)
     if lost.size == case.hz.size:
         remedy = "See run.log for what stopped them, and the size of the loads."
@@ -268,7 +268,7 @@ def unsolved(case: Curve) -> Iterator[Finding]:
 
 
 def few_harmonics(case: Curve) -> Iterator[Finding]:
-    """Doubt a solution whose own harmonics are predicted to be too few, and one that nothing has judged."""
+    """Doubt a solution with too large a predicted error, and one that nothing has judged."""
     for i in np.flatnonzero(case.converged):
         own, solved = case.own_error[i], case.audit[i]
         if case.attained[i] or not np.isnan(solved):
@@ -318,7 +318,7 @@ def _examination(case: Curve) -> str:
 
 
 def audited(case: Curve) -> Iterator[Finding]:
-    """Doubt a solution that more harmonics changed, and that stands all the same."""
+    """Doubt an accepted solution that changed with more harmonics."""
     of = case.texts("audit_error_of")
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
@@ -329,7 +329,7 @@ def audited(case: Curve) -> Iterator[Finding]:
 
 
 def not_audited(case: Curve) -> Iterator[Finding]:
-    """Doubt a peak whose few harmonics were accepted by predictions alone; tell of such points elsewhere."""
+    """Doubt a peak with few harmonics that rests on predictions alone; note such points elsewhere."""
     few = case.converged & case.few & ~case.exact
     none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
     if not none or not case.decides or not few.any() or case.attained[case.peak]:
@@ -347,7 +347,7 @@ def not_audited(case: Curve) -> Iterator[Finding]:
 
 
 def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
-    """Doubt what --verify-harmonics predicts to change."""
+    """Doubt points whose predicted change by --verify-harmonics is too large."""
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
             why = (
@@ -360,7 +360,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
 
 
 def on_other_motions(case: Curve) -> Iterator[Finding]:
-    """Tell of neighbours of a branch that stand on different motions; doubt them at the peak, and where either is not known to be one: stable, its harmonics enough."""
+    """Note neighbouring points on different motions; doubt them at the peak, and if either is not known to be stable with enough harmonics."""
     at = case.branch[case.converged[case.branch]]
     if case.stepped or at.size < 2:  # between given frequencies any growth is possible
         return
@@ -378,7 +378,7 @@ def on_other_motions(case: Curve) -> Iterator[Finding]:
 
 
 def folds(case: Curve) -> Iterator[Finding]:
-    """Tell of a branch that runs backwards: several motions at a frequency; doubt a peak among them."""
+    """Note folds of the branch, with several motions at one frequency; doubt a peak among them."""
     hz = case.hz[case.branch]
     back = [sorted(pair) for pair in pairwise(hz) if case.forward * (pair[1] - pair[0]) < 0]
     if not back:
@@ -398,7 +398,7 @@ def folds(case: Curve) -> Iterator[Finding]:
 
 
 def in_time(case: Curve) -> Iterator[Finding]:
-    """Judge by time integration."""
+    """Judge points by time integration."""
     for point, said in case.examined("verify_difference_percent"):
         motion, off = motion_of(said), float(said["verify_difference_percent"])
         wanders = 100 * float(said.get("verify_scatter", np.inf))
@@ -435,7 +435,7 @@ def _difference_text(percent: float) -> str:
 
 
 def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
-    """Tell of harmonics at the peak that the amplitude does not hold, where they count in its extreme value."""
+    """Note harmonics at the peak that are not part of the amplitude but matter in its extreme value."""
     if case.peak < 0 or case.left_out is None:
         return
     harmonic, share, whole = case.left_out
@@ -450,7 +450,7 @@ def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
 
 
 def not_periodic(case: Curve) -> Iterator[Finding]:
-    """Tell what a motion in time is like where no balance stands for it: a doubt of that point, which is one of the case where it is the peak."""
+    """Report the motion in time at points without a valid balance solution: a doubt of the point, and at the peak of the case."""
     for said in case.rows("not_periodic"):
         hz, sentence = float(said["not_periodic_frequency_hz"]), str(said["not_periodic_sentence"])
         why, off = without_place(sentence), np.abs(case.hz - hz)
@@ -466,7 +466,7 @@ def not_periodic(case: Curve) -> Iterator[Finding]:
 
 
 def at_the_end(case: Curve) -> Iterator[Finding]:
-    """Doubt a largest amplitude that is no resonance, or none at all."""
+    """Doubt a largest amplitude that is no resonance, or that is missing."""
     if case.peak < 0:
         return
     if case.amplitude[case.peak] < STUCK * case.number("excitation_n"):
@@ -493,7 +493,7 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
 
 
 def retention(case: Curve) -> Iterator[Finding]:
-    """Doubt a peak that hangs on what is not physical."""
+    """Doubt a peak that depends on the retention stiffness, which is not physical."""
     shift = case.number("retention_peak_shift")
     if abs(shift) > LARGE_SHIFT:
         why = (
@@ -505,7 +505,7 @@ def retention(case: Curve) -> Iterator[Finding]:
 
 
 def known_to_the_job(case: Curve) -> Iterator[Finding]:
-    """Return what only the model knew."""
+    """Return the verdicts that the job stored because they need the model."""
     for v in from_json(case.text("known_verdicts") or "[]"):
         yield Finding(v.level, v.why, v.remedy)
 

@@ -1,4 +1,4 @@
-"""The working range of the friction: the ends of an optimisation curve, from its peaks and the contacts, and in words."""
+"""The working range of the friction along an optimisation curve: its limits from peaks and contact states, and its description."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -43,16 +43,16 @@ SETTINGS = (
 
 @dataclass(frozen=True)
 class ContactsAtPeak:
-    """What the contacts do in the cycle of a peak.
+    """Contact states in the cycle of a peak.
 
     Parameters
     ----------
     sticking
-        Share of the cycle that they stick, the mean over all.
+        Fraction of the cycle in stick, averaged over all contacts.
     linear
-        Whether none slips, none opens or closes, and they dissipate nothing: the peak is that of a linear system.
+        Whether no contact slips, opens or closes, and none dissipates: the peak is that of a linear system.
     holding
-        Whether any sticks from the beginning of the cycle to its end.
+        Whether any contact sticks during the whole cycle.
     """
 
     sticking: float
@@ -61,7 +61,7 @@ class ContactsAtPeak:
 
 
 def contacts_at_peak(state: IntArray) -> ContactsAtPeak:
-    """Return what contacts do whose states over a cycle, (contact, tangent, sample), are 0 stick, 1 slip or 2 open."""
+    """Return the contact states of a peak from states (contact, tangent, sample): 0 stick, 1 slip, 2 open."""
     slips, opens = (np.any(state == s, axis=1) for s in (SLIP, OPEN))
     stays = ~np.any(slips | opens, axis=1)
     shut = np.all(opens, axis=1)
@@ -79,21 +79,21 @@ class CurvePeak:
     Parameters
     ----------
     value
-        Of the varied key.
+        Value of the varied key.
     size
-        Largest amplitude, over the force where every case has one; m or m/N.
+        Largest amplitude, divided by the force if every case has one; m or m/N.
     hertz
-        Its frequency.
+        Frequency of the peak, Hz.
     contacts
-        What they do there.
+        Contact states at the peak.
     amplitude
-        The largest amplitude itself, m.
+        Largest amplitude, m.
     loss
-        Energy that the contacts dissipate in a cycle of it, J; zero where it is rounding, NaN where it is not known.
+        Energy dissipated by the contacts in a cycle, J; zero for rounding, NaN if unknown.
     case
-        Position along ``case``.
+        Index along ``case``.
     force
-        Amplitude of the excitation, N; NaN where it is not known.
+        Amplitude of the excitation, N; NaN if unknown.
     """
 
     value: float
@@ -113,18 +113,18 @@ class WorkingRange:
     Parameters
     ----------
     peaks
-        From the end where contacts stick to the other; by rising values where that end is not known.
+        Peaks from the end at which contacts stick to the other end; by rising values if that end is unknown.
     regimes
-        One a peak, none where it is not known at which end contacts stick: ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak; ``works``: more; ``lets go``: on the other
-        side of the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
+        One for each peak, none if the stuck end is unknown. ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak;
+        ``works``: more; ``lets go``: beyond the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
     key
-        What is varied.
+        Varied key.
     others
-        Values of what else is varied; empty where nothing is.
+        Values of the other varied keys; empty for none.
     per_force
-        Whether sizes are over the force.
+        Whether sizes are divided by the force.
     left_out
-        Labels of cases whose largest amplitude is no peak to judge by.
+        Labels of cases whose largest amplitude is no valid peak.
     """
 
     peaks: tuple[CurvePeak, ...]
@@ -136,23 +136,23 @@ class WorkingRange:
 
     @property
     def judged(self) -> bool:
-        """Whether it is known at which end contacts stick."""
+        """Whether the end at which contacts stick is known."""
         return bool(self.regimes)
 
     def of(self, *regimes: Regime) -> list[CurvePeak]:
-        """Return the peaks of some regimes, from the stuck end on."""
+        """Return the peaks in some regimes, from the stuck end on."""
         return [p for p, own in zip(self.peaks, self.regimes, strict=True) if own in regimes]
 
     @property
     def stretches(self) -> list[list[CurvePeak]]:
-        """Neighbours at which friction works."""
+        """Runs of neighbouring peaks at which friction works."""
         pairs = zip(self.peaks, self.regimes, strict=True)
         runs = groupby(pairs, key=lambda pair: pair[1])
         return [[p for p, _ in run] for regime, run in runs if regime == "works"]
 
     @property
     def loose(self) -> list[CurvePeak]:
-        """The last peaks, beyond the last one at which friction works; empty where it works to the end or nowhere lets go."""
+        """Peaks beyond the working range; empty if friction works to the end or contacts never let go."""
         backwards = zip(self.peaks[::-1], self.regimes[::-1], strict=True)
         gone = takewhile(lambda pair: pair[1] == "lets go", backwards)
         return [p for p, _ in gone][::-1]
@@ -164,18 +164,18 @@ class WorkingRange:
 
     @property
     def stuck(self) -> CurvePeak | None:
-        """The stuck peak next to the first slip; None where no value was computed at which all contacts stick."""
+        """The stuck peak next to the first slip; None if no computed value has all contacts stuck."""
         own = self.of("stuck")
         return own[-1] if own else None
 
     @property
     def falling(self) -> bool:
-        """Whether the stuck end is that of large values."""
+        """Whether contacts stick at large values."""
         return self.peaks[0].value > self.peaks[-1].value
 
 
 def regimes_of(peaks: Sequence[CurvePeak]) -> tuple[Regime, ...]:
-    """Return the regime of each peak of a curve that begins at the end where contacts stick."""
+    """Return the regime of each peak of a curve that begins at the stuck end."""
     first = next((i for i, p in enumerate(peaks) if not p.contacts.linear), len(peaks))
     best = int(np.argmin([p.size for p in peaks]))
     least = peaks[best].size
@@ -193,10 +193,10 @@ def regimes_of(peaks: Sequence[CurvePeak]) -> tuple[Regime, ...]:
 
 
 def sticks_at(peaks: Sequence[CurvePeak], key: str = "") -> Literal["low", "high"] | None:
-    """Return at which end of a curve of rising values contacts stick; None where it cannot be told.
+    """Return the end of a curve of rising values at which contacts stick; None if unknown.
 
-    The peak of a linear system tells it, with contacts that stick at one end or none that touches at the other; then the meaning of
-    the varied key; at last `_by_contacts`.
+    Evidence in this order: a linear peak, with all contacts stuck at one end or all open at the other; the meaning of
+    the varied key; `_by_contacts`.
     """
     low, high = peaks[0], peaks[-1]
     stuck = [p.contacts.linear and p.contacts.sticking > 0.0 for p in (low, high)]
@@ -233,7 +233,7 @@ def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | No
 
 
 def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | None:
-    """Put a curve over a key in order and judge it; None where there are too few peaks, or no friction."""
+    """Sort a curve over a key and judge it; None if there are too few peaks, or no friction."""
     rising = sorted(peaks, key=lambda p: p.value)
     if len(rising) < MIN_PEAKS or all(p.contacts.linear or p.loss == 0.0 for p in rising):
         return None
@@ -245,7 +245,7 @@ def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | N
 
 
 def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
-    """Return the curves of a forced response over the first varied number, one for each set of other values."""
+    """Return the curves of a forced response over the first varied number, one for each combination of the other values."""
     key, values = first_varied_number(data)
     if not key or key.split(".")[0] in SETTINGS or "peak_state" not in data:
         return ()
@@ -291,7 +291,7 @@ def _loss(curve: Curve) -> float:
 
 
 def with_regimes(data: xr.Dataset) -> xr.Dataset:
-    """Return the dataset of a forced response with the regime of each case, -1 where it was not judged."""
+    """Return the dataset of a forced response with the regime of each case; -1 if not judged."""
     ranges = [own for own in working_ranges(data) if own.judged]
     if not ranges:
         return data
@@ -309,12 +309,12 @@ TITLE = "Where friction works"
 
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:
-    """Say of each curve of a forced response where friction works; nothing where nothing can be judged."""
+    """State the working range of each curve of a forced response; empty if none can be judged."""
     return tuple(said(own.others, text) for own in working_ranges(data) for text in range_sentences(own))
 
 
 def range_sentences(own: WorkingRange) -> tuple[str, ...]:
-    """Say where all contacts stick, where friction works and where it lets go; and which cases were left out."""
+    """State the values at which contacts stick, friction works and contacts let go, and the cases left out."""
     told = [_stuck_end(own), _middle(own), _loose_end(own)] if own.judged else [_unknown(own)]
     if own.left_out:
         them = "; ".join(own.left_out)

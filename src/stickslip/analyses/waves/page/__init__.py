@@ -1,1 +1,1 @@
-"""What a page shows of waves: modes, Campbell diagrams, flutter, safe speeds."""
+"""Waves on the page: modes, Campbell diagrams, flutter, safe speeds."""

@@ -1,4 +1,4 @@
-"""The Campbell diagram: frequencies over speed, engine-order lines, and where they meet."""
+"""The Campbell diagram: frequencies over speed, engine-order lines, and their crossings."""
 
 import numpy as np
 import plotly.graph_objects as go
@@ -127,7 +127,7 @@ def _not_shown(view: Waves, top: float) -> str:
 
 
 def campbell_diagram(view: Waves) -> Plot:
-    """Show frequencies against speed with engine-order lines and the crossings that can be excited."""
+    """Draw frequencies against speed with engine-order lines and the crossings of modes that they excite."""
     hz, rpm = view.floats("frequency_hz"), view.floats("speed_rpm")
     top = 1.06 * float(hz[np.isfinite(hz)].max())
     figure = go.Figure([*_orders(view, top), *_branches(view)])

@@ -14,7 +14,7 @@ _PERCENT = 100.0
 
 
 def least_stable_diagram(view: Waves) -> Plot:
-    """Show the damping of each mode over the inter-blade phase angle."""
+    """Draw the damping of each mode over the inter-blade phase angle."""
     angle, names = view.floats("phase_angle_deg"), view.waves
     energy, eigen, total = (_PERCENT * view.floats(name) for name in _NEEDED[2:])
     figure = go.Figure()
@@ -74,7 +74,7 @@ def least_stable_diagram(view: Waves) -> Plot:
 
 
 def margins(view: Waves) -> Table:
-    """Return the damping of each wave: a row a wave and mode, by phase angle."""
+    """Return a table of the damping of each wave: one row a wave and mode, by phase angle."""
     hz, angle = view.floats("frequency_hz"), view.floats("phase_angle_deg")
     shares = [_PERCENT * view.floats(name) for name in _NEEDED[2:]]
     flow = view.floats("frequency_in_flow_hz")
@@ -109,7 +109,7 @@ def margins(view: Waves) -> Table:
 
 
 def mistuned(view: Waves) -> Words | None:
-    """Return what becomes of the wheel whose sectors differ."""
+    """Return the modes of the mistuned wheel in the flow."""
     if not view.has("wheel_damping"):
         return None
     damping, hertz = _PERCENT * view.floats("wheel_damping"), view.floats("wheel_frequency_hz")

@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes on the page, those of a wheel whose sectors differ among them."""
+"""Natural frequencies and mode shapes on the page, including those of a mistuned wheel."""
 
 import numpy as np
 import plotly.graph_objects as go
@@ -13,7 +13,7 @@ from stickslip.report.section import Block, Card, Section
 
 
 def modes_of_wheel(view: Waves) -> Plot | None:
-    """Draw the localisation of each mode, and its shares of the blades and of the waves."""
+    """Draw the localisation of each mode, and its distribution over blades and waves."""
     if not view.has("mistuned_hz", "sector_share", "wave_share"):
         return None
     hertz, blades = view.floats("mistuned_hz"), view.floats("sector_share")
@@ -70,7 +70,7 @@ def modes_of_wheel(view: Waves) -> Plot | None:
 
 
 def diameter_map(view: Waves) -> Plot:
-    """Show the frequencies over the nodal diameters."""
+    """Draw the frequencies over the nodal diameters."""
     figure = go.Figure(mode_lines(view))
     reference = ""
     if view.has("reference_hz"):
@@ -100,7 +100,7 @@ def diameter_map(view: Waves) -> Plot:
 
 
 def frequencies(view: Waves) -> list[Table]:
-    """Return the natural frequencies: a row a wave, a column a mode."""
+    """Return a table of the natural frequencies: one row a wave, one column a mode."""
     hz = view.floats("frequency_hz")
     head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
     # where nothing parts the directions, both have the frequencies
@@ -119,7 +119,7 @@ def frequencies(view: Waves) -> list[Table]:
 
 
 def in_flow(view: Waves) -> Table | None:
-    """Return frequencies and damping ratios with aerodynamic forces, a row a wave."""
+    """Return a table of frequencies and damping ratios with aerodynamic forces, one row a wave."""
     if not view.has("damped_hz", "damping"):
         return None
     hz, damping = view.floats("damped_hz"), 100 * view.floats("damping")
@@ -133,7 +133,7 @@ def in_flow(view: Waves) -> Table | None:
 
 
 def stage_shares(view: Waves) -> Plot | None:
-    """Show which stage takes part in which mode, as bars that add up to one."""
+    """Draw the energy share of each stage in each mode, as bars that add up to one."""
     if not view.has("stage_share"):
         return None
     share = view.floats("stage_share")
@@ -168,7 +168,7 @@ def stage_shares(view: Waves) -> Plot | None:
 
 
 def comparison(view: Waves) -> Table | Words | None:
-    """Return the relative differences from the reference, a row a wave."""
+    """Return a table of relative differences from the reference, one row a wave."""
     if not view.has("difference"):
         return None
     title, off = "Against the reference", view.floats("difference")

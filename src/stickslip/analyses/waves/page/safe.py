@@ -19,11 +19,11 @@ def zigzag(highest_hz: float, sectors: int, hertz: float) -> tuple[FloatArray, F
     Parameters
     ----------
     highest_hz
-        Where the line may end.
+        Upper end of the line, Hz.
     sectors
-        Of the wheel.
+        Number of sectors.
     hertz
-        Revolutions a second.
+        Speed in revolutions a second.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def zigzag(highest_hz: float, sectors: int, hertz: float) -> tuple[FloatArray, F
 
 
 def safe_diagram(view: Waves) -> Plot:
-    """Show what engine orders excite at a speed: the interference or SAFE diagram."""
+    """Draw the interference or SAFE diagram: the modes that engine orders excite at a speed."""
     hertz, sectors = view.scalar("speed_rpm") / 60, view.sectors
     orders = np.unique(view.integers("pair_engine_order"))
     figure = go.Figure(mode_lines(view))
@@ -134,7 +134,7 @@ def _near(view: Waves, near: np.ndarray) -> go.Scatter:
 
 
 def interference(view: Waves) -> Table:
-    """Return the pairs of engine order and mode, the nearest first."""
+    """Return a table of pairs of engine order and mode, the nearest first."""
     margin, near = view.floats("pair_margin"), view.integers("pair_near")
     order, wave, mode = (view.integers(f"pair_{name}") for name in ("engine_order", "wave", "mode"))
     own, excitation = view.floats("pair_frequency_hz"), view.floats("pair_excitation_hz")

@@ -1,4 +1,4 @@
-"""Modes, Campbell and SAFE diagrams as figures and tables see them: frequencies by travelling wave, and over nodal diameters."""
+"""The dataset of an analysis by waves with the accesses that figures and tables need: frequencies by travelling wave and nodal diameter."""
 
 from dataclasses import dataclass
 
@@ -22,12 +22,12 @@ class Waves(Node):
 
     @property
     def kinds(self) -> list[str]:
-        """Of each wave: standing, forward, backward or whole."""
+        """Kind of each wave: standing, forward, backward or whole."""
         return [str(kind) for kind in self.data["wave_kind"].values]
 
     @property
     def waves(self) -> tuple[str, ...]:
-        """Names of the waves, such as ``ND 3`` or ``ND 3 forward`` where both directions are there."""
+        """Names of the waves, such as ``ND 3``, or ``ND 3 forward`` if both directions are present."""
         diameters = self.integers("nodal_diameter")
         if self.sectors == 1:
             return ("whole structure",) * len(diameters)
@@ -44,7 +44,7 @@ class Waves(Node):
 
 
 def mode_lines(view: Waves) -> list[go.Scatter]:
-    """One line a mode over the nodal diameters, each travelling direction for itself."""
+    """Draw one line a mode over the nodal diameters, separately for each travelling direction."""
     hz = view.floats("frequency_hz")
     diameter, kinds = view.integers("nodal_diameter"), view.data["wave_kind"].values
     names = np.array(view.waves)

@@ -1,4 +1,4 @@
-"""The model in the results: mass, size, axis, effects of rotation, skin for pictures."""
+"""The model in the results: mass, size, axis, effects of rotation, skin for drawings."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -54,13 +54,13 @@ def about(
     model
         The model.
     contacts
-        What its contacts do.
+        State of its contacts: stuck, sliding or open.
     rpm
         Speed of the rotor; NaN for a range.
     highest
-        Speed at which the static displacement is told, rad/s.
+        Speed of the reported static displacement, rad/s.
     more
-        What else is said.
+        Additional entries of the note.
     """
     state = model.static_state(highest)
     doubts = static_doubts(state, contacts=bool(model.contacts))
@@ -80,7 +80,7 @@ def _static(state: StaticState | None) -> dict[str, float]:
 
 
 def skin_note(model: Model) -> dict[str, Any]:
-    """Return the note about the skin, for mode shapes."""
+    """Return the note about the skin, for drawings of mode shapes."""
     skin = model.skin
     assert skin is not None
     return {"skin_point": skin.points, "skin_triangle": skin.triangles, "skin_cut": skin.cut}

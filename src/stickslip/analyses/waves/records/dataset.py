@@ -27,7 +27,7 @@ def dataset(solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variable
     solved
         The cases.
     of_case
-        Returns the variables of a case beside those of its model and waves, and what the user should know.
+        Returns the variables of a case beside those of its model and waves, and its verdicts.
     """
     cases = []
     doubts: list[Verdict] = []

@@ -31,21 +31,21 @@ class WaveModes:
     Parameters
     ----------
     wave_number
-        Of the wave.
+        Wave number.
     frequencies_hz
-        (m,) ascending.
+        (m,) ascending, Hz.
     shapes
         (m, n, 3) complex displacements of the skin's points, the largest of length 1; n = 0 if not asked for.
     growth
-        (m,) derivatives of ω² by Ω² at the speed; zeros for a model that no speed changes.
+        (m,) derivatives of ω² with respect to Ω² at the speed; zeros for a model that does not depend on speed.
     seconds
         Time of the computation.
     in_flow
-        (m,) eigenvalues with aerodynamic forces and the structure's damping, 1/s; none where the model has no such forces.
+        (m,) eigenvalues with aerodynamic forces and structural damping, 1/s; empty for a model without such forces.
     shares
-        (stages, m) of each stage in the kinetic energy; none where there is one wheel.
+        (stages, m) share of each stage in the kinetic energy; empty for a single wheel.
     stiffest_hz
-        (m,) frequencies with all harmonics held that flanges do not couple; none where there is one wheel.
+        (m,) frequencies, Hz, with all harmonics fixed that the flanges do not couple; empty for a single wheel.
     """
 
     wave_number: int
@@ -60,20 +60,20 @@ class WaveModes:
 
 @dataclass(frozen=True, eq=False)
 class WaveBranches:
-    """Frequencies of one travelling wave against speed, and where engine orders cross them.
+    """Frequencies of one travelling wave against speed, and their crossings with engine orders.
 
     Parameters
     ----------
     wave_number
-        Of the wave.
+        Wave number.
     frequencies_hz
-        (s, m) at the speeds, followed by mode shape.
+        (s, m) at the speeds, Hz; columns follow mode shapes.
     engine_orders, modes
-        (c,) of each crossing; modes count from 0.
+        (c,) engine order and mode of each crossing; modes count from 0.
     speeds, crossings_hz
-        (c,) in rad/s and Hz.
+        (c,) speed and frequency of each crossing, rad/s and Hz.
     error
-        Largest relative error of the frequencies that the small basis was found to have.
+        Largest measured relative error of the frequencies by the reduced basis.
     seconds
         Time of the computation.
     """
@@ -90,20 +90,20 @@ class WaveBranches:
 
 @dataclass(frozen=True, eq=False)
 class WaveFlutter:
-    """A wave in the flow; as `FlutterOfWave`, with its number.
+    """Modes of a wave in the flow; as `FlutterOfWave`, with the wave number.
 
     Parameters
     ----------
     wave_number
-        Of the wave.
+        Wave number.
     frequencies_hz
-        (n,) in still fluid.
+        (n,) in still fluid, Hz.
     amplitudes
-        (n, m) of the patterns in each mode.
+        (n, m) amplitudes of the patterns in each mode.
     by_energy
         (n,) aerodynamic damping ratio by the energy method.
     in_flow, damped
-        (n,) eigenvalues with the fluid alone, and with the structure's damping, 1/s.
+        (n,) eigenvalues with the aerodynamic forces alone, and with the structure's damping too, 1/s.
     seconds
         Time of the computation.
     """
@@ -118,28 +118,28 @@ class WaveFlutter:
 
     @property
     def solved(self) -> FlutterOfWave:
-        """The same without its number."""
+        """The same modes without the wave number."""
         omega = HZ * self.frequencies_hz
         return FlutterOfWave(omega, self.amplitudes, self.by_energy, self.in_flow, self.damped)
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """What numbers of waves depend on.
+    """Properties of a wheel that define its wave numbers.
 
     Parameters
     ----------
     sectors
-        Of the wheel; 1 for a whole structure.
+        Number of sectors; 1 for a whole structure.
     parted
-        Whether Coriolis forces part the two directions of a nodal diameter.
+        Whether Coriolis forces split the two directions of a nodal diameter.
     """
 
     sectors: int
     parted: bool
 
     def numbers(self, diameters: Sequence[int] | None = None) -> tuple[int, ...]:
-        """Return the wave numbers of nodal diameters (all if None); forward waves too where the directions are parted."""
+        """Return the wave numbers of nodal diameters (all if None); with split directions also the forward waves."""
         half = self.sectors // 2
         found = sorted(range(half + 1) if diameters is None else diameters)
         if self.parted:
@@ -147,13 +147,13 @@ class Wheel:
         return tuple(found)
 
     def diagram(self, engine_order: int) -> int:
-        """Return the wave number in whose diagram an engine order has its crossings."""
+        """Return the wave number whose diagram holds the crossings of an engine order."""
         excited = excited_wave(engine_order, self.sectors)
         # where nothing parts them, both directions have the same frequencies, and one diagram
         return excited if self.parted else min(excited, self.sectors - excited)
 
     def require(self, diameters: Sequence[int] | None, key: str) -> None:
-        """Refuse nodal diameters that the wheel has not."""
+        """Refuse nodal diameters that the wheel lacks."""
         highest = self.sectors // 2
         if diameters and self.sectors == 1 and max(diameters) > 0:
             raise input_error(key, "are of a wheel, and no part is a sector of one", "Leave them out.")
@@ -174,7 +174,7 @@ def wave_name(number: int, sectors: int) -> tuple[int, str]:
 
 
 def label(number: int, sectors: int, *, parted: bool) -> str:
-    """Return the name of a wave, with its direction where that matters."""
+    """Return the name of a wave, with its direction if the two differ."""
     diameter, kind = wave_name(number, sectors)
     if sectors == 1:
         return "whole"

@@ -1,4 +1,4 @@
-"""Figures of rigid bodies: their motion at the peak; and the energy that contacts dissipate."""
+"""Figures of rigid bodies at the peak, and of the energy dissipated by contacts."""
 
 import numpy as np
 import plotly.graph_objects as go
@@ -21,7 +21,7 @@ _AXIS_LINES = (
 
 
 def rigid_bodies(response: Response) -> dict[str, list[int]]:
-    """Return the bodies all of whose six coordinates are retained: name -> their positions along ``retained``."""
+    """Return the bodies with all six coordinates retained: name -> positions along ``retained``."""
     labels = response.labels("retained")
     place = {label: k for k, label in enumerate(labels)}
     names = dict.fromkeys(label.rpartition(".")[0] for label in labels)
@@ -30,16 +30,16 @@ def rigid_bodies(response: Response) -> dict[str, list[int]]:
 
 
 def body_motion(response: Response, case: ShownCase, at: list[int], samples: int = 96) -> tuple[FloatArray, FloatArray]:
-    """Coordinates of a rigid body over one period at the peak.
+    """Return the coordinates of a rigid body over one period at the peak.
 
     Parameters
     ----------
     response, case
-        Of which.
+        The response, and the index of the case.
     at
         Positions of x, y, z, rx, ry, rz along ``retained``.
     samples
-        Of the period.
+        Number of samples a period.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def _body(response: Response, name: str, at: list[int]) -> Plot:
 
 
 def bodies(response: Response) -> list[Plot]:
-    """Motion of each rigid body over one period at the peak, and its orbit."""
+    """Draw the motion of each rigid body over one period at the peak, and its orbit."""
     if not response.peaked or not response.has("retained_displacement"):
         return []
     return [_body(response, name, at) for name, at in rigid_bodies(response).items()]
@@ -159,7 +159,7 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
 
 
 def energy(response: Response) -> Plot | None:
-    """Energy dissipated per cycle: by contact at the peak, in total against frequency."""
+    """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency."""
     if not response.has("dissipated_energy"):
         return None
     values = response.floats("dissipated_energy")

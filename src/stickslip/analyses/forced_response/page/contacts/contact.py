@@ -21,12 +21,12 @@ _STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (
 
 
 def chosen_case(response: Response) -> Chooser | None:
-    """Buttons that choose the case of the figures below."""
+    """Return the buttons that choose the case of the figures below."""
     return chooser(response.varied, response.peaked, response.chosen)
 
 
 def contact_lines(response: Response) -> list[list[int]]:
-    """Group contact points by the part of their name before the last dot, within each contact: rows of panels."""
+    """Group the contact points of each contact by the part of their name before the last dot; one row of panels a group."""
     names = response.labels("contact")
     lines: dict[tuple[str, str], list[int]] = {}
     for group, members in response.groups.items():
@@ -181,12 +181,12 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
 
 
 def hysteresis_t(response: Response) -> Plot | None:
-    """Loops along the first tangent."""
+    """Draw loops along the first tangent."""
     return _hysteresis(response, "t")
 
 
 def hysteresis_w(response: Response) -> Plot | None:
-    """Loops along the second tangent."""
+    """Draw loops along the second tangent."""
     return _hysteresis(response, "w")
 
 
@@ -232,7 +232,7 @@ def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[
 
 
 def state_map(response: Response) -> Plot | None:
-    """Stick, slip and open over one period for every contact point."""
+    """Draw stick, slip and open over one period for every contact point."""
     cases = _drawn(response, "peak_state")
     if not cases:
         return None

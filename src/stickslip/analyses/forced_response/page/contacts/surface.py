@@ -23,7 +23,7 @@ _SCALE = [[0.0, STATE_COLOURS[0]], [0.5, "#f4efe6"], [1.0, STATE_COLOURS[1]]]  #
 
 
 def surface_map(response: Response) -> Plot | None:
-    """Share of the cycle for which each point of a contact surface slips."""
+    """Draw the fraction of the cycle during which each point of a contact surface slips."""
     needed = ("peak_state", "contact_position", "contact_frame")
     cases = response.peaked if response.has(*needed) else ()
     surfaces = _surfaces(response) if cases else {}

@@ -17,7 +17,7 @@ _OPACITY = 0.22
 
 
 def with_bands(data: xr.Dataset, tree: xr.DataTree) -> xr.Dataset:
-    """Return a forced response with the bounds of its cases, where the same result has them for all its cases."""
+    """Return a forced response with the bounds over residual tractions, if the same result has them for all cases."""
     if ANALYSIS not in tree.children:
         return data
     own = tree[ANALYSIS].to_dataset()
@@ -42,7 +42,7 @@ def _of(response: Response, case: ShownCase, name: str) -> FloatArray:
 
 
 def draw_bands(figure: go.Figure, response: Response) -> str:
-    """Draw the band of each case behind its curve; return what the caption says of it, nothing where there is none."""
+    """Draw the band of each case behind its curve; return the sentence for the caption, empty for none."""
     if not _has(response) or response.has("speed_rpm"):
         return ""
     drawn = False
@@ -80,18 +80,18 @@ def _harmonics(response: Response) -> int:
 
 
 def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase], factor: float) -> str:
-    """Draw the bounds of the peaks behind an optimisation curve, its first column; return what the caption says of it.
+    """Draw the bounds of the peaks in the first column of an optimisation curve; return the sentence for the caption.
 
     Parameters
     ----------
     figure
-        The curves.
+        The figure of the curves.
     response
         The response.
     cases
-        Those of a curve, by their value.
+        Cases of one curve by the value of the varied key.
     factor
-        From the unit of the response to that of the figure.
+        Factor from the unit of the response to the unit of the figure.
     """
     if not _has(response):
         return ""
