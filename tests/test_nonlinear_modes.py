@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.matrix_products import known_by_vectors
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
+from stickslip.response.nonlinear_modes.backbone import _begun_anew
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
@@ -185,6 +187,13 @@ def test_all_four_folds_of_a_mode_in_resonance_with_another_are_followed():
     # gross slip: every slider has slipped
     assert found.solutions[-1].slipping == 1.0
     assert "gross slip from" in found.end
+
+
+def test_a_point_counts_as_begun_anew_where_it_leaps_ahead_of_all_others():
+    """Behind a fold the farthest point is not the last one."""
+    way = ((0.0, 0.1), (1.5, 0.4), (3.0, 0.4), (2.0, 0.4), (4.0, 0.1), (4.25, 0.1), (4.26, 0.1), (4.5, 0.4))
+    found = [SimpleNamespace(p=p, converged=True, point=SimpleNamespace(step=step)) for p, step in way]
+    assert _begun_anew(found, SimpleNamespace(gap=1.0, last=9.0), 0.1) == 2
 
 
 def test_a_mode_ends_at_gross_slip_where_that_is_asked():

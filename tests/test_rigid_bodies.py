@@ -234,3 +234,12 @@ def test_rotation_alone_presses_a_body_where_no_part_is_a_mesh(tmp_path: Path) -
     force = assemble(Study.from_file(path).model(), 1).static_force
     growth = 0.05 * (1000.0 * RPM) ** 2  # N/m: the further out, the stronger it is pulled
     assert force[:, 2].sum() == pytest.approx(-growth * 0.3 / (1.0 - growth / 1e6), rel=1e-9)
+
+
+@pytest.mark.parametrize("rpm", [5.0, 1000.0])
+def test_a_body_that_rotation_takes_off_its_seat_is_refused_however_slow(tmp_path: Path, rpm: float) -> None:
+    path = tmp_path / "study.toml"
+    inside = RIM.replace("0.31, ", "0.29, ").replace("normal = [1.0", "normal = [-1.0")
+    path.write_text(inside.replace("speed_rpm = 1000.0", f"speed_rpm = {rpm}"))
+    with pytest.raises(InputError, match=r"rotation.speed_rpm: pulls part.body off"):
+        assemble(Study.from_file(path).model(), 1)
