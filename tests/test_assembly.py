@@ -211,6 +211,13 @@ def test_what_is_wrong_with_a_model_is_named():
         contacts={"a": replace(one, between=("chian.m1", "ground"))},
     )
     refused("is no sector of a wheel", contacts={"a": replace(one, between=("chain.m1", "next.chain.m2"))})
+    chain = model.parts["chain"]
+    several = replace(chain.structure, sets={**chain.structure.sets, "pair": np.array([2, 3])})
+    refused(
+        r"contact.a.between: 'chain.pair' is not of the kind of 'chain.m1': single dofs and points, or of another number",
+        parts={**model.parts, "chain": replace(chain, structure=several)},
+        contacts={"a": replace(one, between=("chain.pair", "chain.m1"))},
+    )
     with pytest.raises(InputError, match=r"contact.a.acts: is missing"):  # before anything is asked
         replace(model, contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)})
     refused(
