@@ -14,7 +14,8 @@ from study_texts import JENKINS, answered, study_of
 from evidence.judges.free_decay import free_decay
 from evidence.models.lumped import griffin, small_chain
 from evidence.validation import case_nonlinear_modes
-from stickslip.analyses.nonlinear_mode.records import ModeRecord
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.nonlinear_mode.records import ModeRecord, NonlinearModes
 from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts
 from stickslip.analyses.page import plots
 from stickslip.contact.interface import Interface
@@ -399,6 +400,6 @@ def case_of(end: str, status: list[int], change: list[float], problem: str = "")
     ],
 )
 def test_what_is_to_be_thought_of_a_mode(end, status, change, level, words):
-    found = case_verdicts("", case_of(end, status, change))
+    found = case_verdicts("", record_of(NonlinearModes, case_of(end, status, change)))
     assert {v.level for v in found} == {level}
     assert words in found[0].why

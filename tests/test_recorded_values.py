@@ -24,8 +24,8 @@ from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis
 from stickslip.analyses.modal_synthesis.records import SynthesisLevel
-from stickslip.analyses.nonlinear_mode.dataset import dataset as of_modes
-from stickslip.analyses.nonlinear_mode.records import END, ModeRecord
+from stickslip.analyses.nonlinear_mode.analysis import NONLINEAR_MODE
+from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes
 from stickslip.analyses.quasi_periodic.dataset import dataset as of_two_frequencies
 from stickslip.analyses.quasi_periodic.records import TwoFrequencies
 from stickslip.analyses.residual_tractions.dataset import dataset as of_tractions
@@ -196,21 +196,28 @@ def test_amplitudes_without_a_motion_are_lost() -> None:
 def mode_records() -> Iterator[ModeRecord]:
     for k, (points, n) in enumerate(((2, 3), (3, 3))):
         for i in range(points):
-            told_of = (
-                np.array(
-                    [1e-3 * (i + 1), 50.0 + i, 0.1 * (2 - abs(i - 1)), 3.0 + i, 4.0 + i, 0.5 * i, 0.25 * i, 0.001 * i]
-                )
-                + k
-            )
-            motion = np.full((2 + i, n, 2), 1.0 + i + k)
             yield ModeRecord(
-                5 * k, k + 1, "point", index=i, told=told_of, motion=motion, order=1 + i, status=Status.CONVERGED
+                5 * k,
+                k + 1,
+                "point",
+                index=i,
+                amplitude=1e-3 * (i + 1) + k,
+                omega=50.0 + i + k,
+                ratio=0.1 * (2 - abs(i - 1)) + k,
+                modal_amplitude=3.0 + i + k,
+                energy=4.0 + i + k,
+                slipping=0.5 * i + k,
+                open_for=0.25 * i + k,
+                change=0.001 * i + k,
+                motion=np.full((2 + i, n, 2), 1.0 + i + k),
+                order=1 + i,
+                status=Status.CONVERGED,
             )
         yield ModeRecord(5 * k, k + 1, END, mode_omega=60.0 + k, mode_ratio=0.01 + k, tolerance=0.5, end="gross slip")
 
 
 def test_nonlinear_modes() -> None:
-    data = of_modes(
+    data = NONLINEAR_MODE.dataset(
         solved(list(mode_records()), {"model": {"sectors": 6, "output": "b.x"}, "coordinates": COORDINATES})
     )
     first, second = np.arange(2.0), np.arange(3.0)
@@ -819,7 +826,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (LimitCycles,)  # of cases, whose fields are columns
+RECORDS = (LimitCycles, NonlinearModes)  # of cases, whose fields are columns
 
 
 def written() -> set[str]:

@@ -61,19 +61,19 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
     views = told_by(designs, "nonlinear_mode", Modes, needed)
     if not views:
         return []
-    every = np.concatenate([v.floats("amplitude").ravel() for _, _, v in views])
+    every = np.concatenate([branch.amplitude for _, _, v in views for branch in v.found.branches])
     scale = scale_for(np.array([np.nanmedian(every)]), "m")
     figure = make_subplots(1, 2, horizontal_spacing=0.12)
     for k, (design, label, view) in enumerate(views):
         before = sum(own is design for own, _, _ in views[:k])
-        for i, mode in enumerate(view.names):
-            name = ", ".join(word for word in (design.name, label, mode) if word)
+        for i, branch in enumerate(view.found.branches):
+            name = ", ".join(word for word in (design.name, label, branch.name) if word)
             dash = _DASHES[(before + i) % len(_DASHES)]
-            amplitude, hz, ratio = view.along(i, "amplitude", "frequency_hz", "damping_ratio")
-            for panel, y in enumerate((hz, 100.0 * ratio), 1):
+            amplitude = branch.amplitude[branch.known]
+            for panel, y in enumerate((branch.frequency_hz, 100.0 * branch.damping_ratio), 1):
                 figure.add_scatter(
                     x=scale.factor * amplitude,
-                    y=y,
+                    y=y[branch.known],
                     mode="lines",
                     name=name,
                     legendgroup=name,
@@ -84,7 +84,7 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
                     col=panel,
                 )
     styled(figure, 420)
-    outputs = " or ".join(dict.fromkeys(v.text("output") for _, _, v in views))
+    outputs = " or ".join(dict.fromkeys(v.found.output for _, _, v in views))
     figure.update_xaxes(type="log", title_text=f"amplitude of {outputs} ({scale.unit})")
     figure.update_yaxes(title_text="frequency (Hz)", col=1)
     figure.update_yaxes(title_text="damping ratio (%)", col=2)

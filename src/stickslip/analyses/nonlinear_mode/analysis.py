@@ -1,15 +1,24 @@
 """Nonlinear modes: frequency and damping ratio over amplitude and energy."""
 
-from stickslip.analyses.nonlinear_mode.dataset import dataset
+from functools import partial
+
+import numpy as np
+
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.nonlinear_mode.problem import NAME, question_of
-from stickslip.analyses.nonlinear_mode.records import ModeRecord
+from stickslip.analyses.nonlinear_mode.records import ModeRecord, NonlinearModes, answer
 from stickslip.analyses.nonlinear_mode.solve import solve
 from stickslip.analyses.nonlinear_mode.table import NonlinearModeTable
-from stickslip.analyses.nonlinear_mode.verdicts import tables
+from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.study.analysis import Analysis, Case, of_tables
 from stickslip.units import HZ
+
+
+def _lost(found: NonlinearModes) -> int:
+    """Return how many points have no motion."""
+    return sum(int(np.count_nonzero(branch.status > 0)) for branch in found.branches)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
@@ -29,7 +38,7 @@ NONLINEAR_MODE = Analysis(
     key=of_tables("nonlinear_mode", "solver"),
     inputs=question_of,
     solve=solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
 )

@@ -1,13 +1,16 @@
 """Nonlinear modes: frequency and damping ratio over the amplitude and the energy, and backbones over frequency responses."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.node import Node
@@ -28,21 +31,16 @@ _ENERGY = "The energy is twice the mean kinetic energy of all harmonics, of a wh
 class Modes(Node):
     """One case."""
 
-    @property
-    def names(self) -> list[str]:
-        """Of the modes."""
-        waves, modes = self.integers("wave_number"), self.integers("mode")
-        return [f"mode {m}" if k < 0 else f"wave {k}, mode {m}" for k, m in zip(waves, modes, strict=True)]
-
-    def along(self, i: int, *names: str) -> list[FloatArray]:
-        """Return variables along a mode; NaN where it was lost."""
-        known = self.values("status", "branch", "point")[i] >= 0
-        return [self.values(name, "branch", "point")[i][known] for name in names]
+    @cached_property
+    def found(self) -> NonlinearModes:
+        """What was found."""
+        known: NonlinearModes = record_of(NonlinearModes, self.data)
+        return known
 
 
 def frequencies(view: Modes) -> Plot | None:
     """Show the frequency over the amplitude."""
-    figure = _over(view, "amplitude", "frequency_hz", 1.0, "m")
+    figure = _over_amplitude(view, [branch.frequency_hz for branch in view.found.branches])
     if figure is None:
         return None
     figure.update_yaxes(title_text="frequency (Hz)")
@@ -52,10 +50,11 @@ def frequencies(view: Modes) -> Plot | None:
 
 def damping(view: Modes) -> Plot | None:
     """Show the damping ratio over the amplitude."""
-    figure = _over(view, "amplitude", "damping_ratio", 100.0, "m")
+    ratios = [branch.damping_ratio for branch in view.found.branches]
+    figure = _over_amplitude(view, [100.0 * ratio for ratio in ratios])
     if figure is None:
         return None
-    if np.nanmin(view.values("damping_ratio", "branch", "point")) < 0.0:
+    if np.nanmin(np.concatenate(ratios)) < 0.0:
         figure.add_hline(y=0.0, line={"color": INK, "width": 1})
     figure.update_yaxes(title_text="damping ratio (%)")
     return Plot(f"nonlinear_mode_damping{view.key}", "Damping over the amplitude", _READING, figure)
@@ -63,12 +62,17 @@ def damping(view: Modes) -> Plot | None:
 
 def energies(view: Modes) -> list[Plot]:
     """Show frequency and damping ratio over the energy."""
-    found = []
-    for name, factor, title, key, caption in (
-        ("frequency_hz", 1.0, "frequency (Hz)", "energy", _ENERGY),
-        ("damping_ratio", 100.0, "damping ratio (%)", "energy_damping", "The same of the damping ratio."),
+    found, branches = [], view.found.branches
+    for own, title, key, caption in (
+        ([b.frequency_hz for b in branches], "frequency (Hz)", "energy", _ENERGY),
+        (
+            [100.0 * b.damping_ratio for b in branches],
+            "damping ratio (%)",
+            "energy_damping",
+            "The same of the damping ratio.",
+        ),
     ):
-        figure = _over(view, "energy", name, factor, "J")
+        figure = _over(view, [b.energy for b in branches], own, "energy", "J")
         if figure is not None:
             figure.update_yaxes(title_text=title)
             heading = f"{title.split(' (')[0].capitalize()} over the energy"
@@ -88,28 +92,22 @@ def table(view: Modes) -> Table:
         "harmonics",
         "end",
     ]
-    rows = []
-    for i, name in enumerate(view.names):
-        most, at, gross = (
-            float(view.floats(n)[i])
-            for n in ("largest_damping_ratio", "largest_damping_amplitude", "gross_slip_amplitude")
-        )
-        own = view.values("harmonics", "branch", "point")[i]
-        orders = own[own > 0]
-        kept = f"{int(orders.min())} to {int(orders.max())}" if orders.size else NONE
-        rows.append(
-            [
-                name,
-                number(float(view.floats("mode_frequency_hz")[i]), 6),
-                number(100 * float(view.floats("mode_damping_ratio")[i]), 4),
-                number(100 * most, 4) if np.isfinite(most) else NONE,
-                quantity(at, "m", 4),
-                quantity(gross, "m", 4),
-                kept,
-                view.labels_of("problem")[i] or view.labels_of("end")[i],
-            ]
-        )
-    return Table(head, rows)
+    return Table(head, [_row(branch) for branch in view.found.branches])
+
+
+def _row(branch: ModeBranch) -> list[str]:
+    orders = branch.harmonics[branch.harmonics > 0]
+    most = branch.largest_damping_ratio
+    return [
+        branch.name,
+        number(branch.mode_frequency_hz, 6),
+        number(100 * branch.mode_damping_ratio, 4),
+        number(100 * most, 4) if np.isfinite(most) else NONE,
+        quantity(branch.largest_damping_amplitude, "m", 4),
+        quantity(branch.gross_slip_amplitude, "m", 4),
+        f"{int(orders.min())} to {int(orders.max())}" if orders.size else NONE,
+        branch.problem or branch.end,
+    ]
 
 
 def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
@@ -117,9 +115,9 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
     modes, response = nodes.get(NAME), nodes.get("forced_response")
     if not isinstance(modes, Modes) or not isinstance(response, Response):
         return None
-    output = modes.text("output")
+    output = modes.found.output
     labels = response.labels("output")
-    if output not in labels or response.has("speed_rpm") or not modes.has("amplitude"):
+    if output not in labels or response.has("speed_rpm"):
         return None
     amplitude = response.values("amplitude", "point", "output")[:, labels.index(output)]
     amplitude = np.where(response.converged, amplitude, np.nan)
@@ -139,8 +137,8 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
         )
     drawn = []
     low, high = np.nanmin(amplitude), np.nanmax(amplitude)
-    for i, label in enumerate(modes.names):
-        own, hertz = modes.along(i, "amplitude", "frequency_hz")
+    for i, branch in enumerate(modes.found.branches):
+        own, hertz, label = branch.amplitude[branch.known], branch.frequency_hz[branch.known], branch.name
         shown = (own >= 0.5 * low) & (own <= 2.0 * high)
         shown &= (hertz >= x.min()) & (hertz <= x.max())
         if not np.any(shown):
@@ -167,35 +165,42 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
     return Plot("backbones", "Backbones over the frequency responses", caption, figure)
 
 
-def _over(view: Modes, over: str, name: str, factor: float, unit: str) -> go.Figure | None:
-    if not view.has(over, name) or not np.any(np.isfinite(view.values(over))):
+def _over_amplitude(view: Modes, own: Sequence[FloatArray]) -> go.Figure | None:
+    title = f"amplitude of {view.found.output}"
+    return _over(view, [branch.amplitude for branch in view.found.branches], own, title, "m")
+
+
+def _over(
+    view: Modes, over: Sequence[FloatArray], own: Sequence[FloatArray], title: str, unit: str
+) -> go.Figure | None:
+    """Draw a quantity of each mode over another one; nothing where none has a point."""
+    every = np.concatenate(over)
+    if not np.any(np.isfinite(every)):
         return None
-    figure, every = go.Figure(), view.values(over, "branch", "point")
+    figure = go.Figure()
     scale = scale_for(np.array([np.nanmedian(every)]), unit)
-    for i, label in enumerate(view.names):
-        along, own = view.along(i, over, name)
+    for i, (branch, x, y) in enumerate(zip(view.found.branches, over, own, strict=True)):
         figure.add_scatter(
-            x=scale.factor * along,
-            y=factor * own,
+            x=scale.factor * x[branch.known],
+            y=y[branch.known],
             mode="lines",
-            name=label,
+            name=branch.name,
             line={"color": colour(i), "width": 2},
-            hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
+            hovertemplate=f"{branch.name}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
         )
     styled(figure, 440)
-    title = "energy" if over == "energy" else f"amplitude of {view.text('output')}"
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
     figure.update_xaxes(type="log", title_text=f"{title} ({scale.unit})", **ticks)
     return figure
 
 
 def _cards(view: Modes) -> list[Card]:
-    most = view.floats("largest_damping_ratio")
-    if not np.any(np.isfinite(most)):
+    known = [branch for branch in view.found.branches if np.isfinite(branch.largest_damping_ratio)]
+    if not known:
         return []
-    i = int(np.nanargmax(most))
-    at = quantity(float(view.floats("largest_damping_amplitude")[i]), "m")
-    return [Card(f"{number(100 * float(most[i]))} %", "most damping of a mode", f"{view.names[i]} at {at}")]
+    most = max(known, key=lambda branch: branch.largest_damping_ratio)
+    at = quantity(most.largest_damping_amplitude, "m")
+    return [Card(f"{number(100 * most.largest_damping_ratio)} %", "most damping of a mode", f"{most.name} at {at}")]
 
 
 _BLOCK = Block("nonlinear-modes", "Nonlinear modes", (frequencies, damping, energies, table))

@@ -1,21 +1,26 @@
-"""Journal records of nonlinear modes, and the modes made of them."""
+"""Journal records of nonlinear modes, the modes made of them, and all of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.analyses.vibrating import KeptMotions, kept_motions
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.column import column, rows
+from stickslip.reduction.waves import NO_WAVE, wave
 from stickslip.response.continuation.branch import Followed, Judged, Kind, branch_of
 from stickslip.response.nonlinear_modes.backbone import ModeWay, mode_point
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
+from stickslip.study.analysis import Solved
+from stickslip.units import HZ
 
 END = "end"  # kind of the record behind the last one of a mode
-NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")
 
 
 def _nothing() -> FloatArray:
@@ -38,8 +43,8 @@ class ModeRecord:
         Of its point, with all digits: an interrupted run goes on from them.
     status, iterations, residual_norm
         How the solver ended.
-    told
-        (8,) what results tell of a motion, in the order of `NUMBERS`; NaN of what is no point of the mode.
+    amplitude, omega, ratio, modal_amplitude, energy, slipping, open_for, change
+        Of the motion, as of `ModePoint`; NaN of what is no point of the mode.
     motion
         (order + 1, n, 2) displacement of all coordinates, real and imaginary, m; empty of what is no point of the mode.
     order
@@ -64,7 +69,14 @@ class ModeRecord:
     status: Status = Status.CONVERGED
     iterations: int = 0
     residual_norm: float = np.nan
-    told: FloatArray = field(default_factory=_nothing)
+    amplitude: float = np.nan
+    omega: float = np.nan
+    ratio: float = np.nan
+    modal_amplitude: float = np.nan
+    energy: float = np.nan
+    slipping: float = np.nan
+    open_for: float = np.nan
+    change: float = np.nan
     motion: FloatArray = field(default_factory=_nothing)
     order: int = -1
     mode_omega: float = np.nan
@@ -82,16 +94,11 @@ class ModeRecord:
         return Followed(kind, self.index, self.level, point, Judged(self.bound), self.seconds)
 
 
-def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> ModeRecord:
+def mode_record(wave_number: int, mode: StuckMode, way: ModeWay, found: Followed) -> ModeRecord:
     """Return what is kept of what was found on the way along a mode of a wave."""
     point, solution = found.point, found.point.solution
-    told, moved = np.full(len(NUMBERS), np.nan), _nothing()
-    if found.converged and found.kind in ("point", "found", "between"):
-        motion = mode_point(way.curve, found)
-        told[:] = [getattr(motion, name) for name in NUMBERS]
-        moved = np.stack([motion.coefficients.real, motion.coefficients.imag], axis=-1)
     return ModeRecord(
-        wave,
+        wave_number,
         mode.number,
         found.kind,
         found.index,
@@ -107,98 +114,155 @@ def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> Mode
         solution.status,
         solution.iterations,
         solution.residual_norm,
-        told,
-        moved,
-        way.curve.problems[found.level].balance.order,
+        order=way.curve.problems[found.level].balance.order,
+        **_motion(way, found),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class ModeBranch:
-    """A nonlinear mode of a wave.
+def _motion(way: ModeWay, found: Followed) -> dict[str, Any]:
+    """Return the motion at a point of a mode, by the names of the fields of `ModeRecord`; empty of what is no point."""
+    if not found.converged or found.kind not in ("point", "found", "between"):
+        return {}
+    motion = mode_point(way.curve, found)
+    return {
+        "amplitude": motion.amplitude,
+        "omega": motion.omega,
+        "ratio": motion.ratio,
+        "modal_amplitude": motion.modal_amplitude,
+        "energy": motion.energy,
+        "slipping": motion.slipping,
+        "open_for": motion.open_for,
+        "change": motion.change,
+        "motion": np.stack([motion.coefficients.real, motion.coefficients.imag], axis=-1),
+    }
 
-    Parameters
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModeBranch:
+    """A nonlinear mode of a wave; along its points NaN where none was found.
+
+    Attributes
     ----------
-    wave_number
-        -1 for a single structure.
-    mode
-        From 1, by frequency with contacts stuck.
-    omega, ratio
-        Of the linear mode: rad/s and damping ratio.
-    amplitude, motion_omega, motion_ratio
-        (points,) m, rad/s, damping ratio; NaN where none was found.
-    modal_amplitude, energy
-        (points,) kg^0.5 m and J.
-    order, status
-        (points,) highest harmonic, and how the solver ended.
-    slipping, open_for, change
-        (points,) share of contact points that slip or open (of several sliders the share that slips), largest share of the period for which one is open, and relative change that
-        more harmonics are foretold to make.
     motions
-        (points, harmonics, n, 2) displacement of all coordinates, real and imaginary, m; NaN where none was found.
-    tolerance
-        Relative change of frequency or damping ratio that was asked for.
-    end
-        How the curve ended.
-    problem
-        Why there is none; empty where there is one.
+        (points, harmonics, n, 2) displacement of all coordinates, real and imaginary, m; NaN where none was found. A result holds those
+        that other programs need.
     """
 
-    wave_number: int
-    mode: int
-    omega: float
-    ratio: float
-    amplitude: FloatArray
-    motion_omega: FloatArray
-    motion_ratio: FloatArray
-    modal_amplitude: FloatArray
-    energy: FloatArray
-    order: IntArray
-    status: IntArray
-    slipping: FloatArray
-    open_for: FloatArray
-    change: FloatArray
-    motions: FloatArray
-    tolerance: float
-    end: str
-    problem: str = ""
-
-
-def branches_of(records: Sequence[ModeRecord]) -> list[ModeBranch]:
-    """Return the modes whose ends are among the records."""
-    found = []
-    for _, group in groupby(records, lambda r: (r.wave_number, r.mode)):
-        *way, last = group
-        if last.kind == END:
-            found.append(_branch(way, last))
-    return found
-
-
-def _branch(way: Sequence[ModeRecord], last: ModeRecord) -> ModeBranch:
-    points = [] if last.problem else branch_of(way)
-    told = np.array([r.told for r in points]).reshape(-1, len(NUMBERS)).T
-    amplitude, omega, ratio, modal_amplitude, energy, slipping, open_for, change = told
-    order, status = (np.array([int(getattr(r, name)) for r in points], dtype=np.int64) for name in ("order", "status"))
-    return ModeBranch(
-        last.wave_number,
-        last.mode,
-        last.mode_omega,
-        last.mode_ratio,
-        amplitude,
-        omega,
-        ratio,
-        modal_amplitude,
-        energy,
-        order,
-        status,
-        slipping,
-        open_for,
-        change,
-        _motions(points),
-        last.tolerance,
-        last.end,
-        last.problem,
+    wave_number: int = column("1", "wave number of the modes; -1 for a single structure")
+    nodal_diameter: int = column("1", "its nodal diameters; -1 for a single structure")
+    mode: int = column("1", "number of the mode, by frequency with contacts stuck")
+    mode_frequency_hz: float = column("Hz", "frequency with contacts stuck")
+    mode_damping_ratio: float = column("1", "damping ratio with contacts stuck")
+    accuracy: float = column("1", "relative change by more harmonics that was asked for")
+    end: str = column("1", "how the mode ends")
+    problem: str = column("1", "why there is none")
+    gross_slip_amplitude: float = column(
+        "m", "amplitude from which on all contacts, and all their sliders, slip or open at some time"
     )
+    largest_damping_ratio: float = column("1", "largest damping ratio")
+    largest_damping_amplitude: float = column("m", "amplitude there")
+    amplitude: FloatArray = column("m", "amplitude of the output in the first harmonic", along="point")
+    frequency_hz: FloatArray = column("Hz", "frequency of the motion", along="point")
+    damping_ratio: FloatArray = column("1", "damping ratio of the motion; negative: it grows", along="point")
+    modal_amplitude: FloatArray = column("kg^0.5 m", "root of X^H M X of the first harmonic", along="point")
+    energy: FloatArray = column(
+        "J", "twice the mean kinetic energy of all harmonics, of a wheel of one sector", along="point"
+    )
+    harmonics: IntArray = column("1", "highest harmonic", along="point")
+    status: IntArray = column("1", "how the solver ended: 0 is a solution", along="point")
+    slipping: FloatArray = column(
+        "1",
+        "share of the contact points that slip or open at some time; of a contact of several sliders the share that slips",
+        along="point",
+    )
+    open_for: FloatArray = column("1", "largest share of the period for which a contact point is open", along="point")
+    change: FloatArray = column(
+        "1",
+        "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone",
+        along="point",
+    )
+    motions: FloatArray = field(default_factory=lambda: np.zeros((0, 1, 0, 2)))
+
+    @property
+    def name(self) -> str:
+        """Name of the mode."""
+        return f"mode {self.mode}" if self.wave_number < 0 else f"wave {self.wave_number}, mode {self.mode}"
+
+    @property
+    def known(self) -> BoolArray:
+        """Which entries along its points are points: in a result shorter modes are filled up."""
+        return np.asarray(self.status >= 0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NonlinearModes(KeptMotions):
+    """All that is found of a case."""
+
+    output: str = column("1", "output whose amplitude is told", default="")
+    branches: tuple[ModeBranch, ...] = rows("branch")
+    retained_displacement: FloatArray | None = column(
+        "m",
+        "the motion in each harmonic: the real and the imaginary part",
+        along="branch point harmonic coordinate part",
+        default=None,
+    )
+    output_displacement: FloatArray | None = column(
+        "m", "the same of the outputs", along="branch point harmonic reported part", default=None
+    )
+    concept: str | None = column("1", "which motions the modes are made of", default=None)
+
+
+def answer(solved: Solved) -> NonlinearModes:
+    """Return what the job of a case has found, from its records and its notes."""
+    notes, model = solved.notes, solved.notes.get("model", {})
+    output = str(model.get("output", ""))
+    branches = branches_of(solved.records, int(model.get("sectors", 1)))
+    if not branches or "coordinates" not in notes:
+        return NonlinearModes(output=output, branches=branches)
+    known = notes["coordinates"]
+    kept = kept_motions(_every_motion(branches), known)
+    return NonlinearModes(output=output, branches=branches, concept=str(known["concept"]), **kept)
+
+
+def branches_of(records: Sequence[ModeRecord], sectors: int) -> tuple[ModeBranch, ...]:
+    """Return the modes whose ends are among the records."""
+    ways = [list(group) for _, group in groupby(records, lambda r: (r.wave_number, r.mode))]
+    return tuple(_branch(way, last, sectors) for *way, last in ways if last.kind == END)
+
+
+def _branch(way: Sequence[ModeRecord], last: ModeRecord, sectors: int) -> ModeBranch:
+    points = [] if last.problem else branch_of(way)
+    amplitude, ratio, slipping = (_along(points, name) for name in ("amplitude", "ratio", "slipping"))
+    most = int(np.nanargmax(ratio)) if np.any(np.isfinite(ratio)) else -1
+    gross = amplitude[slipping == 1.0]
+    return ModeBranch(
+        wave_number=last.wave_number,
+        nodal_diameter=wave(last.wave_number, sectors).nodal_diameter if last.wave_number >= 0 else NO_WAVE,
+        mode=last.mode,
+        mode_frequency_hz=last.mode_omega / HZ,
+        mode_damping_ratio=last.mode_ratio,
+        accuracy=last.tolerance,
+        end=last.end,
+        problem=last.problem,
+        gross_slip_amplitude=float(gross[0]) if gross.size else np.nan,
+        largest_damping_ratio=float(ratio[most]) if most >= 0 else np.nan,
+        largest_damping_amplitude=float(amplitude[most]) if most >= 0 else np.nan,
+        amplitude=amplitude,
+        frequency_hz=_along(points, "omega") / HZ,
+        damping_ratio=ratio,
+        modal_amplitude=_along(points, "modal_amplitude"),
+        energy=_along(points, "energy"),
+        harmonics=np.array([r.order for r in points], dtype=np.int64),
+        status=np.array([int(r.status) for r in points], dtype=np.int64),
+        slipping=slipping,
+        open_for=_along(points, "open_for"),
+        change=_along(points, "change"),
+        motions=_motions(points),
+    )
+
+
+def _along(points: Sequence[ModeRecord], name: str) -> FloatArray:
+    return np.array([getattr(r, name) for r in points], dtype=np.float64)
 
 
 def _motions(points: Sequence[ModeRecord]) -> FloatArray:
@@ -209,4 +273,15 @@ def _motions(points: Sequence[ModeRecord]) -> FloatArray:
         if record.motion.ndim == 3:
             own[:] = 0.0
             own[: len(record.motion)] = record.motion
+    return out
+
+
+def _every_motion(branches: Sequence[ModeBranch]) -> FloatArray:
+    """Return (branches, most points, most harmonics, n, 2) the motions of all modes, NaN where there is none."""
+    most = np.max([b.motions.shape for b in branches], axis=0)
+    out = np.full((len(branches), *most), np.nan)
+    for own, branch in zip(out, branches, strict=True):
+        points, harmonics, n, _ = branch.motions.shape
+        own[:points, :, :n] = 0.0
+        own[:points, :harmonics, :n] = branch.motions
     return out

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from stickslip.analyses.nonlinear_mode.problem import Question
-from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, record_of
+from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, mode_record
 from stickslip.analyses.vibrating import as_wave, known_coordinates
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
@@ -47,7 +47,7 @@ def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[M
         )
         for found in way.follow(tuple(every)):
             every.append(found)
-            yield record_of(wave, mode, way, found)
+            yield mode_record(wave, mode, way, found)
         end = way.backbone(every).end
     except StickslipError as error:
         problem = str(error)

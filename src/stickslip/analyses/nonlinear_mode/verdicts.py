@@ -1,11 +1,13 @@
 """Verdicts on nonlinear modes, and the terminal tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import number, told_apart
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
 from stickslip.response.nonlinear_modes.backbone import MEETS, OVER
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
@@ -15,37 +17,30 @@ NONE = 1e-9  # damping ratio below which there is none
 LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
 
 
-def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables."""
-    each = [_of_branch(label, case, i) for i in range(case["mode"].size if "mode" in case else 0)]
-    sound = [i for i, own in enumerate(each) if all(v.level == "trusted" for v in own)]
-    found = [v for own in each for v in own]
-    return [*found, Verdict("trusted", label, None, _followed(case, sound))] if sound else found
+def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
+    """Return what is to be thought of a case."""
+    each = [_of_branch(label, branch) for branch in found.branches]
+    sound = [b for b, own in zip(found.branches, each, strict=True) if all(v.level == "trusted" for v in own)]
+    verdicts = [v for own in each for v in own]
+    return [*verdicts, Verdict("trusted", label, None, _followed(found, sound))] if sound else verdicts
 
 
-def branch_name(case: Mapping[str, xr.Variable] | xr.Dataset, i: int) -> str:
-    """Return the name of a mode of a wave."""
-    wave, mode = (int(np.asarray(case[n].values)[i]) for n in ("wave_number", "mode"))
-    return f"mode {mode}" if wave < 0 else f"wave {wave}, mode {mode}"
-
-
-def _followed(case: Mapping[str, xr.Variable], sound: Sequence[int]) -> str:
+def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
     """Say of modes without doubts over which amplitudes they were followed, and the largest damping ratio of them."""
-    every = case["mode"].size
-    amplitude, ratios = case["amplitude"].values[sound], case["largest_damping_ratio"].values[sound]
-    most = sound[int(np.argmax(ratios))]
-    ratio, at = (float(case[f"largest_damping_{n}"].values[most]) for n in ("ratio", "amplitude"))
-    who = branch_name(case, most) if every == 1 else f"{len(sound)} of {every} modes"
+    every = len(found.branches)
+    amplitude = np.concatenate([branch.amplitude for branch in sound])
+    most = sound[int(np.argmax([branch.largest_damping_ratio for branch in sound]))]
+    ratio, at = most.largest_damping_ratio, most.largest_damping_amplitude
+    who = most.name if every == 1 else f"{len(sound)} of {every} modes"
     damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"
     where = f" at {millimetres(at)}" if abs(ratio) > NONE else ""
-    of = f", of {branch_name(case, most)}" if every > 1 and where else ""
+    of = f", of {most.name}" if every > 1 and where else ""
     sizes = millimetres_between(float(np.nanmin(amplitude)), float(np.nanmax(amplitude)))
     return f"{who} followed from {sizes}: {damping}{where}{of}"
 
 
-def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
-    name = branch_name(case, i)
-    problem, end = str(case["problem"].values[i]), str(case["end"].values[i])
+def _of_branch(label: str, branch: ModeBranch) -> list[Verdict]:
+    name, problem, end = branch.name, branch.problem, branch.end
     if problem:
         return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.').removeprefix(f'{name}: ')}")]
     found = []
@@ -63,14 +58,14 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     elif not end.startswith(("amplitude reached", "gross slip")):
         found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))
     found += _of_resonances(label, name, end)
-    status = case["status"].values[i]
+    status = branch.status
     gaps = int(np.count_nonzero(status > 0))
     solved = np.flatnonzero(status == 0)
     lost = solved.size > 0 and bool(np.any(status[: solved[-1]] > 0))
     if lost or AGAIN in end:
         why = f"{name}: it was lost and taken up again further on; {gaps} of its points are no motions"
         found.append(Verdict("doubtful", label, None, why, "What lies beyond may be another mode."))
-    return found + _of_harmonics(label, name, case, i)
+    return found + _of_harmonics(label, branch)
 
 
 def _of_resonances(label: str, name: str, end: str) -> list[Verdict]:
@@ -86,14 +81,13 @@ def _of_resonances(label: str, name: str, end: str) -> list[Verdict]:
     return [Verdict("trusted", label, None, f"{name}: {'; '.join(told)}", remedy, warns=True)]
 
 
-def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+def _of_harmonics(label: str, branch: ModeBranch) -> list[Verdict]:
     """Return what is to be thought of the harmonics of a mode."""
-    solved = case["status"].values[i] == 0
-    change, wanted = case["change"].values[i][solved], float(case["accuracy"].values[i])
+    name, change = branch.name, branch.change[branch.status == 0]
     if change.size and np.all(np.isnan(change)):
         why = f"{name}: was solved with one set of harmonics alone"
         return [Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics.")]
-    above = change[change > wanted]
+    above = change[change > branch.accuracy]
     if not above.size:
         return []
     most = float(above[np.isfinite(above)].max(initial=0.0))
@@ -108,26 +102,24 @@ def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the modes of each case."""
-    return tuple(_table(case, head) for case, head in told_apart(data) if "mode" in case)
+    every = ((record_of(NonlinearModes, case), head) for case, head in told_apart(data))
+    return tuple(_table(found, head) for found, head in every if found.branches)
 
 
-def _table(case: xr.Dataset, head: str) -> TextTable:
+def _table(found: NonlinearModes, head: str) -> TextTable:
     rows = []
-    for i in range(case.sizes["branch"]):
-        hertz = case["frequency_hz"].values[i] if "frequency_hz" in case else np.zeros(0)
-        known = hertz[np.isfinite(hertz)]
+    for branch in found.branches:
+        known = branch.frequency_hz[np.isfinite(branch.frequency_hz)]
         rows.append(
             (
-                branch_name(case, i),
-                f"{float(case['mode_frequency_hz'][i]):.6g}",
+                branch.name,
+                f"{branch.mode_frequency_hz:.6g}",
                 f"{known.min():.6g} to {known.max():.6g}" if known.size else "-",
-                f"{100 * float(case['mode_damping_ratio'][i]):+.4g}",
-                number(100 * float(case["largest_damping_ratio"][i])),
-                number(1e3 * float(case["largest_damping_amplitude"][i])),
-                str(case["problem"][i].values) or str(case["end"][i].values),
+                f"{100 * branch.mode_damping_ratio:+.4g}",
+                number(100 * branch.largest_damping_ratio),
+                number(1e3 * branch.largest_damping_amplitude),
+                branch.problem or branch.end,
             )
         )
     columns = ("mode", "Hz, stuck", "Hz", "damping %, stuck", "most damping %", "at mm", "end")
-    return TextTable(
-        f"{head}Nonlinear modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows)
-    )
+    return TextTable(f"{head}Nonlinear modes over the amplitude of {found.output}", columns, tuple(rows))
