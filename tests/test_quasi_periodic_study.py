@@ -123,7 +123,7 @@ def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time(tmp_
     found = at_frequency(question, 2 * np.pi * 88.0, None)
     assert found.kind == "second tone"
     index = [tuple(row) for row in found.indices]
-    waves = [float(np.hypot(*found.coefficients[index.index(i), 0])) for i in ((1, 0), (0, 1))]
+    waves = [float(found.amplitude[index.index(i), 0]) for i in ((1, 0), (0, 1))]
     # all sectors in time, from the motion of the balance as it is in each of them
     whole = all_sectors(question.model.system, question.first, every=True)
     own, omega = whole.structure.n // 5, found.first

@@ -26,8 +26,8 @@ from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis
 from stickslip.analyses.modal_synthesis.records import SynthesisLevel
 from stickslip.analyses.nonlinear_mode.analysis import NONLINEAR_MODE
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes
-from stickslip.analyses.quasi_periodic.dataset import dataset as of_two_frequencies
-from stickslip.analyses.quasi_periodic.records import TwoFrequencies
+from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
+from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.analyses.residual_tractions.dataset import dataset as of_tractions
 from stickslip.analyses.residual_tractions.records import TractionRecord
 from stickslip.analyses.resonance.dataset import dataset as of_resonances
@@ -398,7 +398,8 @@ def two_frequency_point(k: int, kind: str, indices: Any, time: float) -> TwoFreq
         unknown="u" * k,
         indices=np.array(indices),
         unknowns=np.zeros((count, 1, 2)),
-        coefficients=np.tile(np.array([[[3.0, 4.0]]]) * (k + 1), (count, 2, 1)),
+        combined=count - 1,
+        amplitude=np.full((count, 2), 5.0 * (k + 1)),
         largest=np.array([5.0, 6.0]) + k,
         least=np.array([3.0, 4.0]) + k,
         rms=np.array([2.0, 1.0]) + k,
@@ -406,7 +407,7 @@ def two_frequency_point(k: int, kind: str, indices: Any, time: float) -> TwoFreq
         envelope=np.arange(4.0) + k,
         left_out=0.01 * (k + 1),
         slip=1e-3 * (k + 1),
-        iterations=7 + k,
+        newton_iterations=7 + k,
         time_largest=np.array([time, 6.5]) * (k + 1),
         time_least=np.array([time, 4.5]) * (k + 1),
         time_off=0.001 * (k + 1),
@@ -418,7 +419,7 @@ def test_two_frequencies() -> None:
         two_frequency_point(0, "two loads", [(0, 0), (1, 0), (0, 1)], 5.5),
         two_frequency_point(1, "not found", [(0, 0)], 5.5),
     ]
-    data = of_two_frequencies(solved(points, {"model": {"output": ["b.x", "c.x"]}}))
+    data = QUASI_PERIODIC.dataset(solved(points, {"model": {"output": ["b.x", "c.x"]}}))
     assert data.attrs["failed"] == 1
     amplitude = np.full((2, 3, 2), NAN)
     amplitude[0], amplitude[1, 0] = 5.0, 10.0
@@ -446,7 +447,7 @@ def test_two_frequencies() -> None:
         time_off=[0.001, 0.002],
     )
     untimed = [two_frequency_point(0, "two loads", [(0, 0)], NAN)]
-    alone = of_two_frequencies(solved([SimpleNamespace(**{**vars(untimed[0]), "time_largest": np.array([NAN, NAN])})]))
+    alone = QUASI_PERIODIC.dataset(solved([replace(untimed[0], time_largest=np.array([NAN, NAN]))]))
     assert not [name for name in alone if str(name).startswith("time_")]
 
 
@@ -826,7 +827,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (LimitCycles, NonlinearModes)  # of cases, whose fields are columns
+RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic)  # of cases, whose fields are columns
 
 
 def written() -> set[str]:

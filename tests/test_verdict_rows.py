@@ -17,7 +17,9 @@ from stickslip.analyses.modal_synthesis import verdicts as synthesis
 from stickslip.analyses.modal_synthesis.percents import percent
 from stickslip.analyses.modal_synthesis.solve import judged
 from stickslip.analyses.nonlinear_mode import verdicts as backbones
+from stickslip.analyses.nonlinear_mode.records import NonlinearModes
 from stickslip.analyses.quasi_periodic import verdicts as two_frequencies
+from stickslip.analyses.quasi_periodic.records import QuasiPeriodic
 from stickslip.analyses.residual_tractions import verdicts as tractions
 from stickslip.analyses.resonance import verdicts as resonances
 from stickslip.analyses.run_up import verdicts as running
@@ -42,7 +44,7 @@ TWO: dict[str, Any] = {
     "time_off": [0.0],
 }
 TWO_ROWS: list[Row] = [
-    ({"kind": None}, []),
+    (dict.fromkeys(TWO), []),
     ({}, [("trusted", "1 motions", "at most 0 %", "compared with time integration")]),
     (
         {"kind": ["not found"], "why": ["it diverged."]},
@@ -277,7 +279,7 @@ MODE: dict[str, Any] = {
 }
 FOLLOWED = ("trusted", "mode 3 followed from 0.01 to 1 mm: the largest damping ratio is 2 % at 0.1 mm")
 MODE_ROWS: list[Row] = [
-    ({"mode": None}, []),
+    (dict.fromkeys(MODE), []),
     ({}, [FOLLOWED]),
     ({"end": ["gross slip"]}, [FOLLOWED]),
     ({"end": ["lift-off at 1 mm"]}, [("note", "mode 3: lift-off at 1 mm", "Beyond it"), FOLLOWED]),
@@ -453,7 +455,11 @@ PEAK_ROWS: list[tuple[dict[str, Any], dict[str, Any], list[tuple[str, ...]]]] = 
 ]
 
 
-RECORDS: dict[Any, type[Any]] = {cycles: LimitCycles}  # what the rules of an analysis are given
+RECORDS: dict[Any, type[Any]] = {
+    cycles: LimitCycles,
+    backbones: NonlinearModes,
+    two_frequencies: QuasiPeriodic,
+}  # what the rules of an analysis are given
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,21 @@
 """Motions with two frequencies: two loads, or a forced motion and a second tone that grows by itself."""
 
-from stickslip.analyses.quasi_periodic.dataset import dataset
+from functools import partial
+
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.quasi_periodic.problem import NAME, hertz, question_of
-from stickslip.analyses.quasi_periodic.records import TwoFrequencies
+from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies, answer
 from stickslip.analyses.quasi_periodic.solve import solve
 from stickslip.analyses.quasi_periodic.table import QuasiPeriodicTable
-from stickslip.analyses.quasi_periodic.verdicts import tables
+from stickslip.analyses.quasi_periodic.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.study.analysis import Analysis, Case, of_tables
 from stickslip.units import HZ
+
+
+def _lost(found: QuasiPeriodic) -> int:
+    """Return at how many frequencies no motion was found."""
+    return sum(not point.solved for point in found.points)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
@@ -31,7 +38,7 @@ QUASI_PERIODIC = Analysis(
     key=of_tables(NAME),
     inputs=question_of,
     solve=solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
 )

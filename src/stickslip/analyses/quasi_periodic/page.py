@@ -1,15 +1,21 @@
 """Motions with two frequencies: envelopes, and the combined frequencies that they are made of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
+from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
+from stickslip.units import HZ
 
 SHOWN = 6  # motions drawn one by one
 FAINT = 1e-4  # of the largest: combined frequencies that are not drawn
@@ -19,36 +25,48 @@ FAINT = 1e-4  # of the largest: combined frequencies that are not drawn
 class TwoTonesView(Node):
     """One case."""
 
+    @cached_property
+    def found(self) -> QuasiPeriodic:
+        """What was found."""
+        known: QuasiPeriodic = record_of(QuasiPeriodic, self.data)
+        return known
+
     @property
     def name(self) -> str:
         """Of the output that is drawn."""
-        return self.labels_of("output_name")[0]
+        return str(self.found.output_name[0])
 
     @property
-    def there(self) -> list[int]:
-        """Positions of the motions that were found, with a second frequency."""
-        return [i for i, hz in enumerate(self.floats("second_hz")) if np.isfinite(hz)]
+    def there(self) -> list[TwoFrequencies]:
+        """The motions that were found, with a second frequency."""
+        return [point for point in self.found.points if np.isfinite(point.second)]
 
     @property
-    def drawn(self) -> list[int]:
+    def drawn(self) -> list[TwoFrequencies]:
         """Some of them, evenly taken."""
         there = self.there
         few = np.unique(np.linspace(0, len(there) - 1, min(SHOWN, len(there))).round().astype(int))
         return [there[i] for i in few] if there else []
 
-    def label(self, i: int) -> str:
-        """Name a motion by its frequencies."""
-        first, second = (float(self.floats(f"{n}_hz")[i]) for n in ("first", "second"))
-        return f"{first:.5g} and {second:.5g} Hz"
+
+def _label(point: TwoFrequencies) -> str:
+    """Name a motion by its frequencies."""
+    return f"{point.first / HZ:.5g} and {point.second / HZ:.5g} Hz"
+
+
+def _known(every: Sequence[FloatArray]) -> FloatArray:
+    own = np.concatenate(every)
+    return np.asarray(own[np.isfinite(own)])
 
 
 def envelopes(view: TwoTonesView) -> Plot | None:
     """Show how far the amplitude goes up and down over the first frequency."""
-    if not view.has("largest") or view.data.sizes["point"] < 2:
+    points = view.found.points
+    if len(points) < 2:
         return None
-    hz = view.floats("first_hz")
+    hz = np.array([point.first / HZ for point in points])
     figure = go.Figure()
-    sizes = {w: view.values(w, "point", "output")[:, 0] for w in ("largest", "least", "rms")}
+    sizes = {w: np.array([getattr(point, w)[0] for point in points]) for w in ("largest", "least", "rms")}
     scale = scale_for(sizes["largest"][np.isfinite(sizes["largest"])], "m")
     for i, (word, own) in enumerate(sizes.items()):
         figure.add_trace(
@@ -76,18 +94,17 @@ def over_phase(view: TwoTonesView) -> Plot | None:
     if not view.drawn:
         return None
     figure = go.Figure()
-    own = view.values("envelope", "point", "phase")
-    scale = scale_for(own[np.isfinite(own)], "m")
-    degrees = 360.0 * np.arange(own.shape[1]) / own.shape[1]
-    for place, i in enumerate(view.drawn):
+    scale = scale_for(_known([point.envelope for point in view.found.points]), "m")
+    for i, point in enumerate(view.drawn):
+        phases = point.envelope.size
         figure.add_trace(
             go.Scatter(
-                x=degrees,
-                y=scale.factor * own[i],
+                x=360.0 * np.arange(phases) / phases,
+                y=scale.factor * point.envelope,
                 mode="lines",
-                name=view.label(i),
-                line={"color": colour(place), "width": 2},
-                hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.0f}}°<extra>{view.label(i)}</extra>",
+                name=_label(point),
+                line={"color": colour(i), "width": 2},
+                hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.0f}}°<extra>{_label(point)}</extra>",
             )
         )
     styled(figure, 420)
@@ -102,22 +119,20 @@ def combined(view: TwoTonesView) -> Plot | None:
     if not view.drawn:
         return None
     figure = go.Figure()
-    index = np.asarray(view.data["index"].transpose("point", "index", "tone").values)
-    sizes = np.asarray(view.data["amplitude"].transpose("point", "index", "output").values)[:, :, 0]
-    scale = scale_for(sizes[np.isfinite(sizes)], "m")
-    for place, i in enumerate(view.drawn):
-        hz = index[i] @ np.array([view.floats("first_hz")[i], view.floats("second_hz")[i]])
-        known = np.isfinite(sizes[i]) & (sizes[i] > FAINT * np.nanmax(sizes[i][1:]))
+    scale = scale_for(_known([point.amplitude[:, 0] for point in view.found.points]), "m")
+    for i, point in enumerate(view.drawn):
+        hz, sizes = point.indices @ np.array([point.first / HZ, point.second / HZ]), point.amplitude[:, 0]
+        known = np.isfinite(sizes) & (sizes > FAINT * np.nanmax(sizes[1:]))
         known[0] = False
-        names = [f"{j} f1 {k:+d} f2" for j, k in index[i][known]]
+        names = [f"{j} f1 {k:+d} f2" for j, k in point.indices[known]]
         figure.add_trace(
             go.Scatter(
                 x=np.abs(hz[known]),
-                y=scale.factor * sizes[i][known],
+                y=scale.factor * sizes[known],
                 mode="markers",
-                name=view.label(i),
+                name=_label(point),
                 text=names,
-                marker={"color": colour(place), "size": 8},
+                marker={"color": colour(i), "size": 8},
                 hovertemplate=f"%{{text}}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
             )
         )
@@ -130,11 +145,8 @@ def combined(view: TwoTonesView) -> Plot | None:
 
 def motions(view: TwoTonesView) -> Table:
     """Return a row a motion."""
-    kinds, reasons = view.labels_of("kind"), view.labels_of("why")
-    largest, least, rms, extreme = (
-        view.values(w, "point", "output")[:, 0] for w in ("largest", "least", "rms", "extreme")
-    )
-    timed = view.has("time_largest")
+    points = view.found.points
+    timed = any(point.time_largest is not None for point in points)
     head = [
         "first (Hz)",
         "second (Hz)",
@@ -148,46 +160,42 @@ def motions(view: TwoTonesView) -> Table:
         *(["in time"] if timed else []),
         "why",
     ]
-    rows = []
-    for i, kind in enumerate(kinds):
-        second = float(view.floats("second_hz")[i])
-        lengths = [quantity(float(v[i]), "m", 4) if np.isfinite(v[i]) else NONE for v in (least, largest, rms, extreme)]
-        left = float(view.floats("left_out")[i])
-        rows.append(
-            [
-                fixed(float(view.floats("first_hz")[i]), 3),
-                fixed(second, 3) if np.isfinite(second) else NONE,
-                kind,
-                *lengths,
-                str(int(view.integers("combined")[i])),
-                number(100 * left, 2) if np.isfinite(left) else NONE,
-                *([_in_time(view, i)] if timed else []),
-                reasons[i],
-            ]
-        )
-    return Table(head, rows, "Motions")
+    return Table(head, [_row(point, timed=timed) for point in points], "Motions")
 
 
-def _in_time(view: TwoTonesView, i: int) -> str:
-    ends = [float(view.values(f"time_{w}", "point", "output")[i, 0]) for w in ("least", "largest")]
-    if not np.isfinite(ends[1]):
+def _row(point: TwoFrequencies, *, timed: bool) -> list[str]:
+    second, left = point.second / HZ, point.left_out
+    sizes = [float(own[0]) for own in (point.least, point.largest, point.rms, point.extreme)]
+    return [
+        fixed(point.first / HZ, 3),
+        fixed(second, 3) if np.isfinite(second) else NONE,
+        point.kind,
+        *(quantity(own, "m", 4) if np.isfinite(own) else NONE for own in sizes),
+        str(point.combined),
+        number(100 * left, 2) if np.isfinite(left) else NONE,
+        *([_in_time(point)] if timed else []),
+        point.why,
+    ]
+
+
+def _in_time(point: TwoFrequencies) -> str:
+    if point.time_largest is None or point.time_least is None or not np.isfinite(point.time_largest[0]):
         return NONE
-    off = float(view.floats("time_off")[i])
+    off = np.nan if point.time_off is None else point.time_off
     told = f", {number(100 * off, 2)} % off" if np.isfinite(off) else ""
-    return f"{quantity(ends[0], 'm', 4)} to {quantity(ends[1], 'm', 4)}{told}"
+    return f"{quantity(float(point.time_least[0]), 'm', 4)} to {quantity(float(point.time_largest[0]), 'm', 4)}{told}"
 
 
 def _cards(view: TwoTonesView) -> list[Card]:
     there = view.there
     if not there:
         return [Card("0", "motions with two frequencies", "none was found")]
-    largest = view.values("largest", "point", "output")[:, 0]
-    top = max(there, key=lambda i: largest[i])
+    top = max(there, key=lambda point: point.largest[0])
     return [
         Card(
-            quantity(float(largest[top]), "m", 4),
+            quantity(float(top.largest[0]), "m", 4),
             "largest amplitude with two frequencies",
-            f"{view.label(top)}; {counted(len(there), 'motion')}",
+            f"{_label(top)}; {counted(len(there), 'motion')}",
             False,
         )
     ]

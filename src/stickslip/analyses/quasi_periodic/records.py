@@ -1,68 +1,97 @@
-"""Journal records at one first frequency."""
+"""Motions with two frequencies: one at each first frequency, and all of a case."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.column import column, rows
+from stickslip.study.analysis import Solved
+from stickslip.units import HZ
 
 Kind = Literal["two loads", "second tone", "no second tone", "not found"]
+NOT_FOUND = "not found"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class TwoFrequencies:
-    """A motion with two frequencies, or why there is none.
+    """A motion with two frequencies, or why there is none; NaN of what was not found or not asked for.
 
-    Parameters
+    Attributes
     ----------
-    first, second
-        rad/s; `second` NaN where there is no second tone.
-    kind
-        What the second frequency is.
-    why
-        What it rests on, or why none was found.
-    indices
-        (K, 2) of the combined frequencies.
-    unknown
-        Where there is no second tone: why it is not known that nothing else grows; empty where it is.
-    coefficients
-        (K, outputs, 2) real and imaginary part, m.
     unknowns
-        (K, n_retained, 2) of the retained coordinates, where the next one begins, m.
-    largest, least, rms, extreme
-        (outputs,) envelope, root mean square about the mean, largest distance from it, m.
-    envelope
-        (PHASES,) amplitude of the first output over the phase of the second frequency, m.
-    left_out, slip
-        As of `TorusMotion`.
-    iterations
-        Newton steps of the last solution.
-    time_largest, time_least
-        (outputs,) of time integration, m; NaN where it was not asked.
-    time_off
-        Root mean square difference of time integration and balance, relative; NaN where phases are not comparable.
+        (K, n_retained, 2) real and imaginary part of the retained coordinates, where the next one begins, m.
     """
 
-    first: float
-    second: float
-    kind: str
-    why: str
-    unknown: str
-    indices: IntArray
-    coefficients: FloatArray
-    unknowns: FloatArray
-    largest: FloatArray
-    least: FloatArray
-    rms: FloatArray
-    extreme: FloatArray
-    envelope: FloatArray
-    left_out: float
-    slip: float
-    iterations: int
-    time_largest: FloatArray
-    time_least: FloatArray
-    time_off: float
+    first: float = column("Hz", "first frequency", "first_hz", per=HZ)
+    second: float = column("Hz", "second frequency; NaN where there is none", "second_hz", per=HZ)
+    kind: str = column("1", "two loads, second tone, no second tone or not found")
+    why: str = column("1", "what that rests on")
+    unknown: str = column(
+        "1", "where there is no second tone: why it is not known that nothing else grows; empty where it is"
+    )
+    combined: int = column("1", "combined frequencies that are kept")
+    left_out: float = column(
+        "1",
+        "what those left out would change the motion by, root mean square over it, of the coordinate that they change most",
+    )
+    slip: float = column("rad", "by how much the second phase in the contacts is off after a turn of the first")
+    newton_iterations: int = column("1", "Newton steps of the last solution")
+    largest: FloatArray = column(
+        "m", "largest amplitude, half of peak to peak in a period of the first frequency", along="output"
+    )
+    least: FloatArray = column("m", "least such amplitude", along="output")
+    rms: FloatArray = column("m", "root mean square about the mean", along="output")
+    extreme: FloatArray = column("m", "largest distance from the mean", along="output")
+    envelope: FloatArray = column(
+        "m",
+        "such an amplitude of the first output over the phase of the second frequency where the period begins",
+        along="phase",
+    )
+    indices: IntArray = column("1", "j and k of the combined frequencies j f1 + k f2", "index", along="index tone")
+    amplitude: FloatArray = column(
+        "m", "amplitude of each combined frequency; of (0, 0) the mean", along="index output"
+    )
+    time_largest: FloatArray | None = column("m", "largest amplitude in time", along="output", default=None)
+    time_least: FloatArray | None = column("m", "least amplitude in time", along="output", default=None)
+    time_off: float | None = column(
+        "1",
+        "difference of the motion in time from the balance, root mean square over that of the motion; of two loads",
+        default=None,
+    )
+    unknowns: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 2)))
 
     @property
     def solved(self) -> bool:
         """Whether there is a motion."""
-        return self.kind != "not found"
+        return self.kind != NOT_FOUND
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QuasiPeriodic:
+    """All that is found of a case."""
+
+    output_name: Any = column("1", "output", along="output", default=None)
+    accuracy: float | None = column("1", "accuracy that is asked for, of the same measure as left_out", default=None)
+    points: tuple[TwoFrequencies, ...] = rows("point")
+
+
+def answer(solved: Solved) -> QuasiPeriodic:
+    """Return what the job of a case has found, from its motions and its notes."""
+    model = solved.notes.get("model", {})
+    return QuasiPeriodic(
+        output_name=np.array([str(name) for name in np.atleast_1d(model.get("output", []))], dtype=str),
+        accuracy=model.get("accuracy"),
+        points=_alike(solved.records),
+    )
+
+
+def _alike(points: Sequence[TwoFrequencies]) -> tuple[TwoFrequencies, ...]:
+    """Return motions with as many combined frequencies each, (0, 0) behind their own, and without what time integration found of none."""
+    most = max((len(p.indices) for p in points), default=0)
+    points = [replace(p, indices=np.pad(p.indices, ((0, most - len(p.indices)), (0, 0)))) for p in points]
+    if any(p.time_largest is not None and np.any(np.isfinite(p.time_largest)) for p in points):
+        return tuple(points)
+    return tuple(replace(p, time_largest=None, time_least=None, time_off=None) for p in points)

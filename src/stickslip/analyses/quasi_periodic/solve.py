@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.analyses.forced_response.stability.examination import too_long
 from stickslip.analyses.quasi_periodic.problem import NAME, Question, hertz
-from stickslip.analyses.quasi_periodic.records import TwoFrequencies
+from stickslip.analyses.quasi_periodic.records import NOT_FOUND, TwoFrequencies
 from stickslip.analyses.quasi_periodic.time import compared
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import StickslipError
@@ -58,26 +58,28 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
     alone = kind == "no second tone"
     none = np.full(outputs.size, np.nan)
     largest, least, off = (none, none, np.nan) if in_time is None else in_time
+    seen = motion.coefficients[:, outputs]
     return TwoFrequencies(
-        motion.omegas[0],
-        np.nan if alone else motion.omegas[1],
-        kind,
-        why,
-        unknown,
-        np.array(motion.indices, dtype=np.int64),
-        _parts(motion.coefficients[:, outputs]),
-        _parts(problem.balance.coefficients(motion.x)),
-        shown.largest,
-        shown.least,
-        shown.rms,
-        _extreme(motion, outputs),
-        shown.amplitude[:, 0],
-        motion.left_out,
-        motion.slip,
-        motion.iterations,
-        largest,
-        least,
-        off,
+        first=motion.omegas[0],
+        second=np.nan if alone else motion.omegas[1],
+        kind=kind,
+        why=why,
+        unknown=unknown,
+        combined=len(motion.indices) - 1,
+        left_out=motion.left_out,
+        slip=motion.slip,
+        newton_iterations=motion.iterations,
+        largest=shown.largest,
+        least=shown.least,
+        rms=shown.rms,
+        extreme=_extreme(motion, outputs),
+        envelope=shown.amplitude[:, 0],
+        indices=np.array(motion.indices, dtype=np.int64),
+        amplitude=np.hypot(seen.real, seen.imag),
+        time_largest=largest,
+        time_least=least,
+        time_off=off,
+        unknowns=_parts(problem.balance.coefficients(motion.x)),
     )
 
 
@@ -202,35 +204,35 @@ def _nothing(question: Question, omega: float, why: str) -> TwoFrequencies:
     n = len(question.model.system.outputs)
     none = np.full(n, np.nan)
     return TwoFrequencies(
-        omega,
-        np.nan,
-        "not found",
-        why,
-        "",
-        np.zeros((0, 2), dtype=np.int64),
-        np.zeros((0, n, 2)),
-        np.zeros((0, 0, 2)),
-        none,
-        none,
-        none,
-        none,
-        np.full(PHASES, np.nan),
-        np.nan,
-        np.nan,
-        0,
-        none,
-        none,
-        np.nan,
+        first=omega,
+        second=np.nan,
+        kind=NOT_FOUND,
+        why=why,
+        unknown="",
+        combined=0,
+        left_out=np.nan,
+        slip=np.nan,
+        newton_iterations=0,
+        largest=none,
+        least=none,
+        rms=none,
+        extreme=none,
+        envelope=np.full(PHASES, np.nan),
+        indices=np.zeros((0, 2), dtype=np.int64),
+        amplitude=np.zeros((0, n)),
+        time_largest=none,
+        time_least=none,
+        time_off=np.nan,
     )
 
 
 def _told(one: TwoFrequencies) -> str:
     head = f"{NAME}: {hertz(one.first)}"
-    if one.kind == "not found":
+    if not one.solved:
         return f"{head}: no motion found: {one.why}"
     if one.kind == "no second tone":
         return f"{head}: no second tone: {one.why}"
     return (
         f"{head} and {hertz(one.second)} ({one.kind}): amplitude {millimetres_between(one.least[0], one.largest[0])}, "
-        f"{len(one.indices) - 1} combined frequencies, {100 * one.left_out:.2g} % left out"
+        f"{one.combined} combined frequencies, {100 * one.left_out:.2g} % left out"
     )

@@ -1,61 +1,65 @@
 """Verdicts on motions with two frequencies, and the terminal tables."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import number, told_apart
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
-from stickslip.units import millimetres_between
+from stickslip.units import HZ, millimetres_between
 
 LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful whatever was asked for
 SLIP = 5e-3  # rad a turn, the same
 
 
-def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables."""
-    points = case["kind"].size if "kind" in case else 0
-    found = [v for i in range(points) for v in _of_point(label, case, i)]
-    if points and not found:
-        worst = np.nanmax(np.append(case["left_out"].values, np.nan_to_num(0.0)))
-        why = f"{points} motions, combined frequencies left out would change the motion by at most {100 * worst:.2g} %"
+def case_verdicts(label: str, case: QuasiPeriodic) -> list[Verdict]:
+    """Return what is to be thought of a case."""
+    asked = LARGE if case.accuracy is None else case.accuracy
+    found = [v for point in case.points for v in _of_point(label, point, asked)]
+    if case.points and not found:
+        worst = np.nanmax([0.0, *(point.left_out for point in case.points)])
+        why = f"{len(case.points)} motions, combined frequencies left out would change the motion by at most {100 * worst:.2g} %"
         found.append(Verdict("trusted", label, None, f"{why}; compared with time integration"))
     return found
 
 
-def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
-    def number(name: str) -> float:
-        return float(case[name].values[i])
-
-    hz, kind, why = number("first_hz"), str(case["kind"].values[i]), str(case["why"].values[i])
-    if kind == "not found":
+def _of_point(label: str, point: TwoFrequencies, asked: float) -> list[Verdict]:
+    hz = point.first / HZ
+    if not point.solved:
         remedy = "Give quasi_periodic.second_hz, more harmonics, or nearer frequencies_hz."
-        return [Verdict("wrong", label, hz, f"no motion was found: {why.removesuffix('.')}", remedy)]
-    if kind == "no second tone":
-        return [_without(label, hz, why, str(case["unknown"].values[i]))]
-    found = list(_unexamined(label, case, i))
-    found += _left_out(label, hz, number("left_out"), float(case.get("accuracy", LARGE)))
-    if number("slip") > SLIP:
-        off = f"contacts were marched at a ratio by which the second phase is off by {number('slip'):.2g} rad a turn"
+        return [Verdict("wrong", label, hz, f"no motion was found: {point.why.removesuffix('.')}", remedy)]
+    if point.kind == "no second tone":
+        return [_without(label, hz, point.why, point.unknown)]
+    found = list(_unexamined(label, point))
+    found += _left_out(label, hz, point.left_out, asked)
+    if point.slip > SLIP:
+        off = f"contacts were marched at a ratio by which the second phase is off by {point.slip:.2g} rad a turn"
         found.append(
             Verdict("doubtful", label, hz, off, "Take frequencies whose ratio is nearer to one of small numbers.")
         )
-    away = number("time_off") if "time_off" in case else np.nan
+    return [*found, *_of_time(label, point)]
+
+
+def _of_time(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
+    """Yield a doubt where time integration comes to another motion."""
+    hz = point.first / HZ
+    away = np.nan if point.time_off is None else point.time_off
     if away > LARGE:
         told = f"time integration is {100 * away:.2g} % off"
-        found.append(
-            Verdict("doubtful", label, hz, told, "Lower quasi_periodic.accuracy_percent, or look for another motion.")
-        )
-    if "time_largest" in case and not np.isfinite(away):
-        ends = [(float(case[n].values[i, 0]), float(case[f"time_{n}"].values[i, 0])) for n in ("largest", "least")]
-        size = ends[0][0]
-        apart = max(abs(b - t) for b, t in ends) / size
-        if apart > 2 * LARGE:
-            told = f"in time the amplitude goes from {millimetres_between(ends[1][1], ends[0][1])}, the balance has {millimetres_between(ends[1][0], size)}"
-            found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))
-    return found
+        remedy = "Lower quasi_periodic.accuracy_percent, or look for another motion."
+        yield Verdict("doubtful", label, hz, told, remedy)
+    if point.time_largest is None or point.time_least is None or np.isfinite(away):
+        return
+    largest, least, in_time, least_in_time = (
+        float(own[0]) for own in (point.largest, point.least, point.time_largest, point.time_least)
+    )
+    if max(abs(largest - in_time), abs(least - least_in_time)) / largest > 2 * LARGE:
+        told = f"in time the amplitude goes from {millimetres_between(least_in_time, in_time)}, the balance has {millimetres_between(least, largest)}"
+        yield Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time.")
 
 
 def _left_out(label: str, hz: float, share: float, asked: float) -> list[Verdict]:
@@ -77,13 +81,13 @@ def _without(label: str, hz: float, why: str, unknown: str) -> Verdict:
     return Verdict("doubtful", label, hz, told, remedy)
 
 
-def _unexamined(label: str, case: Mapping[str, xr.Variable], i: int) -> Iterator[Verdict]:
+def _unexamined(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
     """Yield a doubt where no time integration says whether the motion is left."""
-    hz, told = float(case["first_hz"].values[i]), "its stability was not examined"
-    if "time_largest" not in case:
+    hz, told = point.first / HZ, "its stability was not examined"
+    if point.time_largest is None:
         remedy = "Set quasi_periodic.in_time = true, of a single structure."
         yield Verdict("doubtful", label, hz, told, remedy)
-    elif not np.isfinite(case["time_largest"].values[i, 0]):
+    elif not np.isfinite(point.time_largest[0]):
         told += ": time integration came to nothing"
         remedy = "Take frequencies whose ratio is nearer to one of small numbers, but not to 1."
         yield Verdict("doubtful", label, hz, told, remedy)
@@ -91,23 +95,23 @@ def _unexamined(label: str, case: Mapping[str, xr.Variable], i: int) -> Iterator
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the motions of each case."""
-    return tuple(_table(case, head) for case, head in told_apart(data) if "kind" in case)
+    every = ((record_of(QuasiPeriodic, case), head) for case, head in told_apart(data))
+    return tuple(_table(found, head) for found, head in every if found.points)
 
 
-def _table(case: xr.Dataset, head: str) -> TextTable:
+def _table(found: QuasiPeriodic, head: str) -> TextTable:
     rows = [
         (
-            number(float(case["first_hz"][i])),
-            number(float(case["second_hz"][i])),
-            str(case["kind"][i].values),
-            number(1e3 * float(case["least"][i, 0])),
-            number(1e3 * float(case["largest"][i, 0])),
-            number(1e3 * float(case["rms"][i, 0])),
-            str(int(case["combined"][i])),
-            number(100 * float(case["left_out"][i])),
+            number(point.first / HZ),
+            number(point.second / HZ),
+            point.kind,
+            number(1e3 * float(point.least[0])),
+            number(1e3 * float(point.largest[0])),
+            number(1e3 * float(point.rms[0])),
+            str(point.combined),
+            number(100 * point.left_out),
         )
-        for i in range(case.sizes["point"])
+        for point in found.points
     ]
     columns = ("first Hz", "second Hz", "", "least mm", "largest mm", "rms mm", "combined", "left out %")
-    name = str(case["output_name"].values[0])
-    return TextTable(f"{head}Motions with two frequencies, amplitude of {name}", columns, tuple(rows))
+    return TextTable(f"{head}Motions with two frequencies, amplitude of {found.output_name[0]}", columns, tuple(rows))
