@@ -228,10 +228,10 @@ def laws() -> str:
 
 def variables_of_response() -> str:
     """Return the variables of a forced response, as the code that writes them lists them."""
-    from stickslip.analyses.forced_response.records.quantities import QUANTITIES
+    from stickslip.analyses.forced_response.records.columns import COLUMNS
 
     rows = [
-        f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |" for name, q in QUANTITIES.items()
+        f"| `{name}` | {', '.join(c.along)} | {_escaped(c.meaning)} | {_unit(c.unit)} |" for name, c in COLUMNS.items()
     ]
     return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
 

@@ -87,6 +87,10 @@ def test_b12_has_its_frequencies_its_largest_blade_and_its_amplification(ring) -
     assert float(forced["peak_amplitude"][0]) == pytest.approx(326.0181278, rel=1e-8)
     assert 2 * np.pi * float(forced["peak_frequency_hz"][0]) == pytest.approx(1.02076476, rel=1e-9)
     assert float(forced["tuned_peak_amplitude"][0]) == pytest.approx(245.14564, rel=3e-8)
+    # each blade peaks where the largest one does, or beside it; the tuned wheel within its sweep
+    assert np.all(np.abs(forced["blade_peak_hz"].values[0] / float(forced["peak_frequency_hz"][0]) - 1.0) < 0.1)
+    assert forced["blade_peak_hz"].values[0, 2] == float(forced["peak_frequency_hz"][0])
+    assert float(forced["tuned_peak_hz"][0]) in forced["tuned_frequency_hz"].values
     assert float(forced["amplification"][0]) == pytest.approx(1.32989568, rel=1e-8)
     assert float(forced["whitehead"][0]) == pytest.approx(2.232051, abs=1e-6)
     np.testing.assert_array_equal(forced["deviation"].values[0, :, 0], DEVIATIONS)

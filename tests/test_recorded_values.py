@@ -19,6 +19,7 @@ import xarray as xr
 from stickslip.analyses.all_motions.dataset import dataset as of_motions
 from stickslip.analyses.all_motions.dataset import noted
 from stickslip.analyses.columns import described
+from stickslip.analyses.forced_response.records.columns import KINDS
 from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
@@ -827,7 +828,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic)  # of cases, whose fields are columns
+RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic, *KINDS)  # of cases, whose fields are columns
 
 
 def written() -> set[str]:

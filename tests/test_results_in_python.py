@@ -8,7 +8,7 @@ import xarray as xr
 from synthetic_result import KEY, synthetic_result, tree_of
 
 import stickslip as ss
-from stickslip.analyses.forced_response.records.quantities import flags
+from stickslip.analyses.forced_response.records.columns import flags
 from stickslip.study.analysis import named
 
 

@@ -35,6 +35,7 @@ from stickslip.analyses.forced_response.problem import (
     with_comparisons,
 )
 from stickslip.analyses.forced_response.records.blades import of_blades
+from stickslip.analyses.forced_response.records.columns import KnownVerdicts, stored
 from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
 from stickslip.analyses.forced_response.records.points import Response, lost_point
 from stickslip.analyses.forced_response.records.pressures import pressure_lines
@@ -222,7 +223,7 @@ def _put_down(question: Question, response: Response, examined: Sequence[Examine
         return
     shift = peak_shift(question, response)
     notes.put("model", of_model(question, response.output))
-    told = {"known_verdicts": to_json(known(question, response, shift))}
+    told = stored(KnownVerdicts(known_verdicts=to_json(known(question, response, shift))))
     notes.put("response", of_response(question, response, shift) | told)
     size = f"peak {millimetres(response.peak_amplitude)} at {response.peak_hz:.3f} Hz"
     peak = f"{size}, {peak_word(response, examined)}, {len(response.accepted)} points"

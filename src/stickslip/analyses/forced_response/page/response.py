@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.forced_response.stability.stable_words import said_of
 from stickslip.analyses.forced_response.summary import MEASURED
 from stickslip.analyses.forced_response.verdicts.curve import Curve, branch_length, of_largest_blade, peak_output

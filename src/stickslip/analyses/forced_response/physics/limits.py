@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.columns import MotionAtPeak, PhysicsVerdicts, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.errors import InputError
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.physics.damper import DampedMode, damped_modes
 from stickslip.response.physics.friction import Friction, friction_of
 from stickslip.response.physics.modes import UNDAMPED_RATIO, Range, RangeMode, range_modes, springs_of
@@ -138,7 +140,7 @@ def of_physics(question: Question, response: Response) -> Values:
     """Return the variables of a case about its physics."""
     physics = physics_of(question)
     told = () if physics is None else afterwards(question, physics, response)
-    return {"physics_verdicts": to_json(told)}
+    return stored(PhysicsVerdicts(physics_verdicts=to_json(told)))
 
 
 def _of_energy(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
@@ -261,27 +263,32 @@ def motion_at_peak(question: Question, response: Response) -> Values:
     steepest slope is larger. The strain is the root mean square over the elastic parts; the largest strain is larger.
     """
     none = float("nan")
-    found = {"peak_rotation_rad": none, "peak_strain_rms": none, "peak_slip_facets": none}
+    rotation, strain, slipped = none, none, none
     top = response.top
-    if top is None or not top.point.converged:
-        return found
+    if top is not None and top.point.converged:
+        rotation, strain = _rotation_and_strain(question, top.point)
+        facet = np.sqrt(question.model.contacts.area)
+        if np.any(np.isfinite(facet)):
+            gap = signals(question.problem, top.point).gap[:, :2]
+            slip = 0.5 * np.hypot(*(np.ptp(gap[:, k], axis=1) for k in range(2)))
+            slipped = float(np.nanmax(slip / facet[: len(slip)]))
+    return stored(MotionAtPeak(peak_rotation_rad=rotation, peak_strain_rms=strain, peak_slip_facets=slipped))
+
+
+def _rotation_and_strain(question: Question, point: ForcedPoint) -> tuple[float, float]:
+    """Return the largest rotation (rad) and the root mean square of the strain of a motion; NaN where one is not known."""
     problem, extent = question.problem, question.extent
-    system, linear, point = problem.system, problem.low.linear, top.point
+    system, linear = problem.system, problem.low.linear
+    strain = float("nan")
     moved = np.abs(linear.recover(point.omega, point.coefficients))[1:].sum(axis=0)
     turns = np.array([c in ROTATIONS for c in system.structure.dofs.component], dtype=bool)
     slopes = [moved[turns]]
     if extent is not None:
         away = dict(zip(extent.labels, extent.from_clamp, strict=True))
-        each = np.array([away.get(name, none) for name in question.model.output_labels])
+        each = np.array([away.get(name, np.nan) for name in question.model.output_labels])
         slopes.append(moved[system.outputs[: each.size]] / each)
-        strain = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
-        found["peak_strain_rms"] = float(np.sqrt(max(4.0 * strain, 0.0) / extent.stiff_volume))
+        energy = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
+        strain = float(np.sqrt(max(4.0 * energy, 0.0) / extent.stiff_volume))
     known = np.concatenate(slopes)
     known = known[np.isfinite(known)]
-    found["peak_rotation_rad"] = float(known.max()) if known.size else none
-    facet = np.sqrt(question.model.contacts.area)
-    if np.any(np.isfinite(facet)):
-        gap = signals(problem, point).gap[:, :2]
-        slip = 0.5 * np.hypot(*(np.ptp(gap[:, k], axis=1) for k in range(2)))
-        found["peak_slip_facets"] = float(np.nanmax(slip / facet[: len(slip)]))
-    return found
+    return (float(known.max()) if known.size else float("nan")), strain

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.columns import ModelChanges, StiffnessChange, stored
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -47,13 +48,15 @@ def model_changes(question: Question, response: Response) -> Values:
             stays = np.isin(model.system.retained, system.retained)
             point = replace(top.point, coefficients=top.point.coefficients[:, stays])
             fewer = _change(response, own, _found(question, system, model.load, point))
-    return {
-        "modes_peak_change": more[0],
-        "modes_frequency_change_hz": more[1],
-        "points_peak_change": fewer[0],
-        "points_frequency_change_hz": fewer[1],
-        "points_left_out": left_out,
-    }
+    return stored(
+        ModelChanges(
+            modes_peak_change=more[0],
+            modes_frequency_change_hz=more[1],
+            points_peak_change=fewer[0],
+            points_frequency_change_hz=fewer[1],
+            points_left_out=left_out,
+        )
+    )
 
 
 def stiffness_changes(question: Question, response: Response) -> Values:
@@ -63,10 +66,12 @@ def stiffness_changes(question: Question, response: Response) -> Values:
         resonance = _at_resonance(question, top.point)
         slope = stiffness_slope(question.problem, top.point, response.output, resonance=resonance)
     unknown = float("nan")
-    return {
-        "stiffness_peak_slope": unknown if slope is None else slope.amplitude,
-        "stiffness_frequency_slope_hz": unknown if slope is None else slope.omega / HZ,
-    }
+    return stored(
+        StiffnessChange(
+            stiffness_peak_slope=unknown if slope is None else slope.amplitude,
+            stiffness_frequency_slope_hz=unknown if slope is None else slope.omega / HZ,
+        )
+    )
 
 
 def _at_resonance(question: Question, point: ForcedPoint) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.bounds import BOUND, localisation, whitehead
+from stickslip.analyses.forced_response.records.columns import Blades, stored
 from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.arrays import ComplexArray, IntArray
@@ -40,26 +41,25 @@ def of_blades(question: Question, response: Response) -> Values:
     own = every[at, np.arange(where.size)]
     motion = _motion(response, where)
     sizes = np.linalg.norm(motion, axis=0)
-    factor = response.peak_amplitude / tuned.peak_amplitude
-    found = {
-        "blade_peak_amplitude": own,
-        "blade_peak_hz": hertz[at],
-        "blade_motion": np.stack([motion[0].real, motion[0].imag], axis=-1),
-        "wave_amplitude": np.abs(np.fft.fft(motion, axis=1) / where.size),
-        "largest_blade": int(np.argmax(own)) if where.size else -1,
-        "tuned_peak_amplitude": tuned.peak_amplitude,
-        "tuned_peak_hz": tuned.peak_hz,
-        "amplification": factor,
-        "whitehead": whitehead(where.size),
-        "localisation": localisation(sizes),
-        "tuned_frequency_hz": np.array([a.point.omega / HZ for a in tuned.accepted]),
-        "tuned_amplitude": np.array([a.amplitudes(1)[0] for a in tuned.accepted]),
-        "deviation": np.array([*blades.deviations.values()]).reshape(-1, where.size).T,
-        "mistuned": tuple(blades.deviations),
-    }
-    found["wave_amplitude"] = np.linalg.norm(found["wave_amplitude"], axis=0)
-    LOG.info(question.said(sentence(where.size, factor, int(found["largest_blade"]))))
-    return found
+    factor, largest = response.peak_amplitude / tuned.peak_amplitude, int(np.argmax(own)) if where.size else -1
+    of_waves = np.abs(np.fft.fft(motion, axis=1) / where.size)
+    LOG.info(question.said(sentence(where.size, factor, largest)))
+    found = Blades(
+        blade_peak_amplitude=own,
+        blade_peak_hz=hertz[at],
+        blade_motion=np.stack([motion[0].real, motion[0].imag], axis=-1),
+        wave_amplitude=np.linalg.norm(of_waves, axis=0),
+        largest_blade=largest,
+        tuned_peak_amplitude=tuned.peak_amplitude,
+        tuned_peak_hz=tuned.peak_hz,
+        amplification=factor,
+        whitehead=whitehead(where.size),
+        localisation=localisation(sizes),
+        tuned_frequency_hz=np.array([a.point.omega / HZ for a in tuned.accepted]),
+        tuned_amplitude=np.array([a.amplitudes(1)[0] for a in tuned.accepted]),
+        deviation=np.array([*blades.deviations.values()]).reshape(-1, where.size).T,
+    )
+    return stored(found) | {"mistuned": tuple(blades.deviations)}
 
 
 def sentence(blades: int, factor: float, largest: int) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.forced_response.records.quantities import QUANTITIES, flags
+from stickslip.analyses.forced_response.records.columns import COLUMNS, flags
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.analyses.forced_response.verdicts.cases import with_levels
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
@@ -58,9 +58,9 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     before = np.cumsum([0, *(int(c["points"]) for c in cases)])
     each = _aligned([_of_case(i, c, int(before[i])) for i, c in enumerate(cases)])
     found = {
-        name: _joined([e[name].variable for e in each if name in e], along=quantity.dims[0])
-        for name, quantity in QUANTITIES.items()
-        if (any if quantity.dims[0] in SOME else all)(name in e for e in each)
+        name: _joined([e[name].variable for e in each if name in e], along=column.along[0])
+        for name, column in COLUMNS.items()
+        if (any if column.along[0] in SOME else all)(name in e for e in each)
     }
     empty = [name for name, variable in found.items() if not _told(name, variable)]
     ordered = {name: variable for name, variable in found.items() if name not in empty}
@@ -70,8 +70,8 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     data = xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
     data = data.assign(with_levels(data, labels))
     for name, own in data.data_vars.items():
-        quantity = QUANTITIES[str(name)]
-        own.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(str(name))
+        column = COLUMNS[str(name)]
+        own.attrs = {"units": column.unit, "long_name": column.meaning} | flags(str(name))
     return data
 
 
@@ -105,8 +105,8 @@ def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
         if like in values:
             values[own] = np.full(len(values[like]), index)
     data = {
-        name: xr.Variable(quantity.dims, _shaped(values[name], quantity.dims))
-        for name, quantity in QUANTITIES.items()
+        name: xr.Variable(column.along, _shaped(values[name], column.along))
+        for name, column in COLUMNS.items()
         if name in values
     }
     named = {name: [str(x) for x in values[name]] for name in LABELLED if name in values}

@@ -9,8 +9,22 @@ import numpy.typing as npt
 
 from stickslip.analyses.forced_response.more_harmonics import ReferenceDoubt
 from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.columns import (
+    MOTION,
+    STAGES,
+    Attempts,
+    CaseNumbers,
+    ExaminedRows,
+    ModelFacts,
+    MoreHarmonics,
+    PeakPeriod,
+    PointFields,
+    Points,
+    PointStability,
+    TimeChecks,
+    stored,
+)
 from stickslip.analyses.forced_response.records.points import Response
-from stickslip.analyses.forced_response.records.quantities import MOTION, STAGES
 from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.analyses.forced_response.stability.stable_words import BASES
@@ -26,27 +40,29 @@ Values = dict[str, Any]
 def of_model(question: Question, output: int) -> Values:
     """Return the variables of the model: labels, contacts, static state, natural frequencies, skin; `output` is the output with the peak."""
     model, skin = question.model, question.model.skin
-    found = {
+    table, frequencies = model.contacts, model.frequencies
+    facts = ModelFacts(
+        frequency_full_hz=frequencies.free_full,
+        frequency_reduced_hz=frequencies.free_reduced,
+        frequency_stuck_full_hz=frequencies.stuck_full,
+        frequency_stuck_reduced_hz=frequencies.stuck_reduced,
+        static_gap=model.static_gap,
+        static_force=model.static_force,
+        contact_law=table.laws,
+        contact_group=table.groups,
+        contact_position=table.position,
+        contact_frame=table.frame,
+        contact_area=table.area,
+        surface_point=None if skin is None else skin.points,
+        surface_triangle=None if skin is None else skin.triangles,
+    )
+    labels = {
         "output": model.output_labels,
         "retained": model.system.retained_labels,
-        "contact": model.contacts.names,
+        "contact": table.names,
         "driven": question.driven_names,
-        "frequency_full_hz": model.frequencies.free_full,
-        "frequency_reduced_hz": model.frequencies.free_reduced,
-        "frequency_stuck_full_hz": model.frequencies.stuck_full,
-        "frequency_stuck_reduced_hz": model.frequencies.stuck_reduced,
-        "static_gap": model.static_gap,
-        "static_force": model.static_force,
-        "contact_law": model.contacts.laws,
-        "contact_group": model.contacts.groups,
-        "contact_position": model.contacts.position,
-        "contact_frame": model.contacts.frame,
-        "contact_area": model.contacts.area,
-        "attributes": json.dumps(_attributes(question, output)),
     }
-    if skin is None:
-        return found
-    return found | {"surface_point": skin.points, "surface_triangle": skin.triangles}
+    return stored(facts) | labels | {"attributes": json.dumps(_attributes(question, output))}
 
 
 def _attributes(question: Question, output: int) -> Values:
@@ -92,14 +108,21 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
 
 def of_checks(checks: Sequence[Check]) -> Values:
     """Return the variables of the comparisons with time integration."""
-    real = ("frequency_hz", "transient", "balance", "difference_percent", "outputs_percent", "scatter", "refined")
-    columns = {f"verify_{name}": np.array([getattr(c, name) for c in checks]) for name in real}
-    return columns | {
-        "verify_settled": _whole(int(c.settled) for c in checks),
-        "verify_periods": _whole(c.periods for c in checks),
-        "verify_motion": texts(c.motion for c in checks),
-        "verify_sentence": texts(c.sentence for c in checks),
-    }
+    return stored(
+        TimeChecks(
+            verify_frequency_hz=np.array([c.frequency_hz for c in checks]),
+            verify_transient=np.array([c.transient for c in checks]),
+            verify_balance=np.array([c.balance for c in checks]),
+            verify_difference_percent=np.array([c.difference_percent for c in checks]),
+            verify_outputs_percent=np.array([c.outputs_percent for c in checks]),
+            verify_scatter=np.array([c.scatter for c in checks]),
+            verify_refined=np.array([c.refined for c in checks]),
+            verify_settled=_whole(int(c.settled) for c in checks),
+            verify_periods=_whole(c.periods for c in checks),
+            verify_motion=texts(c.motion for c in checks),
+            verify_sentence=texts(c.sentence for c in checks),
+        )
+    )
 
 
 def of_examined(examined: Sequence[Examined], count: int) -> Values:
@@ -109,61 +132,65 @@ def of_examined(examined: Sequence[Examined], count: int) -> Values:
     basis = np.zeros(count, dtype=np.int64)
     for e in examined:
         word[e.position], basis[e.position] = MOTION[e.verdict], BASES.index(e.basis)
-    return {
-        "stability_frequency_hz": np.array([e.omega / HZ for e in rows]),
-        "stability_verdict": texts(e.verdict for e in rows),
-        "stability_multiplier": np.array([e.multiplier for e in rows]),
-        "stability_multiplier_error": np.array([e.error for e in rows]),
-        "stability_sentence": texts(e.sentence for e in rows),
-        "motion_stability": word,
-        "motion_stability_basis": basis,
-    }
+    examined_rows = ExaminedRows(
+        stability_frequency_hz=np.array([e.omega / HZ for e in rows]),
+        stability_verdict=texts(e.verdict for e in rows),
+        stability_multiplier=np.array([e.multiplier for e in rows]),
+        stability_multiplier_error=np.array([e.error for e in rows]),
+        stability_sentence=texts(e.sentence for e in rows),
+    )
+    return stored(examined_rows) | stored(PointStability(motion_stability=word, motion_stability_basis=basis))
 
 
 def of_doubt(doubt: ReferenceDoubt) -> Values:
     """Return the variables of the check with more harmonics."""
-    return {
-        "reference_error_percent": 100 * doubt.errors,
-        "reference_worst_percent": 100 * doubt.worst,
-        "reference_worst_hz": doubt.frequency_hz,
-        "reference_above": doubt.above,
-        "reference_sentence": doubt.sentence,
-    }
+    return stored(
+        MoreHarmonics(
+            reference_error_percent=100 * doubt.errors,
+            reference_worst_percent=100 * doubt.worst,
+            reference_worst_hz=doubt.frequency_hz,
+            reference_above=doubt.above,
+            reference_sentence=doubt.sentence,
+        )
+    )
 
 
 def _of_case(question: Question, response: Response, shift: tuple[float, float]) -> Values:
     contact, linear, rest = response.seconds
-    return {
-        "excitation_n": question.model.excitation,
-        "lowest_hz": question.sweep.omega_range[0] / HZ,
-        "highest_hz": question.sweep.omega_range[1] / HZ,
-        "peak_amplitude": response.peak_amplitude,
-        "peak_frequency_hz": response.peak_hz,
-        "peak_point": response.peak,
-        "peak_damping": _damping(question, response),
-        **_of_unstable(response),
-        "points": len(response.accepted),
-        "points_low": response.points_low,
-        "points_high": len(response.accepted) - response.points_low,
-        "points_failed": response.failed,
-        "unknowns_solved": response.unknowns,
-        "newton_steps": response.newton_steps,
-        "seconds_contact": contact,
-        "seconds_linear": linear,
-        "seconds_rest": rest,
-        "choice_sentence": question.chooser.sentence(response) if question.chooser.decides else "",
-        "retention_peak_shift": shift[0],
-        "retention_frequency_shift_hz": shift[1],
-    }
+    larger, larger_hz = _unstable_peak(response)
+    return stored(
+        CaseNumbers(
+            excitation_n=question.model.excitation,
+            lowest_hz=question.sweep.omega_range[0] / HZ,
+            highest_hz=question.sweep.omega_range[1] / HZ,
+            peak_amplitude=response.peak_amplitude,
+            peak_frequency_hz=response.peak_hz,
+            peak_point=response.peak,
+            peak_damping=_damping(question, response),
+            unstable_peak_amplitude=larger,
+            unstable_peak_frequency_hz=larger_hz,
+            points=len(response.accepted),
+            points_low=response.points_low,
+            points_high=len(response.accepted) - response.points_low,
+            points_failed=response.failed,
+            unknowns_solved=response.unknowns,
+            newton_steps=response.newton_steps,
+            seconds_contact=contact,
+            seconds_linear=linear,
+            seconds_rest=rest,
+            choice_sentence=question.chooser.sentence(response) if question.chooser.decides else "",
+            retention_peak_shift=shift[0],
+            retention_frequency_shift_hz=shift[1],
+        )
+    )
 
 
-def _of_unstable(response: Response) -> Values:
-    """Return the largest motion where it is unstable, so that it is not the peak."""
+def _unstable_peak(response: Response) -> tuple[float, float]:
+    """Return amplitude and frequency (Hz) of the largest motion where it is unstable, so that it is not the peak; else NaN."""
     if response.unstable_peak < 0:
-        return {"unstable_peak_amplitude": np.nan, "unstable_peak_frequency_hz": np.nan}
+        return np.nan, np.nan
     own = response.accepted[response.unstable_peak]
-    size, hz = response.amplitude(own), own.point.omega / HZ
-    return {"unstable_peak_amplitude": size, "unstable_peak_frequency_hz": hz}
+    return response.amplitude(own), own.point.omega / HZ
 
 
 def _damping(question: Question, response: Response) -> float:
@@ -179,23 +206,25 @@ def _of_points(question: Question, response: Response) -> Values:
     own = np.array([p.predicted_error for p in points], dtype=float)
     omega = np.array([p.omega for p in points])
     speed = omega / engine_order / RPM if question.over_speed and engine_order else omega * np.nan
-    return {
-        "frequency_hz": omega / HZ,
-        "speed_rpm": speed,
-        "order": _whole(p.order for p in points),
-        "unknowns": _whole(p.unknowns for p in points),
-        "status": _whole(int(p.status) for p in points),
-        "indicator": asked if chooser.is_error else own,
-        "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
-        "own_error_percent": 100 * np.array([a.own_error for a in response.accepted]),
-        "audit_error_percent": 100 * np.array([a.audit_error for a in response.accepted]),
-        "audit_error_of": texts(labels[a.audit_place] if a.audit_place >= 0 else "" for a in response.accepted),
-        "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
-        "newton_iterations": _whole(p.iterations for p in points),
-        "seconds": np.array([p.seconds_total for p in points]),
-        "refinement": _whole(int(p.stage == "peak") for p in points),
-        "marched_sentence": texts(str(marched_of(p) or "") for p in points),
-    }
+    return stored(
+        Points(
+            frequency_hz=omega / HZ,
+            speed_rpm=speed,
+            order=_whole(p.order for p in points),
+            unknowns=_whole(p.unknowns for p in points),
+            status=_whole(int(p.status) for p in points),
+            indicator=asked if chooser.is_error else own,
+            predicted_error_percent=100 * asked if chooser.is_error else np.full(asked.size, np.nan),
+            own_error_percent=100 * np.array([a.own_error for a in response.accepted]),
+            audit_error_percent=100 * np.array([a.audit_error for a in response.accepted]),
+            audit_error_of=texts(labels[a.audit_place] if a.audit_place >= 0 else "" for a in response.accepted),
+            real_error_percent=100 * np.array([a.real_error for a in response.accepted]),
+            newton_iterations=_whole(p.iterations for p in points),
+            seconds=np.array([p.seconds_total for p in points]),
+            refinement=_whole(int(p.stage == "peak") for p in points),
+            marched_sentence=texts(str(marched_of(p) or "") for p in points),
+        )
+    )
 
 
 def _of_fields(question: Question, response: Response) -> Values:
@@ -209,17 +238,19 @@ def _of_fields(question: Question, response: Response) -> Values:
 
     retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]
     lost = np.full(n_contacts, np.nan)
-    return {
-        "harmonic_kept": _kept([a.point for a in every], high),
-        "amplitude": _stacked([a.amplitudes(n_outputs) for a in every], n_outputs),
-        "amplitude_low": _stacked([a.first_amplitudes(n_outputs, low) for a in every], n_outputs),
-        "driven_amplitude": _stacked([a.driven_amplitudes(n_outputs) for a in every], len(question.driven), n_outputs),
-        "output_displacement": block("outputs", n_outputs),
-        "retained_displacement": _parts(retained, (high + 1, n_retained)),
-        "gap": block("gaps", n_contacts, 3),
-        "contact_force": block("forces", n_contacts, 3),
-        "dissipated_energy": _stacked([getattr(a.fields, "energy", lost) for a in every], n_contacts),
-    }
+    return stored(
+        PointFields(
+            harmonic_kept=_kept([a.point for a in every], high),
+            amplitude=_stacked([a.amplitudes(n_outputs) for a in every], n_outputs),
+            amplitude_low=_stacked([a.first_amplitudes(n_outputs, low) for a in every], n_outputs),
+            driven_amplitude=_stacked([a.driven_amplitudes(n_outputs) for a in every], len(question.driven), n_outputs),
+            output_displacement=block("outputs", n_outputs),
+            retained_displacement=_parts(retained, (high + 1, n_retained)),
+            gap=block("gaps", n_contacts, 3),
+            contact_force=block("forces", n_contacts, 3),
+            dissipated_energy=_stacked([getattr(a.fields, "energy", lost) for a in every], n_contacts),
+        )
+    )
 
 
 def _of_peak(question: Question, response: Response) -> Values:
@@ -227,9 +258,11 @@ def _of_peak(question: Question, response: Response) -> Values:
         n, samples = len(question.model.contacts.names), question.sweep.samples
         lost = np.full((n, 3, samples), np.nan)
         state = np.full((n, 2, samples), -1)
-        return {"peak_time": lost[0, 0], "peak_gap": lost, "peak_force": lost, "peak_state": state}
+        return stored(PeakPeriod(peak_time=lost[0, 0], peak_gap=lost, peak_force=lost, peak_state=state))
     period = signals(question.problem, response.top.point)
-    return {"peak_time": period.time, "peak_gap": period.gap, "peak_force": period.force, "peak_state": period.state}
+    return stored(
+        PeakPeriod(peak_time=period.time, peak_gap=period.gap, peak_force=period.force, peak_state=period.state)
+    )
 
 
 def _of_attempts(question: Question, response: Response) -> Values:
@@ -237,20 +270,22 @@ def _of_attempts(question: Question, response: Response) -> Values:
     # the accepted points do not tell it all: a branch with many harmonics takes the place of points that the alert spoke of
     alert = question.chooser.is_error
     asked = [p for p in points if alert and p.stage in ("low", "point") and not np.isnan(p.predicted_error)]
-    return {
-        "attempt_frequency_hz": np.array([p.omega / HZ for p in points]),
-        "attempt_stage": _whole(STAGES.index(p.stage) for p in points),
-        "attempt_kept": _kept(points, highest(response)),
-        "attempt_unknowns": _whole(p.unknowns for p in points),
-        "attempt_indicator": np.array([p.predicted_error for p in points]),
-        "attempt_repeated": _whole(int(p.asked.size > 0) for p in points),
-        "attempt_status": _whole(int(p.status) for p in points),
-        "attempt_newton_iterations": _whole(p.iterations for p in points),
-        "attempt_seconds": np.array([p.seconds_total for p in points]),
-        "alert_frequency_hz": np.array([p.omega / HZ for p in asked]),
-        "alert_error_percent": np.array([100 * p.predicted_error for p in asked]),
-        "alert_repeated": _whole(int(p.asked.size > 0) for p in asked),
-    }
+    return stored(
+        Attempts(
+            attempt_frequency_hz=np.array([p.omega / HZ for p in points]),
+            attempt_stage=_whole(STAGES.index(p.stage) for p in points),
+            attempt_kept=_kept(points, highest(response)),
+            attempt_unknowns=_whole(p.unknowns for p in points),
+            attempt_indicator=np.array([p.predicted_error for p in points]),
+            attempt_repeated=_whole(int(p.asked.size > 0) for p in points),
+            attempt_status=_whole(int(p.status) for p in points),
+            attempt_newton_iterations=_whole(p.iterations for p in points),
+            attempt_seconds=np.array([p.seconds_total for p in points]),
+            alert_frequency_hz=np.array([p.omega / HZ for p in asked]),
+            alert_error_percent=np.array([100 * p.predicted_error for p in asked]),
+            alert_repeated=_whole(int(p.asked.size > 0) for p in asked),
+        )
+    )
 
 
 def highest(response: Response) -> int:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.columns import MOTION, BifurcationRows, PointStability, stored
 from stickslip.analyses.forced_response.records.points import Response
-from stickslip.analyses.forced_response.records.quantities import MOTION
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.stability.examination import FLOPS, by_hill, examination_work, hill_work
 from stickslip.analyses.forced_response.stability.stable import Examined, why_not
@@ -124,27 +124,27 @@ def of_bifurcations(
     points = [(n, side, p) for n, (_, side) in enumerate(sides) for p in side.points]
     output = response.output
     known = [*found.stabilities, *([None] * (len(response.accepted) - len(found.stabilities)))]
-    return {
-        "bifurcation_frequency_hz": np.array([b.omega / HZ for b in own]),
-        "bifurcation_frequency_error_hz": np.array([b.omega_error / HZ for b in own]),
-        "bifurcation_amplitude": np.array([problem.amplitude_of(b.omega, b.point.coefficients, output) for b in own]),
-        "bifurcation_kind": texts(b.kind for b in own),
-        "bifurcation_multiplier": np.array([[b.multiplier.real, b.multiplier.imag] for b in own]).reshape(-1, 2),
-        "bifurcation_multiplier_error": np.array([b.multiplier_error for b in own]),
-        "bifurcation_certain": np.array([int(b.certain) for b in own], dtype=np.int64),
-        "bifurcation_outside": np.array([b.after for b in own], dtype=np.int64),
-        "bifurcation_sentence": texts(b.sentence for b in own),
-        "bifurcations_limits": "; ".join(limits(question, found)),
-        **_of_motions(known, examined),
-        "side_branch_frequency_hz": np.array([b.omega / HZ for b, _ in sides]),
-        "side_branch_periods": np.array([s.periods for _, s in sides], dtype=np.int64),
-        "side_branch_sentence": texts(f"from the {b.kind} at {b.omega / HZ:.6g} Hz: {s.sentence}" for b, s in sides),
-        "side_point_frequency_hz": np.array([s.periods * p.omega / HZ for _, s, p in points]),
-        "side_point_branch": np.array([n for n, _, _ in points], dtype=np.int64),
-        "side_point_amplitude": np.array([s.amplitude(p, output) for _, s, p in points]),
-        "side_point_subharmonic": np.array([s.subharmonic(p, output) for _, s, p in points]),
-        "side_point_localisation": np.array([s.localisation(p) for _, s, p in points]),
-    }
+    rows = BifurcationRows(
+        bifurcation_frequency_hz=np.array([b.omega / HZ for b in own]),
+        bifurcation_frequency_error_hz=np.array([b.omega_error / HZ for b in own]),
+        bifurcation_amplitude=np.array([problem.amplitude_of(b.omega, b.point.coefficients, output) for b in own]),
+        bifurcation_kind=texts(b.kind for b in own),
+        bifurcation_multiplier=np.array([[b.multiplier.real, b.multiplier.imag] for b in own]).reshape(-1, 2),
+        bifurcation_multiplier_error=np.array([b.multiplier_error for b in own]),
+        bifurcation_certain=np.array([int(b.certain) for b in own], dtype=np.int64),
+        bifurcation_outside=np.array([b.after for b in own], dtype=np.int64),
+        bifurcation_sentence=texts(b.sentence for b in own),
+        bifurcations_limits="; ".join(limits(question, found)),
+        side_branch_frequency_hz=np.array([b.omega / HZ for b, _ in sides]),
+        side_branch_periods=np.array([s.periods for _, s in sides], dtype=np.int64),
+        side_branch_sentence=texts(f"from the {b.kind} at {b.omega / HZ:.6g} Hz: {s.sentence}" for b, s in sides),
+        side_point_frequency_hz=np.array([s.periods * p.omega / HZ for _, s, p in points]),
+        side_point_branch=np.array([n for n, _, _ in points], dtype=np.int64),
+        side_point_amplitude=np.array([s.amplitude(p, output) for _, s, p in points]),
+        side_point_subharmonic=np.array([s.subharmonic(p, output) for _, s, p in points]),
+        side_point_localisation=np.array([s.localisation(p) for _, s, p in points]),
+    )
+    return stored(rows) | _of_motions(known, examined)
 
 
 def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
@@ -190,4 +190,4 @@ def _of_motions(known: Sequence[Stability | None], examined: Sequence[Examined])
             word[i], basis[i] = MOTION[found.verdict], BASES.index("examined")
         if i in own and (found is None or own[i].motion or own[i].basis == "examined"):
             word[i], basis[i] = MOTION[own[i].verdict], BASES.index(own[i].basis)
-    return {"motion_stability": word, "motion_stability_basis": basis}
+    return stored(PointStability(motion_stability=word, motion_stability_basis=basis))

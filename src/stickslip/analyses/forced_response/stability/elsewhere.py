@@ -3,6 +3,7 @@
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.records.columns import OtherMotions, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.stability.stable import examine
@@ -25,13 +26,15 @@ def motions_elsewhere(question: Question, response: Response) -> Values:
                 found += [(other, word)] * (word != "unstable")
     if not found:
         return {}
-    return {
-        "another_frequency_hz": np.array([o.point.omega / HZ for o, _ in found]),
-        "another_amplitude": np.array([o.amplitude for o, _ in found]),
-        "another_known": np.array([o.known for o, _ in found]),
-        "another_start": texts(o.start for o, _ in found),
-        "another_stability": texts(word for _, word in found),
-    }
+    return stored(
+        OtherMotions(
+            another_frequency_hz=np.array([o.point.omega / HZ for o, _ in found]),
+            another_amplitude=np.array([o.amplitude for o, _ in found]),
+            another_known=np.array([o.known for o, _ in found]),
+            another_start=texts(o.start for o, _ in found),
+            another_stability=texts(word for _, word in found),
+        )
+    )
 
 
 def _on_branch(response: Response, other: OtherMotion) -> bool:

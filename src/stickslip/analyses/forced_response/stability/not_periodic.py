@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question, too_large
+from stickslip.analyses.forced_response.records.columns import MotionsInTime, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.stability.in_time import GOLDEN, KICK
 from stickslip.analyses.forced_response.stability.stable import Examined
@@ -313,25 +315,24 @@ def _nothing(omega: float, why: str, count: int, said: str) -> Answer:
     )
 
 
-def of_answers(answers: Sequence[Answer]) -> dict[str, object]:
+def of_answers(answers: Sequence[Answer]) -> dict[str, Any]:
     """Return the variables of these motions."""
-    named = (
-        "largest",
-        "least",
-        "mean",
-        "rms",
-        "extreme",
-        "spread",
-        "periods",
-        "seconds",
-        "line_hz",
-        "line_amplitude",
-        "amplitudes",
+    return stored(
+        MotionsInTime(
+            not_periodic_frequency_hz=np.array([a.omega / HZ for a in answers]),
+            not_periodic_settled=np.array([a.settled for a in answers], dtype=np.int64),
+            not_periodic_repeats=np.array([a.periodic for a in answers], dtype=np.int64),
+            not_periodic_sentence=np.array([a.sentence for a in answers], dtype=str),
+            not_periodic_largest=np.array([a.largest for a in answers]),
+            not_periodic_least=np.array([a.least for a in answers]),
+            not_periodic_mean=np.array([a.mean for a in answers]),
+            not_periodic_rms=np.array([a.rms for a in answers]),
+            not_periodic_extreme=np.array([a.extreme for a in answers]),
+            not_periodic_spread=np.array([a.spread for a in answers]),
+            not_periodic_periods=np.array([a.periods for a in answers]),
+            not_periodic_seconds=np.array([a.seconds for a in answers]),
+            not_periodic_line_hz=np.array([a.line_hz for a in answers]),
+            not_periodic_line_amplitude=np.array([a.line_amplitude for a in answers]),
+            not_periodic_amplitudes=np.array([a.amplitudes for a in answers]),
+        )
     )
-    found: dict[str, object] = {f"not_periodic_{name}": np.array([getattr(a, name) for a in answers]) for name in named}
-    return found | {
-        "not_periodic_frequency_hz": np.array([a.omega / HZ for a in answers]),
-        "not_periodic_settled": np.array([a.settled for a in answers], dtype=np.int64),
-        "not_periodic_repeats": np.array([a.periodic for a in answers], dtype=np.int64),
-        "not_periodic_sentence": np.array([a.sentence for a in answers], dtype=str),
-    }

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.chooser import error_text
+from stickslip.analyses.forced_response.records.columns import Verdicts, stored
 from stickslip.analyses.forced_response.stability.stable_words import said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import (
@@ -19,6 +20,7 @@ from stickslip.analyses.forced_response.verdicts.rules import (
     without_place,
 )
 from stickslip.arrays import IntArray
+from stickslip.column import columns_of
 from stickslip.harmonic.judging import REACH
 from stickslip.study.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level, Verdict, of_all_cases, worst
 
@@ -145,13 +147,16 @@ def verdicts(data: xr.Dataset, labels: Sequence[str]) -> tuple[Verdict, ...]:
 def with_levels(data: xr.Dataset, labels: Sequence[str]) -> dict[str, tuple[str, object]]:
     """Return level of each case and point, and reasons, as variables: dimension and values."""
     every = judged(data, labels)
-    found: dict[str, tuple[str, object]] = {
-        "case_verdict": ("case", np.array([LEVELS.index(own.level) for own in every]))
-    }
+    of_cases = np.array([LEVELS.index(own.level) for own in every])
     if "point_case" not in data:
-        return found
+        return _with_dimensions(Verdicts(case_verdict=of_cases))
     levels = np.zeros(data.sizes["point"], dtype=np.int64)
     reasons = np.full(levels.size, "", dtype=object)
     for own in every:
         levels[own.case.at], reasons[own.case.at] = own.of_points
-    return found | {"verdict": ("point", levels), "verdict_reason": ("point", reasons.astype(str))}
+    return _with_dimensions(Verdicts(case_verdict=of_cases, verdict=levels, verdict_reason=reasons.astype(str)))
+
+
+def _with_dimensions(found: Verdicts) -> dict[str, tuple[str, object]]:
+    dims = columns_of(Verdicts)
+    return {name: (dims[name].along[0], values) for name, values in stored(found).items()}

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.problem import RIGID
-from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.response.forced.amplitude import amplitudes

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.problem import ALONE, MORE_THAN_LOW, MOST_IN_TIME, TOO_MANY
-from stickslip.analyses.forced_response.records.quantities import MOTION
+from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
