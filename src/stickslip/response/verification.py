@@ -121,6 +121,13 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
         return point.predicted_error
     if problem.system.interface.rigid:
         return float("nan")
+    if point not in problem.own_errors:
+        problem.own_errors[point] = _predicted(problem, point)
+    return problem.own_errors[point]
+
+
+def _predicted(problem: ForcedProblem, point: ForcedPoint) -> float:
+    """Predict by Newton steps what the harmonics of its judging set would change in a solution, a fraction; see `own_error`."""
     own = with_stiffness(problem.balance(point.support))
     x = own.unknowns(point.coefficients)
     wide = with_waves(problem, own, judging_set_of(own)[-1])

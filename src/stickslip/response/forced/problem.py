@@ -135,6 +135,7 @@ class ForcedProblem:
     high: Balance
     others: dict[Harmonics, Balance] = field(default_factory=dict)  # made when first needed
     ways: dict[AnyBalance, Following] = field(default_factory=dict, init=False)  # of each
+    own_errors: dict[ForcedPoint, float] = field(default_factory=dict, init=False)  # predicted of each
 
     @cached_property
     def strategy(self) -> Strategy:

@@ -48,8 +48,9 @@ def _located(states: ContactStates, contact: int) -> bytes:
 
 def _cycle(rows: FloatArray) -> bytes:
     """Return rows (n, k) that follow each other in a cycle, the repeated ones once, wherever the cycle begins: their number and themselves."""
-    texts = [b"".join(b"%d" % int(v) for v in row) for row in rows]
-    changed = [text for i, text in enumerate(texts) if text != texts[i - 1]]
-    kept = changed or texts[:1]
+    changed = np.any(rows != np.roll(rows, 1, axis=0), axis=1)
+    chosen = rows[changed] if np.any(changed) else rows[:1]
+    # a contact changes at few of the times at which any of them does
+    kept = [b"".join(b"%d" % v for v in row) for row in chosen.astype(np.int64).tolist()]
     turned = min(kept[i:] + kept[:i] for i in range(len(kept)))
     return b"%d:" % len(kept) + b",".join(turned)

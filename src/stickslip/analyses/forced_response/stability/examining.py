@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 
@@ -275,7 +275,9 @@ def with_stable_peak(response: Response, known: list[Examined]) -> Response:
     return replace(response, peak=position, unstable_peak=response.peak)
 
 
+@lru_cache(maxsize=2)
 def _course(question: Question, response: Response) -> Course:
+    """Return the course of a response; kept, because it is asked for after each motion in time."""
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
     return course_of(question.problem, [a.point for a in every], along, _jumps(response, along))
