@@ -3,6 +3,8 @@
 The derivative of a contact's forces by its gaps is a few (m, m) blocks, m = 2H+1, in the order of `PAIRS`.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
@@ -134,28 +136,198 @@ def multiply_blocks(real, imaginary, rows, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def sweep(real, imaginary, blocks, columns, values, scale, rows, gap, out):  # type: ignore[no-untyped-def]
+def _own_less_mean(block, real, imaginary, p, q):  # type: ignore[no-untyped-def]
+    """Return an entry of a block whose row and column belong to one harmonic, without the mean of that harmonic."""
+    if p == q:
+        return block[p, q] - real
+    return block[p, q] - imaginary if q > p else block[p, q] + imaginary
+
+
+@njit(cache=True, nogil=True)
+def _any_below(block):  # type: ignore[no-untyped-def]
+    """Tell whether a force depends on harmonics below its own."""
+    for p in range(1, block.shape[0]):
+        for q in range(2 * ((p + 1) // 2) - 1):
+            if block[p, q] != 0.0:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _any_above(block, real, imaginary):  # type: ignore[no-untyped-def]
+    """Tell whether a force depends on its own harmonic, but for means (H+1,), or on higher ones."""
+    for p in range(block.shape[0]):
+        h = (p + 1) // 2
+        for q in range(max(2 * h - 1, 0), 2 * h + 1):
+            if _own_less_mean(block, real[h], imaginary[h], p, q) != 0.0:
+                return True
+        for q in range(2 * h + 1, block.shape[0]):
+            if block[p, q] != 0.0:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _filled(blocks, real, imaginary, below, above):  # type: ignore[no-untyped-def]
+    """Tell (n_contacts, P) which blocks have entries below the harmonics on their diagonal, and which have others that no mean stands for."""
+    for c in range(blocks.shape[0]):
+        for b in range(blocks.shape[1]):
+            row, col = _PAIRS[b, 0], _PAIRS[b, 1]
+            below[c, b] = _any_below(blocks[c, b])
+            above[c, b] = _any_above(blocks[c, b], real[:, c, row, col], imaginary[:, c, row, col])
+
+
+@njit(cache=True, nogil=True)
+def _laid_out(blocks, real, imaginary, below, lower, above, upper):  # type: ignore[no-untyped-def]
+    """Copy the entries of the pairs `below` and `above`, (k, 2) each, in the order in which `sweep` and `add_upper` read them."""
+    m = blocks.shape[2]
+    i = 0
+    for h in range(1, (m + 1) // 2):
+        first = 2 * h - 1
+        for k in range(below.shape[0]):
+            block = blocks[below[k, 0], below[k, 1]]
+            for p in range(first, first + 2):
+                lower[i : i + first] = block[p, :first]
+                i += first
+    i = 0
+    for k in range(above.shape[0]):
+        c, b = above[k, 0], above[k, 1]
+        row, col = _PAIRS[b, 0], _PAIRS[b, 1]
+        for p in range(m):
+            h = (p + 1) // 2
+            first = max(2 * h - 1, 0)
+            upper[i : i + m - first] = blocks[c, b, p, first:]
+            for q in range(first, 2 * h + 1):
+                upper[i + q - first] = _own_less_mean(
+                    blocks[c, b], real[h, c, row, col], imaginary[h, c, row, col], p, q
+                )
+            i += m - first
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """What contact forces of each harmonic owe to lower harmonics, and what to their own and higher ones, as a Krylov method reads it many times.
+
+    Attributes
+    ----------
+    below, above
+        (k, 2) contacts and blocks that have entries there; contacts at rest have none.
+    lower, upper
+        The entries one after the other: of `lower` harmonic by harmonic, of `upper` block by block; N/m.
+    """
+
+    below: IntArray
+    lower: FloatArray
+    above: IntArray
+    upper: FloatArray
+
+
+def triangles(blocks: FloatArray, means: ComplexArray) -> Triangles:
+    """Split the derivatives of contact forces.
+
+    Parameters
+    ----------
+    blocks
+        (n_contacts, P, m, m), N/m.
+    means
+        (H+1, n_contacts, 3, 3) what is left out of each harmonic's own entries, see `harmonic_means`.
+    """
+    real, imaginary = np.ascontiguousarray(means.real), np.ascontiguousarray(means.imag)
+    m = blocks.shape[2]
+    filled = np.empty((2, *blocks.shape[:2]), dtype=bool)
+    _filled(blocks, real, imaginary, *filled)
+    below, above = (np.argwhere(which) for which in filled)
+    lower = np.empty(len(below) * (m - 1) ** 2 // 2)
+    upper = np.empty(len(above) * (m * m - (m - 1) ** 2 // 2))
+    _laid_out(blocks, real, imaginary, below, lower, above, upper)
+    return Triangles(below, lower, above, upper)
+
+
+@njit(cache=True, nogil=True, fastmath=_SUMS)
+def _product_of(one, other):  # type: ignore[no-untyped-def]
+    """Return the sum of the products of the entries of `one` with the first ones of `other`."""
+    total = 0.0
+    for q in range(one.size):
+        total += one[q] * other[q]
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath=_SUMS)
+def _push(force, columns, values, factor, first, last, out):  # type: ignore[no-untyped-def]
+    """Add to the rows `first` to `last` of `out` what the forces (n_contacts, 3, m) of these rows do to the coordinates, times a factor."""
+    for c in range(columns.shape[0]):
+        for j in range(columns.shape[1]):
+            for d in range(3):
+                value = factor * values[c, d, j]
+                if value != 0.0:
+                    for p in range(first, last):
+                        out[p, columns[c, j]] += value * force[c, d, p]
+
+
+@njit(cache=True, nogil=True, fastmath=_SUMS)
+def add_upper(above, upper, columns, values, scale, vector, gap, force, out):  # type: ignore[no-untyped-def]
+    """Add to `out` what the gaps of each harmonic and of higher ones do to its contact forces.
+
+    Parameters
+    ----------
+    above, upper
+        Of `Triangles`.
+    columns, values, scale
+        As in `subtract_lower`.
+    vector
+        (m, n) coefficients of the coordinates.
+    gap, force
+        Work: (n_contacts, 3, m) each.
+    out
+        In and out: (m, n).
+    """
+    m = vector.shape[0]
+    for c in range(columns.shape[0]):
+        _gap(columns[c], values[c], vector, gap[c])
+    force[:] = 0.0
+    i = 0
+    for k in range(above.shape[0]):
+        c, row, col = above[k, 0], _PAIRS[above[k, 1], 0], _PAIRS[above[k, 1], 1]
+        for p in range(m):
+            first = max(2 * ((p + 1) // 2) - 1, 0)
+            force[c, row, p] += _product_of(upper[i : i + m - first], gap[c, col, first:])
+            i += m - first
+    _push(force, columns, values, scale, 0, m, out)
+
+
+@njit(cache=True, nogil=True, fastmath=_SUMS)
+def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, force, out):  # type: ignore[no-untyped-def]
     """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts.
 
     Parameters
     ----------
     real, imaginary
         The inverses, as `stickslip.harmonic.matrix_products` has them.
-    blocks, columns, values, scale
+    below, lower
+        Of `Triangles`.
+    columns, values, scale
         As in `subtract_lower`.
     rows
         (m, n) right side; overwritten.
-    gap
-        Work: (n_contacts, 3, m).
+    gap, force
+        Work: (n_contacts, 3, m) each.
     out
         Out: (m, n) solution.
     """
-    before = first = 0
+    before = first = i = 0
     for h in range(real.shape[0]):
         last = 2 * h + 1
         if first > 0:
+            for c in range(columns.shape[0]):
+                _gap(columns[c], values[c], out[before:first], gap[c, :, before:first])
+            force[:, :, first:last] = 0.0
+            for k in range(below.shape[0]):
+                c, row, col = below[k, 0], _PAIRS[below[k, 1], 0], _PAIRS[below[k, 1], 1]
+                for p in range(first, last):
+                    force[c, row, p] += _product_of(lower[i : i + first], gap[c, col])
+                    i += first
             # what is subtracted comes from solved rows; it goes into rows that are not solved yet
-            subtract_lower(blocks, columns, values, out, before, first, last, scale, gap, rows)
+            _push(force, columns, values, -scale, first, last, rows)
         _multiply(real, imaginary, h, rows, out)
         before, first = first, last
 

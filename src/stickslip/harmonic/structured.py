@@ -16,7 +16,15 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
 from stickslip.contact.law import PAIRS
-from stickslip.contact.product import contact_product, harmonic_means, less_means, subtract_lower, sweep
+from stickslip.contact.product import (
+    add_upper,
+    contact_product,
+    harmonic_means,
+    less_means,
+    subtract_lower,
+    sweep,
+    triangles,
+)
 from stickslip.harmonic.costs import linear_costs, reduced_cost
 from stickslip.harmonic.factors import AnyFactors, as_array, factorise, real_part, with_contacts
 from stickslip.harmonic.linear import Shareable, StiffnessProducts
@@ -198,6 +206,8 @@ class StructuredJacobian:
     def preconditioned_by(self, kept: Kept) -> tuple[Solve, Product]:
         """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
         own = self._inverses(kept)
+        if isinstance(own, HarmonicFactors) and own.inverses is not None:
+            return self._by_triangles(own, own.inverses)
 
         def solve(right: FloatArray) -> FloatArray:
             return self._sweep(own, right)
@@ -211,6 +221,29 @@ class StructuredJacobian:
         def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
             q = self._by_row(v)
             return preconditioned + self.scale * self._add_contacts(left, q, False, np.zeros_like(q))
+
+        return solve, product
+
+    def _by_triangles(self, own: HarmonicFactors, inverses: SmallBlocks) -> tuple[Solve, Product]:
+        """Return the same where matrices are small: what couples harmonics is laid out for all products."""
+        parts = triangles(self.blocks, own.means)
+        columns, values = self.rows.columns, self.rows.values
+        gap, force = np.empty((2, len(self.blocks), 3, 2 * len(self.linear.harmonics) - 1))
+
+        def solve(right: FloatArray) -> FloatArray:
+            rows = self._by_row(right).copy()
+            out = np.empty_like(rows)
+            of = inverses.real, inverses.imaginary, parts.below, parts.lower
+            sweep(*of, columns, values, self.scale, rows, gap, force, out)
+            return out.reshape(-1)
+
+        if not self.linear.same(own.linear):
+            return solve, lambda v, _: self.matvec(v)
+
+        def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
+            out = self._by_row(preconditioned).copy()
+            add_upper(parts.above, parts.upper, columns, values, self.scale, self._by_row(v), gap, force, out)
+            return out.reshape(-1)
 
         return solve, product
 
@@ -247,20 +280,6 @@ class StructuredJacobian:
         """Solve harmonic by harmonic, from the static one up."""
         rows = self._by_row(right).copy()
         gap = np.zeros((len(self.blocks), 3, len(rows)))
-        if isinstance(own, HarmonicFactors) and own.inverses is not None:
-            out = np.empty_like(rows)
-            sweep(
-                own.inverses.real,
-                own.inverses.imaginary,
-                self.blocks,
-                self.rows.columns,
-                self.rows.values,
-                self.scale,
-                rows,
-                gap,
-                out,
-            )
-            return out.reshape(-1)
         before = first = 0
         for h in range(len(self.linear.harmonics)):
             last = 2 * h + 1
