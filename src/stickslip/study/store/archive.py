@@ -16,7 +16,7 @@ from stickslip.model.checksum import checked, with_checksum
 HEADER = np.lib.format.MAGIC_LEN + 2
 LAST_NAME = ".npy"  # of an array in the archive
 
-FORMAT = 7  # of all that is kept: raised whenever tables, records or archives change, once an issue at most
+FORMAT = 8  # of all that is kept: raised whenever tables, records or archives change, once an issue at most
 
 
 def encode(values: Mapping[str, Any]) -> bytes:
