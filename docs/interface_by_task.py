@@ -35,7 +35,7 @@ TASKS = {
     "Campbell, SAFE and nodal-diameter diagrams, flutter": ("response.rotating",),
     "Forced response": ("response",),
     "Harmonic balance": ("harmonic", "solve"),
-    "Which harmonics are kept": ("harmonic.selection", "response.contributions", "response.verification"),
+    "Which harmonics are kept": ("harmonic.selection", "response.verification"),
     "Peaks over a design parameter": ("response.resonances", "response.parameter"),
     "Stability": ("response.stability", "response.time.floquet", "response.free_motion"),
     "Bifurcations and other motions": ("response.bifurcations", "response.all_motions"),

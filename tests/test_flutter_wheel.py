@@ -14,11 +14,10 @@ from stickslip.reduction.aerodynamics import InfluenceCoefficients
 from stickslip.response.nonlinear_modes import ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import damping_over_amplitude, slip_amplitude
-from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles
+from stickslip.response.self_excited.cycles import LimitCycle, cycle_stability, limit_cycles
 from stickslip.response.self_excited.in_time import Marched, march_periods, wave_history
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
-from stickslip.response.self_excited.stable import cycle_stability
 from stickslip.response.stability import multipliers, stability
 from stickslip.response.stability.waves import growing_wave, point_disturbances
 from stickslip.response.time.sectors import all_in_time, all_sectors, whole_wheel

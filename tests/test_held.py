@@ -11,8 +11,7 @@ from test_cli import done, refused
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.forces import force_of
-from stickslip.assembly.joints.static_equilibrium_check import refuse_pulled
-from stickslip.assembly.joints.unconstrained_bodies import refuse_unheld, unheld
+from stickslip.assembly.joints.unconstrained_bodies import refuse_pulled, refuse_unheld, unheld
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.interface import Interface

@@ -15,13 +15,24 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
-from stickslip.response.nonlinear_modes.single_mode_flanks import along, slips_from
-from stickslip.response.nonlinear_modes.single_mode_validity import isolation, other_modes, with_others
-from stickslip.response.nonlinear_modes.synthesis import free_motions, motions_at, resonances, synthesise
+from stickslip.response.nonlinear_modes.single_mode_validity import (
+    along,
+    isolation,
+    other_modes,
+    slips_from,
+    with_others,
+)
+from stickslip.response.nonlinear_modes.synthesis import (
+    free_motions,
+    is_homogeneous,
+    motions_at,
+    peak_curve,
+    resonances,
+    synthesise,
+)
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.self_excited.modes import stuck_modes

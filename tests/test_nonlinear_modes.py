@@ -27,13 +27,13 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.matrix_products import known_by_vectors
 from stickslip.model.matrices import lumped
+from stickslip.response.equilibrium import holding, opening
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.nonlinear_modes.backbone import _begun_anew
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
-from stickslip.response.static_contact_state import holding, opening
 from stickslip.response.system import System
 from stickslip.study.check import check_study
 from stickslip.study.store.journal import JobJournal

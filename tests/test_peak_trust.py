@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.assembly.assembling import assemble
-from stickslip.assembly.parts.more_modes import with_more_modes
+from stickslip.assembly.assembling import assemble, with_more_modes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -22,7 +21,7 @@ from stickslip.response.forced import other_motions
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_points, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.physics.fewer_points import halved
+from stickslip.response.physics.contact_model import halved
 from stickslip.response.system import System
 from stickslip.response.time.stepping.marcher import step_work
 from tests.solid_models import box

@@ -15,9 +15,15 @@ from stickslip.contact.laws.dahl import Dahl
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import Iwan
 from stickslip.model.damping import Damping
-from stickslip.response.physics.damper import complex_stiffness, damped_modes
-from stickslip.response.physics.friction import friction_of
-from stickslip.response.physics.modes import Range, RangeMode, range_modes, springs_of
+from stickslip.response.physics.damping_of_modes import (
+    Range,
+    RangeMode,
+    complex_stiffness,
+    damped_modes,
+    friction_of,
+    range_modes,
+    springs_of,
+)
 from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
 

@@ -13,8 +13,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions import TractionSearch, confirmed, resonance_bounds, traction_bounds
-from stickslip.response.residual_tractions.bounds import _at, _setup
-from stickslip.response.residual_tractions.branches import may_be_several
+from stickslip.response.residual_tractions.bounds import _at, _setup, may_be_several
 from stickslip.response.residual_tractions.search import sliders_at
 from stickslip.response.system import System
 from stickslip.response.time.start import TransientStart

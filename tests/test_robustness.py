@@ -8,7 +8,7 @@ import pytest
 
 from evidence.models.random_machines import draw
 from stickslip.operators import times
-from stickslip.response.continuation.homotopies import growing_load, homotopies
+from stickslip.response.continuation.starting_solutions import growing_load, homotopies
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.solve.fallbacks import solve_robustly

@@ -12,7 +12,7 @@ from stickslip.reduction import wave_family
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.wave_family import WaveFamily
 from stickslip.reduction.waves import wave
-from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
+from stickslip.response.rotating.safe import nodal_diameter_map
 
 SECTORS = 7
 RNG = np.random.default_rng(2)

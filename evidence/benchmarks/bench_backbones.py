@@ -13,11 +13,11 @@ import numpy as np
 
 from evidence.models.two_blades import COARSER, two_blades
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.equilibrium import holding
 from stickslip.response.forced.response import forced_response
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
-from stickslip.response.static_contact_state import holding
 
 POINTS, ORDER, REPEATS = 30, 5, 5
 RATIOS = (50.0, 10.0, 4.0)  # F_CL / F_HE: from slip near resonance to slip everywhere

@@ -36,8 +36,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.equilibrium import preload
-from stickslip.response.static_contact_state import static_contact_force
+from stickslip.response.equilibrium import preload, static_contact_force
 from stickslip.response.system import System
 
 Random = np.random.Generator

@@ -9,7 +9,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.structure import Structure
-from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
+from stickslip.response.rotating.safe import nodal_diameter_map
 
 SOURCE = "literature benchmark B12"
 CASE = "B12 ring of blades"

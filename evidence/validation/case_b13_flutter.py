@@ -17,11 +17,10 @@ from stickslip.response.self_excited.curve import (
     parameter_over_amplitude,
     slip_amplitude,
 )
-from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles
+from stickslip.response.self_excited.cycles import LimitCycle, cycle_stability, limit_cycles
 from stickslip.response.self_excited.in_time import march_periods
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
-from stickslip.response.self_excited.stable import cycle_stability
 from stickslip.response.system import System
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.solve.newton_method import Newton

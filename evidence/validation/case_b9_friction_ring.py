@@ -19,7 +19,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.structure import Structure
 from stickslip.reduction.full_wheel import wheel
-from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
+from stickslip.response.rotating.safe import nodal_diameter_map
 from stickslip.solve.newton_method import Newton, newton
 
 SOURCE = "literature benchmark B9"

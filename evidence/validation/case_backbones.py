@@ -17,10 +17,10 @@ from evidence.models.random_machines import Drawn, draw
 from evidence.validation.compare import Record, record
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.equilibrium import holding
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
-from stickslip.response.static_contact_state import holding
 
 SOURCE = "goal of the issue on nonlinear modes"
 SEED, KNOWN, FRESH = 1717, 120, 80

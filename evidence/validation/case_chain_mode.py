@@ -15,8 +15,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, mode_point, nonlinear_mode
-from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
-from stickslip.response.nonlinear_modes.modal_amplitude import by_energy
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve, by_energy
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions

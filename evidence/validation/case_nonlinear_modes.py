@@ -25,8 +25,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import ModePoint, mode_point
-from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
-from stickslip.response.nonlinear_modes.modal_amplitude import Phase, by_energy
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve, Phase, by_energy
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions

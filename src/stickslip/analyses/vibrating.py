@@ -15,10 +15,10 @@ from stickslip.assembly.parts.reduced import Store
 from stickslip.column import column
 from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
+from stickslip.response.equilibrium import pressed_by
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
-from stickslip.response.static_contact_state import pressed_by
 from stickslip.response.system import System
 
 SAMPLES = 256

@@ -1,4 +1,8 @@
-"""A model as solvers see it: a single structure, a tuned wheel, or a wheel whose sectors differ."""
+"""Assembly of a model: a single structure, a tuned wheel, or a wheel whose sectors differ; and with more modes for comparison."""
+
+from dataclasses import replace
+from math import ceil
+from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble_tuned
@@ -6,6 +10,14 @@ from stickslip.assembly.load import refuse_second
 from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store, in_memory
 from stickslip.assembly.sides.mistuned import assemble_mistuned
+from stickslip.errors import StickslipError
+from stickslip.model.part import Part
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
+
+MORE = 1.5  # times as many modes, or modes up to such a frequency
+FINER = 4.0  # where an error of frequencies is asked for: it is to be so many times smaller
+REMEMBERED_AS = "with more modes"
 
 
 def assemble(
@@ -39,3 +51,54 @@ def assemble(
     if model.mistuning is not None:
         return assemble_mistuned(model, harmonics, store)
     return assemble_tuned(model, harmonics, store, wave_number, every_wave=every_wave)
+
+
+def with_more_modes(model: Model) -> Model | None:
+    """Return the model with half again as many modes; None where its parts keep all there are."""
+    own = {name: _more(part) for name, part in model.parts.items()}
+    if all(own[name] is part for name, part in model.parts.items()):
+        return None
+    return replace(model, parts=own)
+
+
+def more_modes(model: Model, harmonics: int, store: Store) -> Assembled | None:
+    """Return a model reduced with half again as many modes; None where it keeps all, or these cannot be had.
+
+    Parameters
+    ----------
+    model
+        As it was solved; a wheel whose sectors differ has no such model.
+    harmonics, store
+        As in `assemble`.
+    """
+    more = with_more_modes(model) if model.mistuning is None else None
+    if more is None:
+        return None
+    try:
+        return assemble_tuned(more, harmonics, store, checked=False)
+    except StickslipError:  # an error of frequencies that takes too many modes
+        return None
+
+
+def _more(part: Part) -> Part:
+    """Return a part with more modes, the same for every model that it belongs to; the part itself where it keeps all."""
+    reduction: Any = part.reduction
+    if part.body is not None or not isinstance(reduction, Reduction):
+        return part
+    modes = _choice(reduction.n_modes)
+    if isinstance(reduction.n_modes, int) and reduction.n_modes >= part.structure.n:
+        return part
+    if REMEMBERED_AS not in part.memo:
+        template = None if part.template is None else _more(part.template)
+        made = replace(part, reduction=replace(reduction, n_modes=modes), template=template)
+        part.memo[REMEMBERED_AS] = made
+    found: Part = part.memo[REMEMBERED_AS]
+    return found
+
+
+def _choice(modes: ModeChoice) -> ModeChoice:
+    if isinstance(modes, FrequencyError):
+        return replace(modes, error=modes.error / FINER)
+    if isinstance(modes, ModesBelow):
+        return replace(modes, factor=MORE * modes.factor)
+    return max(ceil(MORE * modes), modes + 1)

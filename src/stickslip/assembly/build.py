@@ -13,12 +13,10 @@ from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.coordinates import coordinates
 from stickslip.assembly.fluid.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
-from stickslip.assembly.joints.contact_point_coordinates import in_points
+from stickslip.assembly.joints.gap_coordinates import held_gaps, in_gaps, in_points, refuse_mixed_gaps
 from stickslip.assembly.joints.interface_modes import KEY, on_shapes
 from stickslip.assembly.joints.pairs import Pairs
-from stickslip.assembly.joints.rigid import held_gaps, in_gaps, refuse_mixed_gaps
-from stickslip.assembly.joints.static_equilibrium_check import refuse_pulled
-from stickslip.assembly.joints.unconstrained_bodies import held_warnings
+from stickslip.assembly.joints.unconstrained_bodies import held_warnings, refuse_pulled
 from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.parts.reduced import Store, in_memory, reduced_parts
@@ -34,8 +32,7 @@ from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.waves import excited_wave, wave
-from stickslip.response.equilibrium import preload
-from stickslip.response.static_contact_state import pressed_by, static_contact_force
+from stickslip.response.equilibrium import preload, pressed_by, static_contact_force
 from stickslip.response.system import System
 
 MODES = 10  # natural frequencies compared

@@ -1,4 +1,4 @@
-"""Names of surfaces, node sets, nodes and dofs, resolved on the dofs of all parts."""
+"""Names of surfaces, node sets, nodes and dofs, resolved on the dofs of all parts; surfaces with their clamped rim."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -9,7 +9,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.surface import Surface, nodal_surface, rigid_surface
+from stickslip.contact.facets import centres, normals
+from stickslip.contact.surface import SMOOTH, Surface, nodal_surface, rigid_surface
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
 from stickslip.model.dofs import Dofs, is_numbered, join_dofs
 from stickslip.model.mesh.solid_mesh import facets_of
@@ -21,6 +22,7 @@ _DOF = re.compile(r"(?:node(\d+)\.)?(\w+)")
 _DOF_NUMBER = re.compile(r".*\.dof\d+", re.IGNORECASE)
 _NODE = re.compile(r"node(\d+)")
 NO_FACETS = np.zeros((0, 3), dtype=np.int64)
+NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,3 +245,60 @@ def picked(index: IntArray, n: int) -> Matrix:
     row = np.flatnonzero(index >= 0)
     entries = (np.ones(row.size), (row, index[row]))
     return scipy.sparse.csr_array(entries, shape=(index.size, n))
+
+
+def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
+    """Return the facets that continue a surface smoothly on to clamped nodes, and these nodes; indices into the points of its mesh.
+
+    Returns
+    -------
+    facets : (m, k), none where the surface has no facets of its own or holds clamped nodes itself
+    nodes : the clamped ones among them
+    """
+    from scipy.spatial import cKDTree
+
+    part, word = places.parts[spot.part], spot.name.partition(".")[2]
+    mesh, none = part.mesh, (np.zeros((0, 3), dtype=np.int64), NONE)
+    if mesh is None or spot.surface is None or not len(spot.surface.facets):
+        return none
+    own, still = mesh.node_sets.get(word, NONE), mesh.node_sets.get("root", NONE)
+    if part.solid is not None:
+        still = np.flatnonzero(~np.isin(mesh.numbers, part.structure.dofs.node))
+    if not still.size or np.isin(own, still).any():
+        return none
+    both = facets_of(mesh, np.concatenate([own, still]))
+    mine = np.isin(both, own) | (both < 0)
+    rim = both[np.isin(both, own).any(axis=1) & ~mine.all(axis=1)]
+    if not len(rim):
+        return none
+    kept, lost = (_middles(mesh.points, facets) for facets in (facets_of(mesh, own), rim))
+    near = cKDTree(kept[0]).query(lost[0])[1]
+    flush = rim[np.einsum("pc,pc->p", lost[1], kept[1][near]) > SMOOTH]
+    return flush, np.setdiff1d(flush, own)
+
+
+def with_rim(places: Places, spot: Spot) -> Surface:
+    """Return the surface of a spot together with its `clamped_rim`, whose clamped nodes have no displacements."""
+    assert spot.surface is not None
+    surface, mesh = spot.surface, places.parts[spot.part].mesh
+    facets, still = clamped_rim(places, spot)
+    if mesh is None or not still.size:
+        return surface
+    own, n = mesh.node_sets[spot.name.partition(".")[2]], len(surface.points)
+    place = np.full(len(mesh.points), -1)
+    place[own], place[still] = np.arange(n), n + np.arange(len(still))
+    moving = surface.displacement.tocsr(copy=True)
+    moving.resize((3 * (n + len(still)), moving.shape[1]))
+    return Surface(
+        np.vstack([surface.points, mesh.points[still]]),
+        moving,
+        np.vstack([surface.facets, place[facets]]),
+        numbers=np.concatenate([mesh.numbers[own], mesh.numbers[still]]),
+    )
+
+
+def _middles(points: FloatArray, facets: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of facets and their unit normals."""
+    normal = normals(points, facets, centres(facets))
+    middle = points[facets].mean(axis=1)
+    return middle, normal / np.linalg.norm(normal, axis=1, keepdims=True)

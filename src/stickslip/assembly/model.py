@@ -20,11 +20,10 @@ from stickslip.assembly.load import Load, Output
 from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.parts.reduced import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning
-from stickslip.assembly.sides.shared_rotation import joined_displacements
 from stickslip.assembly.sides.stages import is_staged, stages_of
 from stickslip.assembly.sides.wheel import Neighbours, neighbours, with_joins
 from stickslip.assembly.skin import on_skin, skin_of
-from stickslip.assembly.statics import StaticState, static_state
+from stickslip.assembly.statics import StaticState, joined_displacements, static_state
 from stickslip.contact.law import held_stiffness
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
@@ -37,7 +36,7 @@ from stickslip.reduction.basis import in_coordinates, surviving_sets
 from stickslip.reduction.coupled_stages import Multistage
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
-from stickslip.response.forced.choices import AmplitudeOf
+from stickslip.response.forced.sweep import AmplitudeOf
 
 ContactsAs = Literal["static", "stuck", "open"]
 

@@ -1,7 +1,5 @@
 """Public names of `stickslip.response`, written once."""
 
-from .contributions import HarmonicContributions as HarmonicContributions
-from .contributions import harmonic_contributions as harmonic_contributions
 from .equilibrium import frozen_sliders as frozen_sliders
 from .forced.accepted import accepted_points as accepted_points
 from .forced.problem import ForcedPoint as ForcedPoint
@@ -31,10 +29,10 @@ from .rotating.campbell import campbell as campbell
 from .rotating.cyclic_campbell import cyclic_campbell as cyclic_campbell
 from .rotating.flutter import FlutterOfWave as FlutterOfWave
 from .rotating.flutter import flutter_of_wave as flutter_of_wave
-from .rotating.nodal_diameters import NodalDiameterMap as NodalDiameterMap
-from .rotating.nodal_diameters import nodal_diameter_map as nodal_diameter_map
 from .rotating.safe import Interference as Interference
+from .rotating.safe import NodalDiameterMap as NodalDiameterMap
 from .rotating.safe import Safe as Safe
+from .rotating.safe import nodal_diameter_map as nodal_diameter_map
 from .rotating.safe import safe as safe
 from .time.floquet import Floquet as Floquet
 from .time.sectors import SectorsInTime as SectorsInTime
@@ -47,5 +45,7 @@ from .time.start import start_from_harmonics as start_from_harmonics
 from .time.transient import TimeStepping as TimeStepping
 from .time.transient import TransientResult as TransientResult
 from .time.transient import integrate as integrate
+from .verification import HarmonicContributions as HarmonicContributions
 from .verification import SupportCheck as SupportCheck
 from .verification import check_support as check_support
+from .verification import harmonic_contributions as harmonic_contributions

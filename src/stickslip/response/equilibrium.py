@@ -1,13 +1,15 @@
-"""Static equilibrium under the centrifugal load, before anything vibrates."""
+"""Static equilibrium under the centrifugal load, before anything vibrates: displacements, contact forces, and the contact state for small vibrations."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, Matrix
 from stickslip.contact.initial_sliders import freezable, left_behind, sharing_friction
-from stickslip.contact.law import ContactLaw, holding_directions
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import OPEN, ContactLaw, holding_directions
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.aft import contact_forces
@@ -25,6 +27,7 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
 HOLDING = StepControl(scale=1.0, first=0.05, largest=0.5, smallest=1e-5)
+FAR = 1e6  # m: no contact is closed there, of a model without dimensions either
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,3 +208,48 @@ def _unheld(matrix: FloatArray, system: System) -> str:
         f"static equilibrium: coordinate {name} is held by nothing even with all contacts stuck. "
         "Add a contact that holds it, or give the damper a retention stiffness."
     )
+
+
+def holding(system: System, static_load: FloatArray) -> BoolArray:
+    """Return the contact points (p,) of a system that stick in small vibrations under a static load (n,), N."""
+    gap = system.interface.gap_operator[:, system.retained] @ preload(system, static_load)
+    force = static_contact_force(system.springs, gap)
+    return pressed_by(system.springs.laws, force)
+
+
+def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
+    """Return the (p, 3) forces t, w, n of contacts loaded once from rest to `gap` (p, 3)."""
+    coefficients = gap.reshape(1, -1)
+    return contact_forces(coefficients, interface.compiled(), samples=1).force[:, :, 0]
+
+
+def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
+    """Return the contact points that stick in small vibrations: those under pressure, and those whose law never opens.
+
+    Parameters
+    ----------
+    laws
+        One a point.
+    force
+        (p, 3) static contact forces t, w, n, N.
+    """
+    return np.asarray((force[:, 2] < 0.0) | ~opening(laws))
+
+
+def opening(laws: Sequence[ContactLaw]) -> BoolArray:
+    """Return the contact points (p,) whose law lets go of them where they are far away."""
+    found: dict[int, bool] = {}
+    for law in laws:
+        found.setdefault(id(law), _opens(law))
+    return np.array([found[id(law)] for law in laws], dtype=bool)
+
+
+def _opens(law: ContactLaw) -> bool:
+    """Tell whether a law lets go of a point that is far away."""
+    state = law.initial_state()
+    jac = np.zeros((3 + state.size, 6 + state.size))
+    status = np.empty(2, dtype=np.int64)
+    force, after = np.empty(3), np.empty_like(state)
+    parameters = law.parameters()
+    law.kernel(np.array([0.0, 0.0, FAR]), np.zeros(3), state, parameters, force, after, jac, status)
+    return bool(np.all(status == OPEN))

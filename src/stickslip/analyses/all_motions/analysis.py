@@ -7,9 +7,8 @@ from stickslip.analyses.all_motions.problem import Question, question_of
 from stickslip.analyses.all_motions.table import AllMotionsTable
 from stickslip.analyses.all_motions.verdicts import tables
 from stickslip.assembly.model import Model
-from stickslip.response.all_motions.estimate import PERIODS_OF_A_START, search_seconds
 from stickslip.response.all_motions.found import Stage, gathered
-from stickslip.response.all_motions.search import search_stages
+from stickslip.response.all_motions.search import PERIODS_OF_A_START, search_seconds, search_stages
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ

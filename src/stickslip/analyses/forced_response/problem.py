@@ -14,12 +14,11 @@ from stickslip.analyses.forced_response.estimate import check_limits, estimate, 
 from stickslip.analyses.forced_response.stability.examination import examines_every_wave
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.assembly.assembled import Assembled
-from stickslip.assembly.assembling import assemble
+from stickslip.assembly.assembling import assemble, more_modes
 from stickslip.assembly.build import static_state
 from stickslip.assembly.extent import Extent, extent_of
 from stickslip.assembly.forces import ANSWER
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.more_modes import more_modes
 from stickslip.assembly.sides.unreduced import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
@@ -28,8 +27,8 @@ from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import REACH
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import frozen_sliders
-from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.response.forced.sweep import RUNGS, RelativeTo
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analysis import Case

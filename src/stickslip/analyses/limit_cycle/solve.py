@@ -13,10 +13,16 @@ from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.self_excited.curve import AmplitudePoint, damping_over_amplitude, slip_amplitude
-from stickslip.response.self_excited.cycles import LimitCycle, crossings, limit_cycles, with_extremes
+from stickslip.response.self_excited.cycles import (
+    CycleStability,
+    LimitCycle,
+    crossings,
+    cycle_stability,
+    limit_cycles,
+    with_extremes,
+)
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
-from stickslip.response.self_excited.stable import CycleStability, cycle_stability
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres

@@ -18,19 +18,26 @@ from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, nonlinear_mode
-from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
-from stickslip.response.nonlinear_modes.single_mode_flanks import along
 from stickslip.response.nonlinear_modes.single_mode_validity import (
     Isolation,
     OtherModes,
+    along,
     isolation,
     other_modes,
     peak_with_others,
 )
-from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, free_motions, resonances, synthesise
+from stickslip.response.nonlinear_modes.synthesis import (
+    Resonance,
+    Synthesised,
+    free_motions,
+    is_homogeneous,
+    peak_curve,
+    resonances,
+    synthesise,
+)
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.solve.status import Status
 from stickslip.study.analysis import Notes

@@ -8,7 +8,7 @@ import xarray as xr
 from stickslip.analyses.collected import number, told_apart
 from stickslip.analyses.modal_synthesis.percents import percent
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.response.nonlinear_modes.single_mode_flanks import ALONE
+from stickslip.response.nonlinear_modes.single_mode_validity import ALONE
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Level, Verdict
 

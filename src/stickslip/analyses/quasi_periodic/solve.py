@@ -13,8 +13,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath
 from stickslip.response.quasi_periodic.find import growing_tones, swept, tone_beside
-from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
-from stickslip.response.quasi_periodic.problem import Solving, TwoTones, with_enough
+from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, with_enough
 from stickslip.response.quasi_periodic.tone import solve_free
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import LOG, advance

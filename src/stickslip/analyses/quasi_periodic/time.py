@@ -6,8 +6,7 @@ from stickslip.analyses.quasi_periodic.problem import Question
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.quasi_periodic.in_time import course, statistics
-from stickslip.response.quasi_periodic.motion import TorusMotion
-from stickslip.response.quasi_periodic.problem import TwoTones
+from stickslip.response.quasi_periodic.problem import TorusMotion, TwoTones
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping, integrate
 

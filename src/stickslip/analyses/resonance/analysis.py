@@ -16,8 +16,7 @@ from stickslip.errors import InputError
 from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
 from stickslip.response.resonances.point import PeakPoint
-from stickslip.response.resonances.tracker import represented_as
-from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks, represented_as, smallest_peak
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
 from stickslip.study.store.progress import LOG, advance
 from stickslip.study.verdict import doubt, to_json

@@ -14,8 +14,7 @@ from stickslip.analyses.waves.texts import safe_tables
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
-from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
-from stickslip.response.rotating.safe import Safe, safe
+from stickslip.response.rotating.safe import NodalDiameterMap, Safe, safe
 from stickslip.study.analysis import Case, Solved
 from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import Verdict

@@ -9,8 +9,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.contact import NEXT, Contact, Join
-from stickslip.assembly.joints.clamped_rim import clamped_rim
-from stickslip.assembly.locations import Places, Spot
+from stickslip.assembly.locations import Places, Spot, clamped_rim
 from stickslip.contact.law import ContactLaw, Rigid
 from stickslip.contact.pairing import Pairing
 from stickslip.contact.projection import facet_balls

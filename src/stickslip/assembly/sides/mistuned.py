@@ -20,9 +20,9 @@ from stickslip.assembly.build import (
 )
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.fluid.aero_forces import about_static_state
+from stickslip.assembly.joints.gap_coordinates import refuse_mixed_gaps
 from stickslip.assembly.joints.pairs import Pairs
 from stickslip.assembly.joints.point_laws import at_rest
-from stickslip.assembly.joints.rigid import refuse_mixed_gaps
 from stickslip.assembly.joints.unconstrained_bodies import held_warnings
 from stickslip.assembly.locations import picked
 from stickslip.assembly.model import Model
@@ -43,7 +43,7 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import MistunedWheel, circulant, couplings, mistuned_wheel, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
-from stickslip.response.static_contact_state import pressed_by
+from stickslip.response.equilibrium import pressed_by
 from stickslip.response.system import System
 
 RELATIVE = {

@@ -9,7 +9,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.modes import normal_modes
-from stickslip.response.continuation.homotopies import GrowingLoad, growing_load
+from stickslip.response.continuation.starting_solutions import GrowingLoad, growing_load
 from stickslip.response.forced.problem import ForcedProblem
 
 PHASES = 8  # of a free motion against the load; a shift by a period of the load gives the same motion

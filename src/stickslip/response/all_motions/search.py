@@ -1,4 +1,4 @@
-"""The search: a sweep, deflation at a set of frequencies, random states in time, and each motion that is new followed as a branch."""
+"""The search: a sweep, deflation at a set of frequencies, random states in time, and each new motion followed as a branch; its estimated time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -48,6 +48,9 @@ OTHER = 0.5  # share of the starts with another harmonic
 GUESSES = (0.5, 2.0, -1.0)
 WHOLE = "it reaches the end of the range"
 LONGEST = 6  # times the points of a sweep that a branch may have
+STEPS_OF_A_SOLVE = 20  # Newton steps of a deflated solve, as a rule
+PERIODS_OF_A_START = 100  # until a motion repeats, as a rule
+TIMED = 3  # periods
 
 
 @by_one_thread
@@ -348,3 +351,28 @@ class _Search:
         change[: point.order] -= point.coefficients[1:]
         size = max(float(np.linalg.norm(point.coefficients[1:])), np.finfo(float).tiny)
         return factor * float(np.linalg.norm(change)) / size
+
+
+def search_seconds(problem: ForcedProblem, search: MotionSearch) -> float:
+    """Return about how long the deflated solves and the starts take, s, new branches left aside; the budget may end them before."""
+    order, omega = search.periods * search.harmonics, search.places[0] / search.periods
+    whole = with_stiffness(problem.balance(harmonics_of(order)))
+    balance = replace(whole, jacobian="dense")
+    x = bonded_start(balance, omega, problem.system)
+    step = start = np.inf
+    for _ in range(2):  # the first compiles
+        begun = perf_counter()
+        balance.linearise(x, omega)
+        step = min(step, perf_counter() - begun)
+    solves = len(search.places) * search.tries * STEPS_OF_A_SOLVE * step
+    if not_marched(problem.system) or not search.starts:
+        return solves
+    motion = problem.low.linear.recover(omega, balance.coefficients(x))
+    own = sampler(problem, omega, [motion], search.modes, search.spread)
+    stepping = TimeStepping(steps_per_period=search.steps, max_periods=TIMED, harmonics=order, tolerance=1e-4)
+    for number in range(2):
+        begun = perf_counter()
+        in_time(own, own.draw((search.seed, 0, number)), stepping)
+        start = min(start, perf_counter() - begun)
+    periods = min(PERIODS_OF_A_START, search.most_periods)
+    return solves + len(search.places) * search.starts * periods / TIMED * start

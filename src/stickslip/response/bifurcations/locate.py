@@ -8,9 +8,17 @@ import numpy as np
 
 from stickslip.errors import StickslipError, input_error
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.bifurcations.bracket import Stretch, stretch
+from stickslip.response.bifurcations.bracket import (
+    ON_AXIS,
+    Examine,
+    Spectrum,
+    Stretch,
+    nearest_to_one,
+    neutral_of,
+    spectrum,
+    stretch,
+)
 from stickslip.response.bifurcations.found import Bifurcation, BifurcationKind, Bifurcations
-from stickslip.response.bifurcations.spectra import ON_AXIS, Examine, Spectrum, nearest_to_one, neutral_of, spectrum
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.found import Stability
 from stickslip.response.stability.settled import stability

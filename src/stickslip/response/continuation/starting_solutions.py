@@ -1,11 +1,17 @@
-"""Periodic solutions without a neighbour: a ladder of methods, each with a limit of Newton steps."""
+"""Periodic solutions without a neighbour: a ladder of methods, each with a limit of Newton steps, and homotopies as the last one.
+
+In a homotopy the excitation grows first, then the higher harmonics join.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.aft import ContactPeriod
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.response.continuation.adaptive_continuation import follow
 from stickslip.response.continuation.branch import (
@@ -17,11 +23,14 @@ from stickslip.response.continuation.branch import (
     steps_through,
     vibration_weights,
 )
-from stickslip.response.continuation.homotopies import homotopies, lowest_harmonics
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.system import System
 from stickslip.solve.fallbacks import Homotopy, solve_robustly, steps_at_most
 from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
+
+# shares of the excitation at which contacts hardly change: the problem is linear there
+FAINT = (1e-2, 1e-3, 1e-5)
+BACK = 1e-3  # share of the faintest load at which a path has come back to rest
 
 
 def without_branch(
@@ -112,3 +121,122 @@ def _starts(
         solution = newton(lambda x: few.linearise(x, omega), few.unknowns(guess), options)
         if solution.status.converged:
             yield balance.unknowns(few.coefficients(solution.x))
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingLoad:
+    """The balance at one frequency under a share p of its excitation; the static load is always whole.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    excitation
+        (size,) scaled load without its static part.
+    joined
+        (m,) share of the contact forces in the equations of each row of coefficients; None: all of them.
+    """
+
+    balance: HarmonicBalance
+    omega: float
+    excitation: FloatArray
+    joined: FloatArray | None = None
+
+    def linearise(self, x: FloatArray, p: float) -> Linearisation:
+        """Return residual and derivatives at the scaled unknowns `x` and the share `p`."""
+        period = None
+        if self.joined is not None:
+            period = _weighted(self.balance.forces(x, self.omega), self.joined)
+        at = self.balance.linearise(x, self.omega, period)
+        left = (1.0 - p) * self.excitation
+        return replace(at, residual=at.residual + left, by_omega=-self.excitation)
+
+
+@dataclass(frozen=True, eq=False)
+class JoiningHarmonics:
+    """The balance at one frequency with a share p of the contact forces in the equations of its higher harmonics.
+
+    At p = 0 these are linear, and the others are solved with little more than their own harmonics.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    higher
+        (m,) one for each row of coefficients that joins, else zero.
+    """
+
+    balance: HarmonicBalance
+    omega: float
+    higher: FloatArray
+
+    def linearise(self, x: FloatArray, p: float) -> Linearisation:
+        """Return residual and derivatives at the scaled unknowns `x` and the share `p`."""
+        balance = self.balance
+        period = balance.forces(x, self.omega)
+        joined = _weighted(period, 1.0 - (1.0 - p) * self.higher)
+        at = balance.linearise(x, self.omega, joined)
+        return replace(at, by_omega=balance.scaled_forces(self.higher[:, None] * period.coefficients))
+
+
+def _weighted(period: ContactPeriod, share: FloatArray) -> ContactPeriod:
+    """Return contact forces of which a `share` (m,) acts in the equations of each row of coefficients."""
+    return replace(
+        period,
+        coefficients=share[:, None] * period.coefficients,
+        blocks=share[:, None] * period.blocks,
+        by_omega=None if period.by_omega is None else share[:, None] * period.by_omega,
+        events=None,
+    )
+
+
+def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
+    """Return the homotopy in the excitation at the frequency `omega` (rad/s)."""
+    load = balance.linear_load(omega).copy()
+    load[0] = 0.0
+    return GrowingLoad(balance, omega, load.reshape(-1) / balance.force_scale)
+
+
+def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
+    """Yield ways from an easy problem to the balance at one frequency.
+
+    First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
+    motion under every share of the excitation, the path that begins there comes to the whole of it, through folds if need be (degree
+    theory; Allgower & Georg 1990). Contacts act on the harmonics up to the highest that is driven alone: each one more folds the path more
+    often, and with all of them it takes ten times as many steps. Then the contact forces of the higher harmonics join. Where several
+    motions stand beside each other it may find another one than the neighbours in frequency.
+
+    Parameters
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    static
+        (n_retained,) static equilibrium, m.
+    """
+    if not isinstance(
+        balance, HarmonicBalance
+    ):  # of rigid contacts not linear in the excitation, or not all of the equations
+        return
+    at_rest = balance.unknowns(static[None].astype(complex))
+    growing = growing_load(balance, omega)
+    h = np.array(balance.harmonics)
+    rows = np.concatenate([h[:1], np.repeat(h[1:], 2)])
+    higher = (rows > lowest_harmonics(balance)[-1]).astype(float)
+    if not np.any(higher):
+        yield Homotopy((growing,), at_rest, FAINT, BACK * FAINT[-1])
+        return
+    few = replace(growing, joined=1.0 - higher)
+    legs = (few, JoiningHarmonics(balance, omega, higher))
+    yield Homotopy(legs, at_rest, FAINT, BACK * FAINT[-1])
+
+
+def lowest_harmonics(balance: AnyBalance) -> tuple[int, ...]:
+    """Return the harmonics up to the highest that is driven, the first at least."""
+    driven = max(balance.linear.load.harmonics, default=balance.order)
+    return tuple(h for h in balance.harmonics if h <= max(driven, 1))

@@ -4,9 +4,6 @@ from .backbone import Backbone as Backbone
 from .backbone import ModePoint as ModePoint
 from .backbone import ModeSweep as ModeSweep
 from .backbone import nonlinear_mode as nonlinear_mode
-from .design import PeakCurve as PeakCurve
-from .design import is_homogeneous as is_homogeneous
-from .design import peak_curve as peak_curve
 from .more_points import refined as refined
 from .passage import Passage as Passage
 from .passage import Swept as Swept
@@ -19,9 +16,12 @@ from .single_mode_validity import isolation as isolation
 from .single_mode_validity import other_modes as other_modes
 from .single_mode_validity import peak_with_others as peak_with_others
 from .single_mode_validity import with_others as with_others
+from .synthesis import PeakCurve as PeakCurve
 from .synthesis import Resonance as Resonance
 from .synthesis import Synthesised as Synthesised
 from .synthesis import free_motions as free_motions
+from .synthesis import is_homogeneous as is_homogeneous
 from .synthesis import motions_at as motions_at
+from .synthesis import peak_curve as peak_curve
 from .synthesis import resonances as resonances
 from .synthesis import synthesise as synthesise

@@ -21,10 +21,9 @@ from stickslip.response.continuation.branch import Followed, Route, branch_of
 from stickslip.response.nonlinear_modes.closer import LOCATED, TAKES_PART, Closer
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.contacts import Contacts, contacts_of, leaving
 from stickslip.response.self_excited.curve import slip_amplitude
 from stickslip.response.self_excited.modes import StuckMode
-from stickslip.response.self_excited.problem import self_excited_motions
+from stickslip.response.self_excited.problem import Contacts, contacts_of, leaving, self_excited_motions
 from stickslip.response.system import System
 from stickslip.solve.status import Status
 from stickslip.units import millimetres, millimetres_between

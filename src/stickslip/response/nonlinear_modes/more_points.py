@@ -10,8 +10,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
-from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
-from stickslip.response.nonlinear_modes.modal_amplitude import Size, by_energy
+from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve, Size, by_energy
 from stickslip.response.nonlinear_modes.sdof_oscillator import MIN_BACKBONE_POINTS, modal_oscillator
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.problem import self_excited_motions

@@ -3,9 +3,9 @@
 from .find import tone_beside as tone_beside
 from .in_time import course as course
 from .in_time import statistics as statistics
-from .motion import TorusMotion as TorusMotion
-from .motion import envelope as envelope
+from .problem import TorusMotion as TorusMotion
 from .problem import TwoTones as TwoTones
+from .problem import envelope as envelope
 from .problem import two_tones as two_tones
 from .problem import with_enough as with_enough
 from .tone import beginnings as beginnings

@@ -14,8 +14,7 @@ from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.quasi_periodic.motion import TorusMotion
-from stickslip.response.quasi_periodic.problem import TwoTones
+from stickslip.response.quasi_periodic.problem import TorusMotion, TwoTones
 from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone
 from stickslip.response.stability import stability
 

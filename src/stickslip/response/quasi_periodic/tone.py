@@ -16,8 +16,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.two_frequency_path import TorusPath
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
-from stickslip.response.quasi_periodic.motion import TorusMotion
-from stickslip.response.quasi_periodic.problem import TwoTones
+from stickslip.response.quasi_periodic.problem import TorusMotion, TwoTones
 from stickslip.solve.newton_method import Solution, newton
 from stickslip.solve.status import Status
 

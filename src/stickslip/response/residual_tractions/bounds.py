@@ -1,7 +1,11 @@
-"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance."""
+"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance.
+
+Sweeps up and down a wider range find motions of other branches, where laws allow several motions.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -9,19 +13,28 @@ import scipy.optimize
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.initial_sliders import Starts, starts_of
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws.bonded import Bonded
+from stickslip.contact.laws.bouc_wen import BoucWen
+from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
+from stickslip.contact.laws.dahl import Dahl
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.iwan import Iwan
+from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Driven, driven_by
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.continuation.branch import Followed
-from stickslip.response.continuation.starting_solutions import without_branch
+from stickslip.response.continuation.starting_solutions import plain_sweep, without_branch
 from stickslip.response.parameter import Discretisation
-from stickslip.response.residual_tractions.branches import both_ways, crossings, may_be_several
 from stickslip.response.residual_tractions.problem import TractionProblem, TractionState
 from stickslip.response.residual_tractions.search import Extremes, TractionSearch, extremes
 from stickslip.response.system import System
-from stickslip.solve.newton_method import newton
+from stickslip.solve.newton_method import Newton, newton
 
 PEAK_WIDTH = 3e-5  # relative width of the bracket of a resonance
 PEAK_TRIALS = 9  # frequencies that are tried in it
@@ -29,6 +42,10 @@ EQUAL = 1e-6  # relative difference of two bounds that are one
 APART = 1e-3  # relative difference of the amplitudes of two motions from one start that stand on different branches
 
 End = Literal["least", "most"]
+WIDER = 1.3  # the sweeps begin and end at this multiple of the range and its inverse: a branch that bends leads far
+POINTS = 15  # least number of points of a sweep around one frequency; two more for each further one
+ONE = (Bonded, BoucWen, Dahl, Iwan, Jenkins)  # no stop, and friction under a constant normal load
+NORMAL = (CoupledCoulomb, ElasticCoulomb, RegularisedCoulomb)  # the same where k_n is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,3 +363,36 @@ def _bound(state: TractionState) -> Bound:
     room = state.room
     rests = np.where(room.sticks, room.slider, state.sliders)
     return Bound(state.amplitude, state.coefficients, rests, room.multiplier, state.error)
+
+
+def may_be_several(interface: Interface) -> bool:
+    """Whether a law of an interface is more than friction under a constant normal load, which alone leaves one branch."""
+    return not all(_leaves_one(law) for law in interface.laws)
+
+
+def _leaves_one(law: ContactLaw) -> bool:
+    return isinstance(law, ONE) or (isinstance(law, NORMAL) and law.k_n == 0.0)
+
+
+def both_ways(
+    system: System, balance: HarmonicBalance, omegas: Sequence[float], options: Newton
+) -> list[list[Followed]]:
+    """Return the branches from below the frequencies upward and from above them downward."""
+    low, high = min(omegas) / WIDER, max(omegas) * WIDER
+    points = POINTS + 2 * (len(omegas) - 1)
+    return [plain_sweep(system, balance, way, points, options) for way in ((low, high), (high, low))]
+
+
+def crossings(
+    branches: Sequence[Sequence[Followed]], balance: HarmonicBalance, omega: float, options: Newton
+) -> Iterator[FloatArray]:
+    """Yield the unknowns of every motion in which a branch passes a frequency; the same one as often as it is met."""
+    for branch in branches:
+        for one, other in pairwise(branch):
+            if not (one.converged and other.converged) or (one.p - omega) * (other.p - omega) > 0.0:
+                continue
+            share = (omega - one.p) / (other.p - one.p) if other.p != one.p else 0.0
+            begin = np.asarray(one.point.x + share * (other.point.x - one.point.x))
+            found = newton(lambda x: balance.linearise(x, omega), begin, options)
+            if found.status.converged:
+                yield found.x

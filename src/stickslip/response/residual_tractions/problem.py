@@ -3,6 +3,9 @@
 The sliders s enter through the gaps alone, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact
 derivatives that belongs to the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs
 that slip, open, or were dragged to where they stick have forgotten their start: their column is zero.
+
+The admissible slider positions of a planar contact are the intersection of the discs of all instants: in units of force the slider is at
+``z = K s``, and rests while ``|K x(t) - z| <= μN(t)``.
 """
 
 from collections.abc import Iterable
@@ -20,7 +23,6 @@ from stickslip.harmonic.judging import covers, judging_balance
 from stickslip.harmonic.peak import Driven
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
-from stickslip.response.residual_tractions.discs import farthest_in_discs, in_all_discs
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
@@ -29,6 +31,9 @@ ALERT_TOLERANCE = 1e-6  # relative residual of the step that predicts what more 
 HALVINGS = 4  # of the way between two starts where Newton does not come from one to the other
 INSIDE = 1e-7  # of the room of a spring: how far from its walls a slider is put for a gradient
 RESTS = 1e-7  # of the largest stretch: movement of a slider over a period that counts as none
+CENTRING = 200  # steps to a place deep in all discs
+RAYS = 720  # on which the edge is looked for
+CLOSER = 2  # times that the best ray is looked at with rays a hundredth as far apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,3 +247,45 @@ def room_of(starts: Starts, period: ContactPeriod) -> Room:
         gap,
         limit,
     )
+
+
+def in_all_discs(centres: FloatArray, radii: FloatArray) -> tuple[FloatArray, float]:
+    """Return a place (2,) deep inside all discs of `centres` (2, n) and `radii` (n,), and its distance from the nearest edge."""
+    at = centres.mean(axis=1)
+    best, depth = at, -np.inf
+    for step in range(CENTRING):
+        away = at[:, None] - centres
+        inside = radii - np.hypot(*away)
+        worst = int(np.argmin(inside))
+        if inside[worst] > depth:
+            best, depth = at, float(inside[worst])
+        way = -away[:, worst] / max(float(np.hypot(*away[:, worst])), 1e-300)
+        at = at + way * float(np.ptp(inside)) / (step + 2.0)
+    return best, depth
+
+
+def farthest_in_discs(inside: FloatArray, centres: FloatArray, radii: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return the place (2,) in all discs at which ``slope · z`` is largest.
+
+    Parameters
+    ----------
+    inside
+        (2,) a place in all of them.
+    centres, radii
+        (2, n) and (n,) of the discs.
+    slope
+        (2,) not zero.
+    """
+    away = inside[:, None] - centres
+    room = radii**2 - np.sum(away**2, axis=0)
+    middle, width = float(np.arctan2(slope[1], slope[0])), np.pi
+    best = inside
+    for _ in range(1 + CLOSER):
+        angles = middle + np.linspace(-width, width, RAYS)
+        rays = np.stack([np.cos(angles), np.sin(angles)])
+        along = rays.T @ away
+        length = np.min(np.sqrt(along**2 + room) - along, axis=1)
+        ends = inside[:, None] + length * rays
+        top = int(np.argmax(slope @ ends))
+        best, middle, width = ends[:, top], float(angles[top]), 0.01 * width
+    return np.asarray(best)

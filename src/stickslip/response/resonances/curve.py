@@ -14,7 +14,7 @@ from stickslip.response.continuation.adaptive_continuation import follow
 from stickslip.response.continuation.branch import Followed, Judged, OneLevel, Route, steps_through
 from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint
-from stickslip.response.resonances.tracker import Tracker, trackers
+from stickslip.response.resonances.tracking import Tracker, trackers
 from stickslip.solve.branch import Following, Latest, ParameterEvaluation
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution

@@ -2,9 +2,12 @@
 
 Each peak is the solution of one equation (see `harmonic.peak`), started from the peak before. A damper optimisation curve costs a few
 Newton steps a point, and its lowest point is the root of the exact slope of the peak amplitude.
+
+Each step starts from the peaks before it. Where a step is too long, it goes through intermediate values of the parameter.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.optimize
@@ -12,15 +15,220 @@ import scipy.optimize
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.peak import Peak
+from stickslip.harmonic.peak import EVALUATIONS, Peak, PeakProblem
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.parameter import Discretisation, Parameter
-from stickslip.response.resonances.first import PeakSearch
-from stickslip.response.resonances.point import PeakPoint
-from stickslip.response.resonances.tracker import Tracker, trackers
+from stickslip.response.resonances.first import PeakSearch, Start, first_peaks
+from stickslip.response.resonances.point import PeakPoint, peak_point
 from stickslip.response.system import System
+from stickslip.solve.branch import ParameterEvaluation
+from stickslip.solve.newton_method import Newton, Solution, charged, newton
+from stickslip.solve.status import Status
 
 APART = 1e-5  # relative distance of the frequencies of two peaks that are not the same
+HALVINGS = 6  # of a step of the parameter that does not converge
+FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was found
+BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
+SEARCH = 60  # solutions that may be spent on a bracket
+FAR = 2.0  # steps beyond the last peak up to which a line through the last two is gone on
+PEAK_FREQUENCY_RTOL = 1e-6  # relative distance of frequencies of two solutions that are one peak
+
+
+@dataclass(slots=True)
+class Tracker:
+    """The peaks found so far, from which the next ones start."""
+
+    problem: PeakProblem
+    newton: Newton
+    known: list[tuple[float, FloatArray]]
+    force: float  # phase of the load in the first harmonic that peaks, rad
+    periods: int = 1  # of the load in one of the motion
+    evaluations: int = 0
+    number: int = 0
+    corner: bool = False  # whether the last peak sits on a corner of the response
+    tops: list[tuple[float, float]] = field(default_factory=list)  # phases of the last two maxima, by variable phase
+
+    def point(self, value: float) -> PeakPoint:
+        """Find the peak at a value of the parameter, from those known."""
+        solution = self.reached(value)
+        if solution.status.converged:
+            self._turn(solution.x, value)
+        spent, self.evaluations = self.evaluations, 0
+        return self.told(self.problem, value, solution, spent)
+
+    def told(self, problem: PeakProblem, value: float, solution: Solution, spent: int) -> PeakPoint:
+        """Return what is told of a solution of the equation."""
+        point = peak_point(problem, self.force, value, solution, spent, self.number)
+        return replace(point, omega=self.periods * point.omega)
+
+    def take(self, point: PeakPoint) -> None:
+        """Go on from a peak that was found before."""
+        balance = self.problem.family(point.value)
+        motion = balance.unknowns(point.coefficients[:, balance.linear.retained])
+        y = np.append(motion, np.log(point.omega / self.periods / self.problem.omega_scale))
+        self.known = [*self.known[-1:], (point.value, y)]
+        self._turn(y, point.value)
+
+    def _turn(self, y: FloatArray, value: float) -> None:
+        """Align the equation with the response at a peak, and keep the phase of the maximum beside it."""
+        state = self.problem.state(y, value)
+        self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
+        self.problem = self.problem.aligned(state)
+        if self.problem.by == "variable_phase":
+            self.tops = [*self.tops[-1:], (value, self.problem.of_the_top(state).phase)]
+
+    def reached(self, value: float, halvings: int = HALVINGS) -> Solution:
+        """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
+        self._ask(value)
+        solution, last = self._solved(value), self.known[-1][0]
+        if not solution.status.converged and halvings > 0 and last != value:
+            between = self.reached(0.5 * (last + value), halvings - 1)
+            if between.status.converged and not self.corner:
+                return self.reached(value, halvings - 1)
+            if between.status.converged:
+                solution = self._solved(value)
+        if solution.status.converged:
+            self.corner = False
+        elif self.problem.by == "horizontal_tangent":
+            solution, self.corner = self._bracketed(value), True
+        if solution.status.converged:
+            self.known = [*self.known[-1:], (value, solution.x)]
+        return solution
+
+    def _ask(self, value: float) -> None:
+        """Ask for the phase that the last maxima lead to, on a line through two of them."""
+        if self.problem.by != "variable_phase":
+            return
+        (before, earlier), (p, phase) = self.tops[0], self.tops[-1]
+        share = (value - p) / (p - before) if p != before else 0.0
+        change = float(np.angle(np.exp(1j * (phase - earlier))))
+        phase += share * change if abs(share) <= FAR else 0.0
+        self.problem = replace(self.problem, phase=phase)
+
+    def _predicted(self, value: float) -> FloatArray:
+        """Go on through the last two peaks, or along the tangent at the only one; the last one, where that would go far."""
+        (before, earlier), (p, y) = self.known[0], self.known[-1]
+        if p != before:
+            share = (value - p) / (p - before)
+            return y + share * (y - earlier) if abs(share) <= FAR else y
+        if value == p or self.corner:
+            return y
+        self.evaluations += 3 * EVALUATIONS[self.problem.by]
+        at = self.problem.linearise(y, p)
+        inverse = self.problem.invert(at.jac)
+        change = None if inverse is None else inverse((p - value) * at.jac_p)
+        return y if change is None or abs(change[-1]) > FARTHEST else y + change
+
+    def _solved(self, value: float) -> Solution:
+        """Solve from the predicted peak; another peak than the one that was followed is none."""
+        guess = self._predicted(value)
+
+        def evaluate(v: FloatArray) -> ParameterEvaluation:
+            self.evaluations += EVALUATIONS[self.problem.by]
+            return self.problem.linearise(v, value)
+
+        solution = newton(evaluate, guess, self.newton)
+        if not solution.status.converged or self._is_same(solution.x, guess, value):
+            return solution
+        return replace(solution, status=Status.STALLED)
+
+    def _is_same(self, y: FloatArray, guess: FloatArray, value: float) -> bool:
+        """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
+        if abs(y[-1] - guess[-1]) > FARTHEST:
+            return False
+        if self.problem.by != "horizontal_tangent":
+            return True
+        self.evaluations += EVALUATIONS["horizontal_tangent"]
+        return not self.problem.curvature(self.problem.state(y, value)) > 0.0
+
+    def _bracketed(self, value: float) -> Solution:
+        """Find the top of a response whose slope jumps there: a kink, or the steps that samples make."""
+        balance, y = self.problem.family(value), self._predicted(value)
+        spent = [Solution(y[:-1], Status.STALLED, 0, np.nan, 0.0, 0.0)]
+
+        def rate(place: float) -> float:
+            """Solve at ``ln(ω / omega_scale) = place`` from the last solution, and return the slope there."""
+            omega = self.problem.omega(np.array([place]))
+            spent.append(newton(lambda v: balance.linearise(v, omega), spent[-1].x, self.newton))
+            self.evaluations += spent[-1].iterations + 2
+            found = self.problem.rate(self.problem.state(np.append(spent[-1].x, place), value))
+            if not (spent[-1].status.converged and np.isfinite(found)):
+                raise ArithmeticError("lost the response, or met a fold")
+            return found
+
+        try:
+            top = _sign_change(rate, float(y[-1]), 0.1 / self.problem.sharpness)
+            rate(top)
+        except (ArithmeticError, ValueError):
+            return replace(charged(spent[-1], spent), x=y, status=Status.STALLED)
+        return replace(charged(spent[-1], spent), x=np.append(spent[-1].x, top))
+
+
+def _sign_change(rate: Callable[[float], float], at: float, step: float) -> float:
+    """Climb until the slope changes its sign, then close the bracket."""
+    slope = rate(at)
+    step = step if slope > 0.0 else -step
+    for _ in range(SEARCH):
+        if rate(at + step) * slope <= 0.0:
+            return float(scipy.optimize.brentq(rate, at, at + step, xtol=BRACKET))
+        at, step = at + step, 1.3 * step
+    raise ArithmeticError("no maximum")
+
+
+def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
+    """Return the highest peaks at a value of the parameter, at most so many, ready to be followed; the first one has paid for the sweep."""
+    starts, spent = first_peaks(search, value)
+    made: list[Tracker] = []
+    for start in starts:
+        if len(made) == most:
+            break
+        one = _tracker(search, start)
+        if made and not _is_another(one, made):
+            continue
+        one.number = len(made)
+        made.append(one)
+    made[0].evaluations += spent
+    return made
+
+
+def _tracker(search: PeakSearch, start: Start) -> Tracker:
+    """Return the tracker of one peak; the phase of the variable one is that at the maximum, which is found first."""
+    force = start.problem.phase
+    known = [(start.value, start.y)]
+    if start.problem.by != "variable_phase":
+        return Tracker(start.problem, start.newton, known, force, search.periods)
+    exact = Tracker(replace(start.problem, by="horizontal_tangent"), start.newton, known, force)
+    top = exact.point(start.value)
+    y = exact.known[-1][1]
+    problem = replace(exact.problem, by="variable_phase")
+    problem = problem.of_the_top(problem.state(y, start.value))
+    tops = [(start.value, problem.phase)]
+    known = [(start.value, y)]
+    return Tracker(problem, start.newton, known, force, search.periods, top.evaluations, tops=tops)
+
+
+def _is_another(one: Tracker, made: list[Tracker]) -> bool:
+    """Whether a tracker leads to a peak that none of those before it has."""
+    value, _ = one.known[-1]
+    found = one.reached(value)
+    if not found.status.converged:
+        return False
+    others = [other.problem.omega(other.reached(value).x) for other in made]
+    omega = one.problem.omega(found.x)
+    return all(abs(omega - other) > PEAK_FREQUENCY_RTOL * other for other in others)
+
+
+def represented_as(search: PeakSearch, point: PeakPoint, how: Discretisation) -> PeakPoint:
+    """Return a peak as it is with other harmonics, from the known one, by horizontal tangent."""
+    more = replace(search, how=how, by="horizontal_tangent")
+    problem = more.problem(point.value)
+    problem = replace(problem, omega_scale=point.omega / search.periods)
+    balance = problem.family(point.value)
+    y = np.append(balance.unknowns(point.coefficients[:, balance.linear.retained]), 0.0)
+    state = problem.state(y, point.value)
+    problem = problem.sharpened(state).aligned(state)
+    tracker = Tracker(problem, how.newton, [(point.value, y)], problem.phase, search.periods)
+    return tracker.point(point.value)
 
 
 @by_one_thread

@@ -4,7 +4,9 @@ from .curve import AmplitudePoint as AmplitudePoint
 from .curve import damping_over_amplitude as damping_over_amplitude
 from .curve import parameter_over_amplitude as parameter_over_amplitude
 from .curve import slip_amplitude as slip_amplitude
+from .cycles import CycleStability as CycleStability
 from .cycles import LimitCycle as LimitCycle
+from .cycles import cycle_stability as cycle_stability
 from .cycles import limit_cycles as limit_cycles
 from .in_time import WaveHistory as WaveHistory
 from .in_time import march_periods as march_periods
@@ -13,5 +15,3 @@ from .modes import StuckMode as StuckMode
 from .modes import stuck_modes as stuck_modes
 from .problem import SelfExcited as SelfExcited
 from .problem import self_excited_motions as self_excited_motions
-from .stable import CycleStability as CycleStability
-from .stable import cycle_stability as cycle_stability

@@ -13,8 +13,7 @@ from stickslip.response.continuation.adaptive_continuation import follow
 from stickslip.response.continuation.branch import Followed, OneLevel, Route, branch_of, steps_through
 from stickslip.response.equilibrium import preload
 from stickslip.response.parameter import Parameter
-from stickslip.response.self_excited.contacts import contacts_of
-from stickslip.response.self_excited.problem import SelfExcited, levels
+from stickslip.response.self_excited.problem import SelfExcited, contacts_of, levels
 from stickslip.solve.branch import Following
 from stickslip.solve.chord_newton import KeptFactors
 from stickslip.solve.linear import Signed

@@ -7,15 +7,20 @@ zero, since time may begin anywhere. The unknowns beside the motion are ``ln ω`
   of the model it is negative: the extended periodic motion concept of Krack, Computers & Structures 154 (2015) 59-71);
 - any parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
 - the amplitude itself, for the model as it is: the limit cycle.
+
+Contact forces and the dissipation of a motion follow from its gaps.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray
+from stickslip.contact.element import K_T, MU, PRELOAD, UNILATERAL
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import OPEN, SLIP, STICK, ContactLaw, PiecewiseLinear
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, State
@@ -34,6 +39,7 @@ WANDERED = 3.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
 FARTHEST = 100.0  # |ln a| beyond which there are no motions
 STILL = 1e-6  # of the largest amplitude of a mode: a coordinate that moves less is none of it
 SAMPLES_A_HARMONIC = 16
+FAR = 1e6  # m: whatever can slip has slipped there, of a model without dimensions, too
 
 
 @dataclass(frozen=True)
@@ -274,3 +280,87 @@ def levels(problem: SelfExcited, parameter: Parameter, first: float) -> BalanceA
 
     family = parameter_family(problem.system, problem.load, parameter, first, made)
     return lambda value: replace(family(value), displacement_scale=own.displacement_scale, force_scale=own.force_scale)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts over one period.
+
+    Attributes
+    ----------
+    slipping
+        Share of the contact points that can slip or open and do so, or close, at some time; NaN where none can. A contact of several
+        sliders counts with the share of them that slip: it is 1 in gross slip alone.
+    sticking
+        Share of those that stick all the time, of several sliders likewise.
+    open_for
+        Largest share of the period for which one is open.
+    """
+
+    slipping: float
+    sticking: float
+    open_for: float
+
+
+def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contacts:
+    """Return what contacts do in a motion given by its unknowns over an amplitude, m."""
+    balance = problem.at_amplitude(problem.balance, float(np.log(amplitude)))
+    period = balance.contacts(y[:-2], problem.omega(y))
+    state, leaves = period.state, leaving(problem.system.interface)
+    # one that stays open does nothing
+    slips = np.any(state == SLIP, axis=(1, 2)) | np.any(state != state[:, :, :1], axis=(1, 2))
+    stays = np.all(state == STICK, axis=(1, 2))
+    moved, stuck = slips.astype(float), stays.astype(float)
+    for c, travels in _sliders(problem.system.interface).items():
+        moved[c] = np.mean(np.any(np.ptp(period.gap[c, :2], axis=1) > travels, axis=1))
+        stuck[c] = 1.0 - moved[c]
+    share = float(np.mean(moved[leaves])) if np.any(leaves) else np.nan
+    opened = np.mean(np.any(state == OPEN, axis=1), axis=1)
+    sticks = float(np.mean(stuck[leaves])) if np.any(leaves) else np.nan
+    return Contacts(share, sticks, float(np.max(opened, initial=0.0)))
+
+
+@lru_cache(maxsize=8)
+def _sliders(interface: Interface) -> dict[int, FloatArray]:
+    """Return of each contact of several sliders the (n, 2) travels from turn to turn along t and w, m, beyond which they slip."""
+    found: dict[int, FloatArray] = {}
+    for law in interface.laws:
+        if id(law) not in found:
+            found[id(law)] = _travels(law)
+    every = {c: found[id(law)] for c, law in enumerate(interface.laws)}
+    return {c: travels for c, travels in every.items() if len(travels) > 1}
+
+
+def _travels(law: ContactLaw) -> FloatArray:
+    """Return the travels of the sliders of a law whose limits are constant, elastic springs left out; of others none."""
+    rows = law.elements() if isinstance(law, PiecewiseLinear) else np.zeros((0, UNILATERAL + 1))
+    if np.any(rows[:, UNILATERAL]):
+        return np.zeros((0, 2))
+    k, limit = rows[:, K_T : K_T + 2], np.tile(rows[:, MU] * rows[:, PRELOAD], (2, 1)).T
+    travels = np.divide(2.0 * limit, k, out=np.full(k.shape, np.inf), where=k > 0.0)
+    return np.asarray(travels[np.any(np.isfinite(travels), axis=1)])
+
+
+@lru_cache(maxsize=8)
+def leaving(interface: Interface) -> BoolArray:
+    """Return the contact points (p,) whose law slips or opens at some gap."""
+    found: dict[int, bool] = {}
+    for law in interface.laws:
+        found.setdefault(id(law), _leaves(law))
+    leaves = np.array([found[id(law)] for law in interface.laws], dtype=bool)
+    leaves.setflags(write=False)
+    return leaves
+
+
+def _leaves(law: ContactLaw) -> bool:
+    """Tell whether a law leaves the state of sticking far along its tangents or far away."""
+    return any(_state(law, gap) for gap in FAR * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]))
+
+
+def _state(law: ContactLaw, gap: FloatArray) -> bool:
+    state = law.initial_state()
+    jac = np.zeros((3 + state.size, 6 + state.size))
+    status = np.empty(2, dtype=np.int64)
+    after = np.empty_like(state)
+    law.kernel(gap, np.zeros(3), state, law.parameters(), np.empty(3), after, jac, status)
+    return bool(np.any(status != STICK))

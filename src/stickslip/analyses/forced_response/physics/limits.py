@@ -10,12 +10,20 @@ from stickslip.analyses.forced_response.records.columns import MotionAtPeak, Phy
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.errors import InputError
+from stickslip.response.equilibrium import pressed_by
 from stickslip.response.forced.response import ForcedPoint
-from stickslip.response.physics.damper import DampedMode, damped_modes
-from stickslip.response.physics.friction import Friction, friction_of
-from stickslip.response.physics.modes import UNDAMPED_RATIO, Range, RangeMode, range_modes, springs_of
+from stickslip.response.physics.damping_of_modes import (
+    UNDAMPED_RATIO,
+    DampedMode,
+    Friction,
+    Range,
+    RangeMode,
+    damped_modes,
+    friction_of,
+    range_modes,
+    springs_of,
+)
 from stickslip.response.recovery import damped_share, equivalent_damping, signals
-from stickslip.response.static_contact_state import pressed_by
 from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ
 

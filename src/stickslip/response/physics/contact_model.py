@@ -1,21 +1,26 @@
-"""Sensitivity of a resonance peak to the contact stiffness, by linear solutions with the Jacobian of the balance.
+"""Sensitivity of a resonance peak to the contact model: to the contact stiffness, and to the number of contact points.
 
 A solution of ``R(x, ω, κ) = 0``, with κ the logarithm of a factor on all contact stiffnesses, moves by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
 forces depend on κ; their derivative is a difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak
 amplitude changes as the amplitude at a fixed frequency does. Solved points stand beside the peak. Two of them, a little apart, give the
 slopes of ``∂A/∂ω`` and of ``∂A/∂κ``, from these the place of the peak, ``dω/dκ = -A_κω / A_ωω`` there, and ``∂A/∂κ`` at it.
+
+With half as many contact points each point stands for two neighbours and sees the mean of their gaps.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 
 STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields of laws, N/m and N/m³
@@ -23,6 +28,7 @@ STEP = 1e-5  # relative step of stiffness, and of the motion for the amplitude: 
 APART = 1e-4  # relative distance of two frequencies whose slopes are compared
 TINY = float(np.finfo(float).tiny)
 PEAK_DISTANCE_RTOL = 0.005  # relative distance from a solved point within which its peak lies
+FEWEST_HALVED = 8  # points of a contact below which half of them would hold it otherwise
 
 
 @dataclass(frozen=True)
@@ -149,3 +155,63 @@ def _beside(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint
     if not found.status.converged:
         return None
     return replace(point, omega=omega, coefficients=balance.coefficients(found.x))
+
+
+def halved(system: System, groups: Sequence[str], position: FloatArray, area: FloatArray) -> tuple[System, int] | None:
+    """Return a system with half the points of its meshed contacts, and how many points are left out; None where none is meshed finely enough.
+
+    Parameters
+    ----------
+    system
+        With contacts on meshes.
+    groups
+        (p,) which contact each point belongs to.
+    position
+        (p, 3) in m.
+    area
+        (p,) in m²; NaN where a point stands for no facets.
+
+    Notes
+    -----
+    A point that stays takes the weight of the neighbour that goes, by their stuck stiffness, and its gap is the mean of both by that weight: it lies
+    between them, so that a contact is as stiff as before against displacements and does not move to one side.
+    """
+    own = system.interface
+    stiffness = own.stuck_stiffness().reshape(-1, 3).sum(axis=1)
+    takes: IntArray = np.arange(own.n_contacts)
+    for group in dict.fromkeys(groups):
+        points = np.flatnonzero(np.array(groups) == group)
+        meshed = np.all(np.isfinite(area[points])) and np.all(np.isfinite(position[points]))
+        if points.size >= FEWEST_HALVED and meshed and np.all(stiffness[points] > 0.0):
+            takes[points] = points[_pairs(position[points])]
+    stays = np.flatnonzero(takes == np.arange(takes.size))
+    if stays.size == takes.size:
+        return None
+    whole = np.zeros(own.n_contacts)
+    np.add.at(whole, takes, stiffness)
+    row = np.searchsorted(stays, takes)
+    mean = sparse.csr_array((stiffness / whole[takes], (row, np.arange(takes.size))))
+    few = Interface(
+        tuple(own.names[i] for i in stays),
+        tuple(own.laws[i] for i in stays),
+        sparse.kron(mean, np.eye(3), format="csr") @ own.gap_operator,
+        (own.factors * whole / stiffness)[stays],
+    )
+    return replace(system, interface=few), int(takes.size - stays.size)
+
+
+def _pairs(position: FloatArray) -> IntArray:
+    """Return for each point that which stands for it: itself, or the nearest of the points before it that stands for itself alone."""
+    takes = np.arange(len(position))
+    open_to = np.ones(len(position), dtype=bool)
+    for i in range(len(position)):
+        if not open_to[i]:
+            continue
+        others = np.flatnonzero(open_to)
+        others = others[others > i]
+        if not others.size:
+            break
+        near = others[np.argmin(np.linalg.norm(position[others] - position[i], axis=1))]
+        takes[near] = i
+        open_to[[i, near]] = False
+    return takes

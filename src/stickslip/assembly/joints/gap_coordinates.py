@@ -1,5 +1,6 @@
-"""Rigid contacts: their gaps become coordinates."""
+"""Gaps as coordinates: of rigid contacts, and where contact points need fewer coordinates than the nodes around them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,3 +133,40 @@ def refuse_rigid(model: Model) -> None:
                 f"is missing: the law {law_name(law)} takes its pressure from the motion along the normal, and there is none",
                 "Give the constant force that presses the contact.",
             )
+
+
+def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequence[str]) -> InGaps:
+    """Write a reduced structure in the rows of its gaps, where that leaves fewer coordinates for contacts to touch.
+
+    A point on a facet of six nodes touches 18 dofs and has three rows. What the coordinates that stay add to a row is left in the
+    gap operator: a row then is the motion of the other side at that point.
+
+    Parameters
+    ----------
+    structure
+        Of all parts; a sparse one is left as it is.
+    gaps
+        (3 p, n) CSR rows t, w, n.
+    stay
+        Coordinates that stay what they are: outputs, and rigid bodies.
+    names
+        Of the p contact points.
+    """
+    same = InGaps(structure, gaps)
+    fixed = np.isin(np.arange(structure.n), stay).astype(float)
+    moved = scipy.sparse.csr_array(gaps @ scipy.sparse.diags_array(1.0 - fixed))
+    moved.eliminate_zeros()
+    touched = np.unique(moved.indices)
+    if scipy.sparse.issparse(structure.stiffness) or touched.size <= np.count_nonzero(np.diff(moved.indptr)):
+        return same
+    try:
+        written, own = in_relative_coordinates(replace(structure, basis=None), moved, names)
+    except InputError:  # rows depend on each other: nodes stay
+        return same
+    place = np.full(structure.n, -1)
+    free = np.setdiff1d(np.arange(structure.n), touched)
+    place[free] = np.arange(structure.n - free.size, structure.n)
+    others = scipy.sparse.csr_array(gaps @ scipy.sparse.diags_array(fixed))
+    whole = scipy.sparse.csr_array(own + others @ written.basis)
+    whole.eliminate_zeros()
+    return InGaps(written, whole, place)

@@ -1,0 +1,364 @@
+"""Modes in a frequency range: damping without friction, largest damping by friction, and the parts that move.
+
+Friction is the Coulomb limit of each contact, whatever its law. Every contact that slips is a spring of the complex stiffness ``k η(x)``, with one
+slip ratio x of all contacts: the amplitude of their gaps over that at which they begin to slip. From stuck (x = 1) to sliding (x large) each mode is
+followed by its shape. It is an estimate, no bound: for chains of masses it was right within a factor of 1.5, where normal loads stay as they are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.harmonic.aft import contact_forces
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.structure import Structure
+from stickslip.response.self_excited.modes import StuckMode, sprung_modes
+from stickslip.response.system import System
+from stickslip.units import HZ
+
+UNDAMPED_RATIO = 1e-5  # damping ratio below which nothing damps a mode
+SPANNED = 60  # coordinates up to which eigenvalues are those of all motions
+UNDRIVEN = 1e-9  # force on a mode over the norms of force and shape: below, the load stands at a node
+FIRST_MODES = 4  # asked for at first; twice as many until they pass the range
+ALONE = 0.99  # share of the strain energy in contact springs, and of the kinetic energy in one part
+TRAVEL_M = 1e6  # amplitude of a cycle in which every slider has slipped far, of a model without dimensions, too
+SAMPLES = 256  # of the cycle, for laws that are marched
+ROUNDING = 1e-13  # of the force of a spring beside the slider: dissipation below is rounding
+SLIP_RATIOS = np.geomspace(1.0, 1e4, 20)  # amplitude over that at which slip begins
+BEYOND = 1.3  # frequencies of modes that span the motions, over the highest of the range
+INDEPENDENT = 1e-10  # least share of a motion that the others do not span
+SMALLEST_DAMPING = 1e-4  # ratio below which friction does nothing that is worth a word
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Friction of contacts under their static loads.
+
+    Attributes
+    ----------
+    limits
+        (n_contacts, 2) force along t and w that a contact slips at, N: a quarter of what it dissipates in a long cycle, over the amplitude.
+    variable
+        (n_contacts,) whether the limit follows a normal gap that moves.
+    """
+
+    limits: FloatArray
+    variable: BoolArray
+
+    @property
+    def slips(self) -> BoolArray:
+        """(3 n_contacts,) directions t, w, n in which contacts slip."""
+        along = np.zeros((len(self.limits), 3), dtype=bool)
+        along[:, :2] = self.limits > 0.0
+        return along.reshape(-1)
+
+    @property
+    def any(self) -> bool:
+        """Whether any contact slips at all."""
+        return bool(np.any(self.limits > 0.0))
+
+
+def friction_of(interface: Interface, static_gap: FloatArray, static_force: FloatArray) -> Friction:
+    """Return the friction of contacts that stand at the static gaps (n_contacts, 3), m, under the forces (n_contacts, 3), N.
+
+    Every law is taken round a cycle of great amplitude in t and then in w, its normal gap at rest: what it dissipates is four times its limit
+    times the amplitude. Springs that never slip have no limit, nor have contacts that are open.
+    """
+    n = interface.n_contacts
+    compiled = interface.compiled()
+    limits = np.zeros((n, 2))
+    for axis in range(2):
+        cycle = np.zeros((3, n, 3))
+        cycle[0] = static_gap
+        cycle[1, :, axis] = TRAVEL_M
+        force = contact_forces(cycle.reshape(3, -1), compiled, SAMPLES).coefficients.reshape(3, n, 3)
+        work = np.pi * TRAVEL_M * force[2, :, axis]
+        size = np.linalg.norm(force[1:, :, axis], axis=0)
+        limit = np.abs(work) / (4.0 * TRAVEL_M)
+        limits[:, axis] = np.where(limit > ROUNDING * size, limit, 0.0)
+    follows = np.array([hasattr(law, "mu") and law.stuck_stiffness()[2] > 0 for law in interface.laws])
+    pressed = static_force[:, 2] < 0.0
+    return Friction(limits, np.asarray(follows & pressed, dtype=bool))
+
+
+@dataclass(frozen=True)
+class Range:
+    """Frequencies of the excitation from `lowest` to `highest`, rad/s."""
+
+    lowest: float
+    highest: float
+
+    def holds(self, omega: float) -> bool:
+        """Whether a frequency of the excitation lies within."""
+        return self.lowest <= omega <= self.highest
+
+    @property
+    def middle(self) -> float:
+        """Mean of both ends, rad/s."""
+        return 0.5 * (self.lowest + self.highest)
+
+
+@dataclass(frozen=True, eq=False)
+class RangeMode:
+    """A mode that a harmonic of a load passes within the range.
+
+    Attributes
+    ----------
+    harmonic
+        Of the load.
+    number
+        Of the mode, from 1.
+    omega
+        Frequency of the excitation whose harmonic is that of the mode, rad/s.
+    ratio
+        Damping ratio without friction.
+    force
+        Of the harmonic on the mode, N on unit modal mass; 0 where the load stands at a node.
+    gaps
+        (n_contacts, 3) motion of the contacts at unit modal mass.
+    strain
+        Share of its strain energy in contact springs.
+    part, kinetic
+        The part that moves most, and its share of the kinetic energy.
+    """
+
+    harmonic: int
+    number: int
+    omega: float
+    ratio: float
+    force: float
+    gaps: ComplexArray
+    strain: float
+    part: str
+    kinetic: float
+
+    @property
+    def undamped(self) -> bool:
+        """Whether the load drives it and nothing damps it while no contact slips."""
+        return self.force > 0.0 and self.ratio < UNDAMPED_RATIO
+
+    @property
+    def resonance(self) -> float:
+        """Modal amplitude at its resonance, m √kg, with at least the damping ratio `UNDAMPED_RATIO`."""
+        return self.force / (2.0 * (self.harmonic * self.omega) ** 2 * max(self.ratio, UNDAMPED_RATIO))
+
+    @property
+    def hz(self) -> float:
+        """Frequency of the excitation, Hz."""
+        return self.omega / HZ
+
+    @property
+    def on_contacts(self) -> bool:
+        """Whether one part alone moves, as a rigid body on the springs of its contacts."""
+        return self.strain > ALONE and self.kinetic > ALONE
+
+    def excess(self, friction: Friction) -> float:
+        """Return the force over 4/π of the Coulomb limit projected on the mode: above 1 friction bounds no mode without damping.
+
+        Infinite without friction, zero where the limit follows a normal gap that moves in the mode, as it then grows with the motion.
+        """
+        size, along = np.abs(self.gaps), np.abs(self.gaps[:, :2])
+        grows = size[:, 2] * along.max(axis=1, initial=0.0)
+        if np.any(grows[friction.variable] > UNDRIVEN * size.max(initial=0.0) ** 2):
+            return 0.0
+        bound = 4.0 / np.pi * float(np.sum(friction.limits * along))
+        return self.force / bound if bound > 0.0 else np.inf
+
+
+def springs_of(system: System, holds: BoolArray, sliding: BoolArray | None = None) -> FloatArray:
+    """Return the (3 n_contacts,) springs of contacts that hold (n_contacts,), N/m, without those of `sliding` directions (3 n_contacts,)."""
+    springs = np.where(np.repeat(holds, 3), system.springs.stuck_stiffness(), 0.0)
+    return springs if sliding is None else np.where(sliding, 0.0, springs)
+
+
+def range_modes(system: System, load: HarmonicLoad, within: Range, springs: FloatArray) -> list[RangeMode]:
+    """Return the modes that harmonics of a load pass in a range, with linear springs in place of the contacts.
+
+    Parameters
+    ----------
+    system
+        What vibrates; along an engine-order line at the middle of the range.
+    load
+        Periodic load.
+    within
+        Frequencies of the excitation.
+    springs
+        (3 n_contacts,) stiffnesses, N/m: `springs_of`.
+    """
+    here, found = system.at(within.middle), []
+    for h, force in sorted(load.harmonics.items()):
+        if h < 1 or not np.any(force):
+            continue
+        structure = here.structure.of_harmonic(h)
+        for mode in modes_up_to(here, h * within.highest, springs, h):
+            if within.holds(mode.omega / h):
+                on_mode = float(abs(np.vdot(mode.shape, force)))
+                size = float(np.linalg.norm(force) * np.linalg.norm(mode.shape))
+                gaps = np.asarray(here.interface.gap_operator @ mode.shape)
+                part, kinetic = _most_moved(structure, mode)
+                in_springs = float(np.sum(springs * np.abs(gaps) ** 2))
+                found.append(
+                    RangeMode(
+                        harmonic=h,
+                        number=mode.number,
+                        omega=mode.omega / h,
+                        ratio=mode.ratio,
+                        force=on_mode if on_mode > UNDRIVEN * size else 0.0,
+                        gaps=gaps.reshape(-1, 3),
+                        strain=_share(in_springs, structure, mode),
+                        part=part,
+                        kinetic=kinetic,
+                    )
+                )
+    return found
+
+
+def modes_up_to(system: System, highest: float, springs: FloatArray, harmonic: int) -> list[StuckMode]:
+    """Return all modes of a harmonic up to a frequency in rad/s, and the next one."""
+    most = int(np.count_nonzero(system.structure.of_harmonic(harmonic).mass.diagonal()))
+    count = min(FIRST_MODES, most)
+    while True:
+        modes = sprung_modes(system, count, springs, harmonic, SPANNED)
+        above = [k for k, mode in enumerate(modes) if mode.omega > highest][:1]
+        if above or count >= most:
+            return modes[: above[0] + 1] if above else modes
+        count = min(2 * count, most)
+
+
+def _share(in_springs: float, structure: Structure, mode: StuckMode) -> float:
+    own = float(np.real(np.vdot(mode.shape, structure.stiffness @ mode.shape)))
+    every = in_springs + max(own, 0.0)
+    return in_springs / every if every > 0.0 else 0.0
+
+
+def _most_moved(structure: Structure, mode: StuckMode) -> tuple[str, float]:
+    """Return the part with most kinetic energy and its share; no part where the model has one alone."""
+    energy = np.real(np.conj(mode.shape) * (structure.mass @ mode.shape))
+    whose = np.array(structure.dofs.part)
+    each = {str(part): float(energy[whose == part].sum()) for part in np.unique(whose)}
+    if len(each) < 2:
+        return "", 0.0
+    part = max(each, key=lambda name: each[name])
+    return part, each[part] / sum(each.values())
+
+
+def complex_stiffness(ratio: float) -> complex:
+    """Return the stiffness of a spring with a slider over that of the spring: its first harmonic at an amplitude of `ratio` times that at which it slips."""
+    if ratio <= 1.0:
+        return 1.0 + 0.0j
+    angle = np.arccos(1.0 - 2.0 / ratio)
+    return complex((angle - 0.5 * np.sin(2.0 * angle)) / np.pi, 4.0 / np.pi * (ratio - 1.0) / ratio**2)
+
+
+@dataclass(frozen=True)
+class DampedMode:
+    """What friction can do to a mode.
+
+    Attributes
+    ----------
+    stuck, ends
+        Frequency of the excitation with contacts stuck and with contacts that slide freely, rad/s.
+    best
+        Where friction damps it most, rad/s.
+    ratio
+        Damping ratio by friction there.
+    """
+
+    stuck: float
+    best: float
+    ratio: float
+    ends: float
+
+    def apart(self, omega: float) -> float:
+        """Return how far a frequency in rad/s lies from those between sticking and sliding."""
+        low, high = sorted((self.stuck, self.ends))
+        return max(low - omega, omega - high, 0.0)
+
+    def __str__(self) -> str:
+        stuck, best, ends = (omega / HZ for omega in (self.stuck, self.best, self.ends))
+        damping = f"up to {100 * self.ratio:.2g} % of critical at {best:.2f} Hz"
+        return f"the mode at {stuck:.2f} Hz (sticking) by {damping}, on its way to {ends:.2f} Hz (sliding)"
+
+
+def damped_modes(
+    system: System, friction: Friction, springs: FloatArray, harmonic: int, within: Range
+) -> list[DampedMode]:
+    """Return what friction can do to the modes that pass a range of frequencies.
+
+    Parameters
+    ----------
+    system
+        What vibrates; along an engine-order line at the middle of the range.
+    friction
+        Of its contacts.
+    springs
+        (3 n_contacts,) stiffnesses with contacts stuck, N/m.
+    harmonic
+        That drives the modes.
+    within
+        Frequencies of the excitation.
+
+    Notes
+    -----
+    Motions are spanned by the modes with contacts stuck and those with contacts sliding, up to `BEYOND` of the range.
+    """
+    here = system.at(within.middle)
+    slips = friction.slips & (springs > 0.0)
+    if not slips.any():
+        return []
+    highest = BEYOND * harmonic * within.highest
+    shapes = [
+        m.shape for own in (springs, np.where(slips, 0.0, springs)) for m in modes_up_to(here, highest, own, harmonic)
+    ]
+    if not shapes:
+        return []
+    structure, gaps = here.structure.of_harmonic(harmonic), here.interface.gap_operator
+    way = _spanned(structure.mass, np.array(shapes).T)
+    moved = gaps @ way
+    stiffness = way.conj().T @ (structure.stiffness @ way)
+    rest, slider = (
+        (moved.conj().T * own) @ moved for own in (np.where(slips, 0.0, springs), np.where(slips, springs, 0.0))
+    )
+    squares = _followed(0.5 * (stiffness + stiffness.conj().T) + rest, slider)
+    roots = np.sqrt(squares) / harmonic
+    damping = roots.imag / np.abs(roots)
+    found = []
+    for omega, ratio in zip(np.abs(roots).T, damping.T, strict=True):
+        top = int(np.argmax(ratio))
+        inside = [within.holds(omega[k]) for k in (0, top)]
+        if any(inside) and ratio[top] > SMALLEST_DAMPING:
+            found.append(DampedMode(float(omega[0]), float(omega[top]), float(ratio[top]), float(omega[-1])))
+    return found
+
+
+def _spanned(mass: ComplexArray, shapes: ComplexArray) -> ComplexArray:
+    """Return motions of unit mass that span the shapes."""
+    square, turn = np.linalg.eigh(shapes.conj().T @ (mass @ shapes))
+    kept = square > INDEPENDENT * square[-1]
+    return np.asarray(shapes @ (turn[:, kept] / np.sqrt(square[kept])))
+
+
+def _followed(rest: ComplexArray, slider: ComplexArray) -> ComplexArray:
+    """Return the (20, m) squares of the frequencies of each mode from stuck to sliding."""
+    values, vectors = np.linalg.eigh(rest + slider)
+    every = [values.astype(complex)]
+    for ratio in SLIP_RATIOS[1:]:
+        own, shapes = np.linalg.eig(rest + complex_stiffness(float(ratio)) * slider)
+        shapes = shapes / np.linalg.norm(shapes, axis=0)
+        order = _partners(np.abs(vectors.conj().T @ shapes))
+        vectors = shapes[:, order]
+        every.append(own[order])
+    return np.array(every)
+
+
+def _partners(alike: FloatArray) -> IntArray:
+    """Return for each row the column that it is most alike, none twice."""
+    order = np.zeros(len(alike), dtype=np.int64)
+    alike = alike.copy()
+    for _ in order:
+        row, column = np.unravel_index(int(np.argmax(alike)), alike.shape)
+        order[row] = column
+        alike[row, :] = alike[:, column] = -1.0
+    return order
