@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import stickslip as ss
 from stickslip.assembly.assembling import assemble
@@ -17,6 +16,7 @@ from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.store.netcdf import read_tree
 
 CHAIN = """
 schema_version = 2
@@ -88,7 +88,7 @@ def answered(path):
     study = read_study(path)
     outcome = run_study(study)
     assert outcome is not None
-    return xr.load_datatree(study.folder / "result.nc", engine="h5netcdf")["forced_response"]
+    return read_tree(study.folder / "result.nc")["forced_response"]
 
 
 def test_every_law_is_written_in_a_file():

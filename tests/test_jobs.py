@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from cell_work import die, eat, refuse
 from test_journal import Point, point
 from toy_analysis import ToyStudy
@@ -27,6 +26,7 @@ from stickslip.study.store import folder as keep_folder
 from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.journal import JobJournal, read_sealed
+from stickslip.study.store.netcdf import read_tree
 from stickslip.study.store.watch import solve_far, watched
 from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped, memory_gb
 from stickslip.study.store.workers import check_kind, executor
@@ -222,7 +222,7 @@ def test_copy_of_a_file_whose_write_was_cut_off_is_whole(tmp_path: Path) -> None
 
 
 def bits(study: ToyStudy) -> np.ndarray:
-    tree = xr.load_datatree(study.folder / "result.nc", engine="h5netcdf")
+    tree = read_tree(study.folder / "result.nc")
     assert tree.attrs["complete"] == 1
     return np.asarray(tree["toy"].value.values)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from test_root_joint import COARSE, CONTACT, FINE, blocks
 from typer.testing import CliRunner
 
@@ -10,6 +9,7 @@ from stickslip.analyses.forced_response.estimate import estimate
 from stickslip.cli import app
 from stickslip.response.forced.sweep import Sweep
 from stickslip.study.models.study import read_study
+from stickslip.study.store.netcdf import read_tree
 
 MODEL = (
     CONTACT.format("node_to_segment").replace("interference_m = 1e-6\n", "")
@@ -82,10 +82,7 @@ def test_the_response_of_parts_kept_whole_from_the_command_line(tmp_path, monkey
     other = study(tmp_path / "condensed", FORCED)
     code, told = said("run", other, "--no-report")
     assert code == 0, told
-    one, two = (
-        xr.load_datatree(p.parent / "results" / "result.nc", engine="h5netcdf")["forced_response"]
-        for p in (path, other)
-    )
+    one, two = (read_tree(p.parent / "results" / "result.nc")["forced_response"] for p in (path, other))
     np.testing.assert_allclose(one["amplitude"], two["amplitude"], rtol=1e-6)
 
 

@@ -20,6 +20,7 @@ from stickslip.study.jobs import Shard
 from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer, run_study
 from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.netcdf import read_tree
 from stickslip.study.store.progress import LOG, Interrupted
 from stickslip.study.store.worker_process import Limits
 from stickslip.study.store.workers import executor
@@ -39,7 +40,7 @@ def study(folder: Path, **changes: object) -> ToyStudy:
 
 
 def result(study: ToyStudy) -> xr.DataTree:
-    return xr.load_datatree(study.folder / "result.nc", engine="h5netcdf")
+    return read_tree(study.folder / "result.nc")
 
 
 def sealed(study: ToyStudy) -> dict[str, bytes]:
