@@ -7,8 +7,10 @@ import inspect
 import re
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import NamedTuple
 
 import grimp
 import pytest
@@ -54,6 +56,35 @@ def body_lines(node: ast.FunctionDef) -> int:
     return node.end_lineno - body[0].lineno + 1 if body else 0
 
 
+def literal(node: ast.expr) -> str:
+    """Return the text of a string, with braces for its values; empty of anything else."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(literal(own) if isinstance(own, ast.Constant) else "{}" for own in node.values)
+    return str(node.value) if isinstance(node, ast.Constant) else ""
+
+
+class Written(NamedTuple):
+    """What the tests below ask of a module; the tree of its text would take too much memory to keep."""
+
+    functions: list[int]  # their lines of code, methods too
+    constants: list[str]  # names assigned at the top
+    refusals: list[tuple[str, int, str, str]]  # file, line, place and what is wrong with it
+
+
+@cache
+def written(path: Path) -> Written:
+    """Read a module, once for all tests."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
+    calls = [n for n in nodes if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "input_error"]
+    return Written(
+        [body_lines(node) for node in nodes if isinstance(node, ast.FunctionDef)],
+        [n.id for a in assigned for n in ast.walk(a) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)],
+        [(path.name, node.lineno, *map(literal, node.args[:2])) for node in calls],
+    )
+
+
 def tracked_files() -> list[Path]:
     """Return what git tracks; skips where there is no repository, as in an unpacked archive."""
     try:
@@ -94,19 +125,17 @@ def test_type_checking_imports_do_not_hide_from_the_contracts():
 
 
 def test_functions_are_short():
-    lengths = sorted(body_lines(node) for path in MODULES for node in functions(path))
+    lengths = sorted(lines for path in MODULES for lines in written(path).functions)
     assert lengths[int(0.9 * len(lengths))] <= USUAL_FUNCTION
 
 
 def test_constants_name_their_quantity():
     empty = {"MOST", "FEWEST", "NEAR", "CLOSE", "SAME", "MUCH"}
     found = [
-        f"{path.relative_to(SOURCE)}: {name.id}"
+        f"{path.relative_to(SOURCE)}: {name}"
         for path in MODULES
-        for node in ast.parse(path.read_text()).body
-        if isinstance(node, ast.Assign | ast.AnnAssign)
-        for name in ast.walk(node)
-        if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id.strip("_") in empty
+        for name in written(path).constants
+        if name.strip("_") in empty
     ]
     assert not found
 
@@ -162,21 +191,8 @@ VERBS = re.compile(
 )
 
 
-def literal(node: ast.expr) -> str:
-    """Return the text of a string, with braces for its values; empty of anything else."""
-    if isinstance(node, ast.JoinedStr):
-        return "".join(literal(own) if isinstance(own, ast.Constant) else "{}" for own in node.values)
-    return str(node.value) if isinstance(node, ast.Constant) else ""
-
-
 def test_refusals_name_the_place_before_they_say_what_is_wrong_with_it():
-    calls = [
-        (path.name, node)
-        for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "input_error"
-    ]
-    found = [(name, node.lineno, *map(literal, node.args[:2])) for name, node in calls]
+    found = [refusal for path in MODULES for refusal in written(path).refusals]
     assert sum(bool(VERBS.search(what)) for *_, what in found) > len(found) / 2
     assert [one for one in found if VERBS.search(one[2])] == []
 
