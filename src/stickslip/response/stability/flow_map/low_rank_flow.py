@@ -164,7 +164,8 @@ class LowRankFlow:
         shape = (len(own), 2, *rows.shape)
         out, more = self._room(place, shape), self._room(3, shape)
         for each, of, into in ((own, rows, out), (cross, rows[:, self.other], more)):
-            np.einsum("jpk,rk->jprk", np.stack([each.real, each.imag], axis=1), of, out=into)
+            np.multiply(each.real[:, None], of, out=into[:, 0])
+            np.multiply(each.imag[:, None], of, out=into[:, 1])
         out += more
         return out.reshape(len(own), -1, rows.shape[1])
 
@@ -219,9 +220,14 @@ def _longest(contacts: ContactStates) -> FloatArray:
     base: FloatArray = contacts.stiffness[0].copy()
     lengths = np.diff(contacts.times)
     for c in np.flatnonzero(np.any(contacts.stiffness != base, axis=(0, 2, 3))):
-        states = contacts.stiffness[:, c].reshape(lengths.size, -1)
-        known, which = np.unique(states, axis=0, return_inverse=True)
-        base[c] = known[np.argmax(np.bincount(which.ravel(), lengths))].reshape(3, 3)
+        # a few different states of many intervals: found by their bytes, sorted by their numbers
+        states = contacts.stiffness[:, c].reshape(lengths.size, -1) + 0.0  # no negative zeros
+        place: dict[bytes, int] = {}
+        which = np.array([place.setdefault(row.tobytes(), len(place)) for row in states])
+        known = states[[int(np.argmax(which == k)) for k in range(len(place))]]
+        order = np.lexsort(known.T[::-1])
+        times = np.bincount(which, lengths)[order]
+        base[c] = known[order[np.argmax(times)]].reshape(3, 3)
     return base
 
 
