@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -44,3 +45,26 @@ def test_every_public_name_serves_a_task(generate: ModuleType) -> None:
     tasks = generate.interface_by_task.by_task()
     assert all(tasks.values())
     assert sum(map(len, tasks.values())) == len(list(generate.interface_by_task.public_names()))
+
+
+def test_files_and_modules_that_pages_name_exist() -> None:
+    root = DOCS.parent
+    files = {str(p.relative_to(root)) for p in root.rglob("*.py") if not {".venv", "build"} & set(p.parts)}
+    names = {f"/{name}" for name in files}
+    pages = [*DOCS.rglob("*.md"), root / "README.md", root / "CONTRIBUTING.md"]
+    found = [
+        (page.name, word)
+        for page in pages
+        for word in re.findall(r"(?<![\w/.-])[a-z_][\w/.]*\.py\b", page.read_text(encoding="utf-8"))
+        if "NAME" not in word and "/slip_onset/" not in word  # a folder that the page of extensions makes
+    ]
+    assert len(found) > 100
+    assert [one for one in found if not any(name.endswith(f"/{one[1]}") for name in names)] == []
+    modules = {
+        (page.name, word)
+        for page in pages
+        for word in re.findall(r"(?:python -m )(evidence[\w.]*\w)", page.read_text(encoding="utf-8"))
+    }
+    assert modules
+    folders = {str(Path(name).parent) for name in files}
+    assert [m for m in modules if (w := m[1].replace(".", "/")) not in folders and f"{w}.py" not in files] == []
