@@ -306,7 +306,9 @@ def lifted(**sweep: object) -> Question:
 
 def test_fold_is_told_with_the_label_of_its_case() -> None:
     asked = lifted()
-    (said,) = [t for t in warnings_of(dataset(solved(asked))) if "folds" in t]
+    data = dataset(solved(asked))
+    assert 0 < int(data.refinement.sum()) <= asked.sweep.peak_points
+    (said,) = [t for t in warnings_of(data) if "folds" in t]
     assert said.startswith("The response folds between 0.2")
     assert "the peak stands among them. Which motion a machine takes" in said
     told = warnings_of(dataset(solved(replace(asked, label="load.f.force_n = 2"))))
@@ -544,6 +546,7 @@ def test_response_over_speed_has_speeds() -> None:
     asked = replace(asked, model=replace(asked.model, engine_order=2, sectors=4))
     data = dataset(solved(asked))
     np.testing.assert_allclose(data.speed_rpm * 2 / 60, data.frequency_hz, rtol=1e-14)
+    assert not data.refinement.any()
     assert data.attrs["engine_order"] == 2
     assert data.attrs["sectors"] == 4
 

@@ -26,10 +26,12 @@ from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.forced_response.page.tables import more_harmonics, peaks, time_integration
 from stickslip.analyses.inputs import Varied, as_run, told
 from stickslip.analyses.page import plots, report_file, report_html
+from stickslip.analyses.pictures.model import reduction
 from stickslip.analyses.pictures.skin import edges, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
 from stickslip.report.content import Table
+from stickslip.report.node import Node
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.tiles import patches, triangulated
@@ -422,6 +424,16 @@ def test_checks_name_their_case_and_what_decided() -> None:
         ["undecided", "–", "0.9", "none"],
     ]
     assert table.items[1] == f"{KEY} = 5: 181.000 Hz: undecided: y"
+
+
+def test_a_reduction_is_told_by_the_analysis_that_knows_the_full_model() -> None:
+    frequency = ("mode", [100.0])
+    reduced = xr.Dataset({"frequency_reduced_hz": frequency})
+    both = reduced.assign(frequency_full_hz=frequency)
+    assert reduction({"modes": Node(reduced)}) is None
+    table = reduction({"modes": Node(reduced), "forced_response": Node(both)})
+    assert table is not None
+    assert table.rows == [["free 1", "100.000", "100.000", percent(0.0)]]
 
 
 def test_every_table_of_checks_ends_with_what_they_said() -> None:

@@ -199,6 +199,13 @@ def test_the_damper_takes_its_apex_from_the_platforms(tmp_path):
     assert damper == FlatCurvedDamper(apex=BladePair().wedge_apex, centre=damper.centre)
 
 
+def test_what_a_damper_says_of_itself_counts_before_its_platforms(tmp_path):
+    tables = read_study(write_two_blades(tmp_path, {"part.damper.curved_angle_deg": "44.0"})).tables
+    damper = damper_of(tables, "damper")
+    assert damper.curved_angle == pytest.approx(math.radians(44.0))
+    assert (damper.apex, damper.flat_angle) == (BladePair().wedge_apex, FlatCurvedDamper().flat_angle)
+
+
 # models
 
 

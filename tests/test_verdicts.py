@@ -67,7 +67,8 @@ def response(attrs: dict[str, object] | None = None, **changes: object) -> xr.Da
     }
     for name, value in (plain | case | changes).items():
         word = name.partition("_")[0]
-        dims = rows.get(word, "case" if name in (*case, "known_verdicts") else "point")
+        of_case = name in (*case, "known_verdicts") or word in ("modes", "points")
+        dims = rows.get(word, "case" if of_case else "point")
         found[name] = ((dims, "harmonic") if name == "harmonic_kept" else dims, value)
     own = {"low_harmonics": [0, 1], "selection_threshold": 0.05, "error_limit_percent": 5.0}
     return xr.Dataset(found, {"output": ["tip.x"]}, own | (attrs or {}))
@@ -357,6 +358,24 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "output that does not move": ({"amplitude": np.full(6, 1e-20)}, "doubtful", {}, "tip.x does not move"),
     "retention": ({"retention_peak_shift": [-0.2]}, "doubtful", {}, "the peak changes by -20 %"),
     "little retention": ({"retention_peak_shift": [0.005]}, "trusted", {}, "peak with H = 1"),
+    "more modes": (
+        {"modes_peak_change": [-0.2], "modes_frequency_change_hz": [1.5]},
+        "doubtful",
+        {},
+        "the peak changes by -20 % and +1.5 Hz with half again as many modes in the reduction",
+    ),
+    "fewer points": (
+        {"points_peak_change": [0.2], "points_frequency_change_hz": [-1.5], "points_left_out": [12]},
+        "doubtful",
+        {},
+        "the peak changes by +20 % and -1.5 Hz with half the points of its contacts (12 left out)",
+    ),
+    "modes that are enough": (
+        {"modes_peak_change": [0.005], "modes_frequency_change_hz": [0.1]},
+        "trusted",
+        {},
+        "peak with H = 1",
+    ),
     "known to the job": ({"known_verdicts": [to_json([doubt("It may drift.")])]}, "doubtful", {}, "It may drift"),
 }
 
