@@ -23,14 +23,14 @@ _structure: Any = cgutils.create_struct_proxy
 
 @cache
 def address_of(function: Any, signature: Any) -> int:
-    """Return where the code of a compiled function begins, in this process."""
+    """Return the address of a compiled function in this process."""
     compiled = function.get_compile_result(signature)
     address: int = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return address
 
 
 def function_at(signature: Any) -> Any:
-    """Return what turns an address into a function in compiled code."""
+    """Return the compiled function that turns an address into a function of this signature."""
     kind = types.FunctionType(signature)
 
     @intrinsic
@@ -51,7 +51,7 @@ law_at = function_at(STEP_SIGNATURE)  # the step of a law
 
 
 def law_address(kernel: Any) -> int:
-    """Return where the compiled step of a law begins, for `law_at`."""
+    """Return the address of a law's compiled step, for `law_at`."""
     return address_of(kernel, STEP_SIGNATURE)
 
 

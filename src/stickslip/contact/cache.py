@@ -21,7 +21,7 @@ LINE = "compiling contact laws or their time steps, once an installation; this m
 
 
 class _Compiling(event.Listener):
-    """Listens to numba; functions that one calls are compiled within its time."""
+    """Listener of numba's compilations; compilation of called functions is nested in that of the caller."""
 
     def __init__(self) -> None:
         self.depth = 0
@@ -29,13 +29,13 @@ class _Compiling(event.Listener):
         self.told = False
 
     def tell(self) -> None:
-        """Say it, once a process."""
+        """Log the line, once a process."""
         if not self.told:
             self.told = True
             LOG.info(LINE)
 
     def on_start(self, _: Any) -> None:
-        """Wait, and say it if it lasts."""
+        """Start the timer that logs the line."""
         self.depth += 1
         if self.depth == 1 and not self.told:
             self.soon = Timer(QUIET_SECONDS, self.tell)
@@ -43,7 +43,7 @@ class _Compiling(event.Listener):
             self.soon.start()
 
     def on_end(self, _: Any) -> None:
-        """Be quiet about what was short."""
+        """Stop the timer: short compilations are not logged."""
         self.depth -= 1
         if self.depth == 0:
             self.soon.cancel()
@@ -53,30 +53,29 @@ _LISTENER = _Compiling()
 
 
 def say_what_is_compiled() -> None:
-    """Log a line where a function takes seconds to compile."""
+    """Log a line whenever a function takes seconds to compile."""
     event.register("numba:compile", _LISTENER)  # type: ignore[no-untyped-call]
 
 
 def njit(*asked: Any, cache: bool = False, **options: Any) -> Any:
     """Compile as `numba.njit` does; with ``cache`` in a cache of this package.
 
-    Where numba may write to no folder, functions that ask for a cache are compiled at every start: numba itself refuses to load
-    them. What another version of this package has left in the cache is compiled again, and so is a function whose file imports one
-    that has changed.
+    If numba has no folder that it may write, functions with a cache are compiled at every start; numba itself would refuse to load
+    them. A function is compiled again if its file, or one that this file imports, has changed.
 
     Parameters
     ----------
     *asked
-        The function, or the signatures that are compiled at once, or nothing.
+        The function, or signatures that are compiled at once, or nothing.
     cache
-        Whether compiled code is kept for the next start.
+        Whether compiled code is stored for the next start.
     **options
-        Of numba.
+        Options of numba.
 
     Returns
     -------
     Dispatcher
-        Of the function; without a function what makes it of one.
+        The dispatcher of the function; without a function, a decorator.
     """
     if len(asked) == 1 and callable(asked[0]) and hasattr(asked[0], "__code__"):
         return _compiled(asked[0], (), cache, options)

@@ -26,14 +26,14 @@ _TOLD = "STICKSLIP_UNCACHED"  # in the environment: worker processes need not sa
 
 
 class CheckedFiles(IndexDataCacheFile):
-    """Index and data of one function. A file that fails its checksum is thrown away with one line; one of another age counts for nothing.
+    """Index and data of one function. A file that fails its checksum is deleted with one line in the log; an outdated file is ignored.
 
-    A file holds `MARK`, the SHA-256 of the rest, and two pickles: its age, and its content. Data have the key of the index before
-    them: a file that another process, or one that was killed, left under the same name is not taken for another function's.
+    A file consists of `MARK`, the SHA-256 of the rest, and two pickles: the state of its sources, and its content. The key of the index
+    precedes the data, so that a file of the same name from another or a killed process is not mistaken for this function's.
     """
 
     def load(self, key: Any) -> Any:
-        """Return what was saved under a key; None where it is not there, damaged, or of another age."""
+        """Return the data saved under a key; None if missing, damaged or outdated."""
         name = self._load_index().get(key)
         kept = None if name is None else self._read(self._path(name))
         return None if kept is None or kept[0] != key else kept[1]
@@ -86,7 +86,7 @@ class CheckedFiles(IndexDataCacheFile):
 
 
 class CheckedCache(FunctionCache):
-    """numba's cache of one function, with `CheckedFiles`. What cannot be read or written costs a compilation, and never ends a program.
+    """numba's cache of one function, with `CheckedFiles`. A file that cannot be read or written costs a compilation, and never ends the program.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class CheckedCache(FunctionCache):
         )  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function of a signature; None where it has to be compiled."""
+        """Return the compiled function of a signature; None if it must be compiled."""
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # noqa: BLE001  as above, of the compiled code; or nothing can be read
@@ -115,7 +115,7 @@ class CheckedCache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the compiled function of a signature, if anything can be written."""
+        """Save the compiled function of a signature, if a file can be written."""
         try:
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
         except OSError:  # a disk that is full since
@@ -146,7 +146,7 @@ def _contents(file: Path) -> str:
 
 
 def tell_uncached() -> None:
-    """Say, once in all processes, that compiled functions cannot be kept."""
+    """Log, once in all processes, that compiled functions cannot be stored."""
     if _TOLD not in os.environ:
         os.environ[_TOLD] = "yes"
         LOG.warning(

@@ -15,7 +15,7 @@ from stickslip.errors import input_error
 
 @dataclass(frozen=True, eq=False)
 class MarchedLaws:
-    """Contacts of one law class, marched together."""
+    """Contacts of one law class, evaluated together by marching."""
 
     contacts: IntArray
     kernel: Any
@@ -25,29 +25,29 @@ class MarchedLaws:
 
 @dataclass(frozen=True, eq=False)
 class CompiledContacts:
-    """The laws of all contacts, sorted by how they are evaluated.
+    """The laws of all contacts, grouped by evaluator.
 
     Attributes
     ----------
     evaluator
-        How piecewise-linear laws are evaluated: ``intervals`` (on samples), ``events`` (exact), or ``march`` as all others but planar
-        ones are.
+        Evaluator of piecewise-linear laws: ``intervals`` (on samples), ``events`` (exact), or ``march``, which also evaluates
+        all other laws but planar friction.
     n_contacts
         Number of contacts.
     pairs
-        Derivative blocks a contact: 5, 7 or 9.
+        Number of derivative blocks of a contact: 5, 7 or 9.
     weights
         (n_contacts,) factors of the forces; None: ones.
     piecewise
-        Contacts that are sums of elementary ones.
+        Indices of contacts that are sums of elementary contacts.
     elements, first
-        (n_elements, 7) and (len(piecewise) + 1,): their elements, see `contact_period`.
+        (n_elements, 7) and (len(piecewise) + 1,): elements of these contacts, see `contact_period`.
     planar, planar_elements
-        Contacts with isotropic planar friction, and their (len(planar), 7) rows.
+        Indices of contacts with isotropic planar friction, and their (len(planar), 7) rows.
     marched
         All other contacts.
     sliders
-        (n_contacts, 3) gaps at which the springs of evaluated (not marched) contacts are unstretched before t = 0, m, zero along
+        (n_contacts, 3) gaps, m, at which the springs of contacts that are not marched are unstretched before t = 0, zero along
         the normal; None: zeros.
     """
 
@@ -70,11 +70,11 @@ class CompiledContacts:
 
     @property
     def keeps_events(self) -> bool:
-        """Whether an evaluation without samples tells when every contact changes its state."""
+        """Whether an evaluation without samples returns the events of all contacts."""
         return self.evaluator == "events" and not self.marched and not self.planar.size
 
     def from_sliders(self, gap_coefficients: FloatArray) -> FloatArray:
-        """Return the (2H+1, 3 n_contacts) coefficients of the gaps measured from where springs start unstretched; evaluators start at zero."""
+        """Return the (2H+1, 3 n_contacts) coefficients of the gaps relative to the initial slider positions, as evaluators start at zero."""
         if self.sliders is None:
             return gap_coefficients
         moved = gap_coefficients.copy()
@@ -97,7 +97,7 @@ def checked_weights(weights: FloatArray, n: int) -> FloatArray:
 def compile_contacts(
     laws: Sequence[ContactLaw], weights: FloatArray | None = None, evaluator: Evaluator = "intervals"
 ) -> CompiledContacts:
-    """Sort `laws` by evaluator and lay their parameters out in arrays.
+    """Group `laws` by evaluator and write their parameters into arrays.
 
     Parameters
     ----------
@@ -106,8 +106,8 @@ def compile_contacts(
     weights
         (n_contacts,) factors of the forces; None: ones.
     evaluator
-        ``intervals`` or ``events`` for piecewise-linear laws, ``march`` for all; planar friction is evaluated at events by both of the
-        first, and all other laws are marched.
+        ``intervals`` or ``events`` for piecewise-linear laws, ``march`` for all. With the first two, planar friction is
+        evaluated at events, and all other laws are marched.
 
     Raises
     ------

@@ -14,7 +14,7 @@ _PAIRS = np.array(PAIRS)  # force and gap direction of each block
 
 @njit(cache=True, nogil=True)
 def _strays(block, p):  # type: ignore[no-untyped-def]
-    """Return by how much row `p` of a block, the cosine row of its harmonic, and the sine row after it differ from those of a complex number."""
+    """Return the deviation of row `p` of a block, the cosine row of a harmonic, and of the following sine row from the form of a complex number."""
     h, rest = (p + 1) // 2, 0.0
     for row in range(p, p + (1 if p == 0 else 2)):
         for q in range(block.shape[1]):
@@ -43,7 +43,7 @@ def _split(block, coupled, mean, left):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untyped-def]
-    """Separate forces that depend on other harmonics from those that do not.
+    """Separate contact forces that depend on other harmonics from forces that do not.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untype
     rounding
         Share of a contact's largest derivative that counts as zero.
     means
-        Out: (H+1, n_contacts, 3, 3) complex numbers by which a harmonic of a force depends on the same one of a gap; zero where it is coupled.
+        Out: (H+1, n_contacts, 3, 3) complex derivatives of a harmonic of a force by the same harmonic of a gap, N/m; zero where the force is coupled.
     left
-        Out: (n_contacts, P, m, m) the derivatives of forces that are coupled, else zero.
+        Out: (n_contacts, P, m, m) derivatives of coupled forces, N/m, else zero.
     coupled
-        Out: (n_contacts, 3, H+1) whether a harmonic of a force depends on the gaps in any other way.
+        Out: (n_contacts, 3, H+1) whether a harmonic of a force depends on other harmonics of the gaps.
     """
     n_contacts, n_pairs = blocks.shape[:2]
     coupled[:] = False
@@ -76,7 +76,7 @@ def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untype
 
 @njit(cache=True, nogil=True)
 def touched(coupled, columns, values, out):  # type: ignore[no-untyped-def]
-    """Set `out` (H+1, n) to the coordinates whose equation in a harmonic holds a force that is `coupled`; the others from `sparse_rows`."""
+    """Set `out` (H+1, n) to whether the equation of a coordinate in a harmonic contains a `coupled` force; `columns` and `values` from `sparse_rows`."""
     out[:] = False
     for c in range(columns.shape[0]):
         for d in range(3):
@@ -127,22 +127,22 @@ def _add_force(columns, values, line, place, out):  # type: ignore[no-untyped-de
 
 @njit(cache=True, nogil=True)
 def add_coupling(left, coupled, columns, values, real, imaginary, kept, first, place, out):  # type: ignore[no-untyped-def]
-    """Add what the coupled forces make of the kept unknowns, with those that follow them: ``Bᵀ left B P``.
+    """Add the coupled forces as functions of the kept unknowns: ``Bᵀ left B P``.
 
     Parameters
     ----------
     left, coupled
-        From `couplings`, in the scale of the result.
+        Results of `couplings`, in the scale of `out`.
     columns, values
         The gap operator by contact, from `sparse_rows`.
     real, imaginary
-        (H+1, n, most) P: coordinates that unit amplitudes of the kept ones make, harmonic by harmonic.
+        (H+1, n, most) P: all coordinates for unit amplitudes of the kept ones, harmonic by harmonic.
     kept, first
-        (H+1,) how many are kept of a harmonic, and where the first of them is among all unknowns that are kept.
+        (H+1,) number of kept coordinates of each harmonic, and position of the first among all kept unknowns.
     place
-        (m, n) where an unknown is among those kept.
+        (m, n) position of an unknown among the kept ones.
     out
-        In and out: (N, N) in C order, a row for each equation that is kept.
+        In and out: (N, N) in C order, a row for each kept equation.
     """
     n_contacts, n_pairs, m, _ = left.shape
     gap = np.empty((2, 3, real.shape[0], real.shape[2]))

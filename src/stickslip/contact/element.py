@@ -34,7 +34,7 @@ element_step = kernel_in("element")
 
 
 def slider_start(residual_traction: float | None, slider: tuple[float, float] | None = None) -> FloatArray:
-    """Return the (2,) slider positions before t = 0: `slider`, zero without one, or NaN where a residual traction decides."""
+    """Return the (2,) slider positions before t = 0: `slider`, or zero without one; NaN if a residual traction is given."""
     if residual_traction is not None:
         return np.full(2, np.nan)
     return np.zeros(2) if slider is None else np.array(slider)

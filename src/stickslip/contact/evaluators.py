@@ -8,5 +8,5 @@ Evaluator = Literal["intervals", "march", "events"]
 
 
 def check_evaluator(evaluator: str) -> None:
-    """Refuse a name that is not known."""
+    """Refuse an unknown evaluator."""
     check_choice("evaluator", evaluator, get_args(Evaluator), "'events' has no sampling error.")

@@ -20,14 +20,14 @@ UNKEPT = -1  # count of events that found no room: round-off made more than such
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """Where contacts change their states over a period: all that is needed to integrate forces and derivatives again.
+    """State changes of contacts over a period, sufficient to integrate forces and derivatives again.
 
     Attributes
     ----------
     polynomials
         (n_contacts, 3, m) real Fourier coefficients of the gaps, m.
     crossings, n_crossings, starts_open
-        (n_elements, 2 order + 4) times at which elements open and close, their number, and whether they begin open.
+        (n_elements, 2 order + 4) times at which elements open and close, number of these times, and whether an element begins open.
     segments, n_segments
         (n_elements, 2, 12 order + 12, 6) and (n_elements, 2): states of both tangential springs, as `slider.find_segments` finds them.
     """
@@ -41,19 +41,19 @@ class Events:
 
     @property
     def whole(self) -> bool:
-        """Whether all events are there."""
+        """Whether all events fitted into the arrays."""
         return bool(np.all(self.n_crossings > UNKEPT) and np.all(self.n_segments > UNKEPT))
 
     @property
     def none(self) -> bool:
-        """Whether no state changes: then forces are linear in the gaps, and have no harmonics that these have not."""
+        """Whether no state changes: then forces are linear in the gaps, and have the same harmonics."""
         return bool(self.whole and np.all(self.n_crossings == 0) and np.max(self.n_segments, initial=0) <= 1)
 
 
 def room_for_events(order: int, elements: int) -> Events:
-    """Allocate for the events of gaps with `order` harmonics; their polynomials are still missing.
+    """Allocate arrays for the events of gaps with `order` harmonics; `polynomials` is not yet filled.
 
-    A polynomial changes its sign and has extrema 2 H times at most, so that there are 6 H + 1 cells between nodes, each with two segments.
+    A polynomial has at most 2 H sign changes and 2 H extrema, which gives 6 H + 1 cells between nodes, each with two segments.
     """
     return Events(
         np.zeros((0, 3, 2 * order + 1)),
@@ -76,7 +76,7 @@ def _basis_row(at, weight, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _add_stuck(segment, at_start, k, work, coefficients, block_x, block_n):  # type: ignore[no-untyped-def]
-    """Add what the resting slider of one segment takes off the force ``k x``."""
+    """Subtract the part of the resting slider in one segment from the force ``k x``."""
     _basis_row(work.means[0], 2.0, work.row)
     m = work.row.size
     for p in range(m):
@@ -223,7 +223,7 @@ def _integrate_events(  # type: ignore[no-untyped-def]
 def integrated(
     events: Events, elements: FloatArray, first: IntArray, order: int, pairs: int = 5
 ) -> tuple[FloatArray, FloatArray]:
-    """Integrate forces and derivatives up to `order` between known events; nothing is searched again.
+    """Integrate forces and derivatives up to `order` between known events, without a new search.
 
     Parameters
     ----------
@@ -234,13 +234,13 @@ def integrated(
     order
         Highest harmonic, at least that of the gaps.
     pairs
-        Derivative blocks a contact, at least five.
+        Number of derivative blocks of a contact, at least five.
 
     Returns
     -------
     tuple
         (2 order + 1, 3 n_contacts) coefficients of the forces, N; (n_contacts, pairs, 2 order + 1, 2 order + 1) derivatives, N/m, also by
-        coefficients that the gaps do not have.
+        harmonics that the gaps do not have.
     """
     n, _, few = events.polynomials.shape
     m = 2 * order + 1

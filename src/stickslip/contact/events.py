@@ -37,7 +37,7 @@ LARGEST = 1e152  # of a gap's Fourier coefficients; its square is still finite
 
 @njit(cache=True)
 def sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def]
-    """Add the normal force on samples; fill the limit there and the state that a direction without stiffness has."""
+    """Add the normal force on samples; fill the friction limit there and the state of directions without stiffness."""
     for i in range(gap.size):
         normal, _, limit[i], _, is_open = normal_contact(gap[i], row)
         force[i] += normal
@@ -153,7 +153,7 @@ def contact_events(  # type: ignore[no-untyped-def]
     grid
         From `search_grid`.
     gap
-        (n_contacts, 3, samples) the gaps on samples, for `force` and `state`; there may be none.
+        (n_contacts, 3, samples) gaps on samples, for `force` and `state`; there may be no samples.
     coefficients
         Out: (n_contacts, 3, m) Fourier coefficients of the forces (T_t, T_w, -N) in N.
     blocks
@@ -173,7 +173,7 @@ def contact_events(  # type: ignore[no-untyped-def]
 def contact_events_threads(  # type: ignore[no-untyped-def]
     shares, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
 ):
-    """Do the same as `contact_events` in `shares` that threads take in turn."""
+    """Evaluate as `contact_events`, in `shares` that are distributed over threads."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(
@@ -214,11 +214,11 @@ def exact_period(
     elements, first
         (n_elements, 7) rows and (n_contacts + 1,) offsets, see `contact_events`.
     gap
-        (n_contacts, 3, samples) the gaps on samples where forces and states are wanted; there may be none.
+        (n_contacts, 3, samples) gaps on samples at which forces and states are returned; there may be no samples.
     pairs
-        Derivative blocks a contact, at least five.
+        Number of derivative blocks of a contact, at least five.
     kept
-        Out: events, from `room_for_events`; None: they are not kept.
+        Out: events, from `room_for_events`; None: they are not returned.
 
     Returns
     -------

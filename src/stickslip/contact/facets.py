@@ -23,7 +23,7 @@ CENTRE = {kind: nodes[: CORNERS[kind]].mean(axis=0) for kind, nodes in REFERENCE
 
 
 def kinds_of(facets: IntArray) -> IntArray:
-    """Return the number of nodes of each row of `facets` (m, k), without the -1 that fill it up."""
+    """Return the number of nodes of each row of `facets` (m, k), not counting fillers -1."""
     return np.asarray(np.count_nonzero(facets >= 0, axis=1), dtype=np.int64)
 
 
@@ -87,12 +87,12 @@ def interpolation(facets: IntArray, at: FloatArray) -> FloatArray:
 
 
 def positions(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
-    """Return the (n, 3) places of the reference points `at` (n, 2) of `facets` (n, k)."""
+    """Return the (n, 3) positions of the reference points `at` (n, 2) of `facets` (n, k)."""
     return np.asarray(np.einsum("nk,nkc->nc", interpolation(facets, at), points[facets]))
 
 
 def tangents(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
-    """Return the (n, 2, 3) derivatives of the place by the reference coordinates."""
+    """Return the (n, 2, 3) derivatives of the position by the reference coordinates."""
     found = np.zeros((len(facets), 2, 3))
     for kind, rows in _by_kind(facets):
         gradients = shape_gradients(kind, at[rows])
@@ -109,13 +109,13 @@ def centres(facets: IntArray) -> FloatArray:
 
 
 def normals(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
-    """Return the (n, 3) normals of the facets themselves, as long as an area element of the reference square."""
+    """Return the (n, 3) normals of the facets; their length is the area per unit area of the reference facet."""
     first, second = tangents(points, facets, at).transpose(1, 0, 2)
     return np.asarray(np.cross(first, second))
 
 
 def node_normals(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the (n, k, 3) normals of each facet at each of its own nodes, as long as the facet's angle there in rad.
+    """Return the (n, k, 3) normals of each facet at its own nodes; their length is the facet's angle there in rad.
 
     Their sum over the facets around a node does not depend on how a surface is cut into triangles (Thürmer & Wüthrich 1998).
     """
@@ -135,7 +135,7 @@ def node_normals(points: FloatArray, facets: IntArray) -> FloatArray:
 
 
 def lumped_areas(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the area of each facet shared out to its nodes, (n, k), all positive.
+    """Return the area of each facet distributed to its nodes, (n, k), all positive.
 
     Linear triangles and parallelograms: ``∫ N_i dA``, thus the loads of a uniform pressure. Quadratic facets: in proportion to ``∫ N_i² dA``
     (Hinton, Rock & Zienkiewicz 1976), because ``∫ N_i dA`` is zero or negative at their corners.

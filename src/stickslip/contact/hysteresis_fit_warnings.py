@@ -17,7 +17,7 @@ _FOURTH = math.sqrt(70.0)  # standard deviation of fourth differences of noise o
 def doubts(
     model: LoopModel, fitted: FloatArray, slips: FloatArray, *, k_t: float, limit: float, least: tuple[float, float]
 ) -> list[str]:
-    """Return a sentence for each thing that the loops cannot tell or that is doubtful.
+    """Return a sentence for each parameter that the loops do not determine and for each doubtful estimate.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ def doubts(
     slips
         (samples,) 1 where the fitted contact slips forward, -1 backward, 0 where it sticks.
     k_t, limit
-        As fitted; NaN where they are not told.
+        Fitted values; NaN where the loops do not determine them.
     least
-        What they certainly reach, where they are not told.
+        Lower bounds of both, where the loops do not determine them.
     """
     away = model.measured - fitted
     return [

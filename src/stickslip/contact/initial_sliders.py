@@ -31,22 +31,22 @@ FORGETS = (BoucWen, Dahl)  # a mean force relaxes over many cycles: the steady o
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """The springs of an interface that have a start.
+    """The springs of an interface whose initial slider position is free.
 
     Attributes
     ----------
     interface
-        Every law with no start of its own (unstretched at zero displacement), an Iwan element as its Jenkins elements side by side.
+        The interface with all springs unstretched at zero displacement, Iwan elements as Jenkins elements in parallel.
     given
-        The same with the starts that the model gives.
+        The same interface with the initial positions of the model.
     first
         (n_contacts + 1,) contact c of the model is contacts first[c] to before first[c + 1] of `interface`.
     stiffness
-        (n, 2) of each spring along t and w, N/m; zero where there is no spring that has a start.
+        (n, 2) stiffness of each spring along t and w, N/m; zero where no spring with a free start exists.
     planar
-        (n,) whether the force is limited as a vector in the plane.
+        (n,) whether the friction force is limited as a vector in the plane.
     friction, constant
-        (n,) a friction limit is ``friction N + constant``, N the normal force.
+        (n,) parameters of the friction limit ``friction N + constant``, N being the normal force.
     """
 
     interface: Interface
@@ -58,13 +58,13 @@ class Starts:
     constant: FloatArray
 
     def limits(self, normal: FloatArray) -> FloatArray:
-        """Return the friction limits, N, under normal forces (n, ...) that push where they are positive."""
+        """Return the friction limits, N, under normal forces (n, ...), which are positive in compression."""
         shape = (-1,) + (1,) * (normal.ndim - 1)
         pushed = self.friction.reshape(shape) * np.maximum(normal, 0.0)
         return np.asarray(pushed + self.constant.reshape(shape))
 
     def law(self, contact: int, slider: FloatArray) -> ContactLaw:
-        """Return the law of a contact of `interface` that starts from a slider (2,), m."""
+        """Return the law of a contact of `interface` with the initial slider position (2,), m."""
         own: Any = self.interface.laws[contact]
         if np.any(self.stiffness[contact]):
             own = replace(own, slider=(float(slider[0]), float(slider[1])))
@@ -72,18 +72,18 @@ class Starts:
         return begun
 
     def started(self, sliders: FloatArray) -> Interface:
-        """Return the interface whose springs start from sliders (n, 2), m."""
+        """Return the interface with initial slider positions (n, 2), m."""
         laws = tuple(self.law(c, s) for c, s in enumerate(sliders))
         return replace(self.interface, laws=laws)
 
 
 def starts_of(interface: Interface) -> Starts:
-    """Return the springs of an interface that have a start.
+    """Return the springs of an interface whose initial slider position is free.
 
     Raises
     ------
     InputError
-        If a contact is rigid, or a law of one's own remembers something and does not say where its springs start.
+        If a contact is rigid, or a user's law has a state without a known initial position of its springs.
     """
     given: list[ContactLaw] = []
     of_contact = [0]
@@ -171,19 +171,19 @@ OneSlider = ElasticCoulomb | CoupledCoulomb  # under the normal force, with a pl
 
 
 def freezable(name: str, law: ContactLaw) -> bool:
-    """Return whether a law has a slider that a static state can leave somewhere; of springs nothing is to be frozen.
+    """Return whether a law has a slider that can start from a static state; False for springs without a slider.
 
     Parameters
     ----------
     name
-        Of the contact, for messages.
+        Name of the contact, for messages.
     law
-        Its law.
+        Law of the contact.
 
     Raises
     ------
     InputError
-        If the law remembers more than the place of one slider, or says itself where that starts.
+        If the state of the law is more than the position of one slider, or the law prescribes its start.
     """
     if isinstance(law, OneSlider):
         if isinstance(law, ElasticCoulomb) and law.residual_traction is not None:
@@ -204,12 +204,12 @@ def freezable(name: str, law: ContactLaw) -> bool:
 
 
 def sharing_friction(law: ContactLaw, share: float) -> ContactLaw:
-    """Return a law with a share of its friction coefficient, its springs unstretched at zero displacement; springs as they are."""
+    """Return a law with a share of its friction coefficient and springs unstretched at zero displacement; laws without a slider are unchanged."""
     return replace(law, mu=share * law.mu, slider=None) if isinstance(law, OneSlider) else law
 
 
 def left_behind(law: ContactLaw, gap: FloatArray, force: FloatArray) -> ContactLaw:
-    """Return a law whose slider starts where a spring with the `force` (3,) at the `gap` (3,) holds it; springs as they are."""
+    """Return a law whose slider starts so that the spring has the `force` (3,) at the `gap` (3,); laws without a slider are unchanged."""
     if not isinstance(law, OneSlider):
         return law
     k = law.stuck_stiffness()

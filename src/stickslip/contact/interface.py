@@ -27,9 +27,9 @@ class Interface:
     laws
         One law a contact.
     gap_operator
-        (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``; the contact forces act on the structure as
-        ``gap_operator.T @ force``, on the left side of the equation of motion. Dense or sparse; kept as `scipy.sparse.csr_array`
-        without stored zeros, because a contact touches a few coordinates of thousands.
+        (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``. The contact forces act on the structure as
+        ``gap_operator.T @ force``, on the left side of the equation of motion. Dense or sparse; stored as `scipy.sparse.csr_array`
+        without zeros, because a contact acts on a few coordinates of thousands.
     weights
         (n_contacts,) factors of the forces of each law, such as the area of a point where laws are given per area; None: ones.
 
@@ -82,7 +82,7 @@ class Interface:
         return np.asarray(self.factors[:, None] * own).reshape(-1)
 
     def resting_force(self) -> FloatArray:
-        """Return the (3 n_contacts,) contact forces at zero gap before anything has moved, N: preloads."""
+        """Return the (3 n_contacts,) contact forces at zero gap before any motion, N: preloads."""
         rest = np.zeros(3)
         out = np.empty((self.n_contacts, 3))
         for law, force in zip(self.laws, out, strict=True):
@@ -94,11 +94,11 @@ class Interface:
 
     @property
     def rigid(self) -> bool:
-        """Whether a contact is rigid, so that its force is no function of its gap."""
+        """Whether a contact is rigid: its force is no function of its gap."""
         return any(isinstance(law, Rigid) for law in self.laws)
 
     def sprung(self, stiffness: float) -> "Interface":
-        """Return the interface with springs of a stiffness (N/m) in place of rigid contacts."""
+        """Return the interface with springs of `stiffness` (N/m) in place of rigid contacts."""
         return replace(self, laws=softened(self.laws, stiffness))
 
     def coordinates(self) -> IntArray:
@@ -106,7 +106,7 @@ class Interface:
         return np.unique(self.gap_operator.indices).astype(np.int64)
 
     def restricted(self, dofs: IntArray) -> "Interface":
-        """Return the interface on the coordinates `dofs` alone; they must hold `coordinates()`."""
+        """Return the interface on the coordinates `dofs` alone, which must include `coordinates()`."""
         return replace(self, gap_operator=self.gap_operator[:, dofs])
 
 
@@ -120,19 +120,19 @@ def _without_zeros(gap_operator: Matrix) -> Matrix:
 
 @dataclass(frozen=True, eq=False)
 class SparseRows:
-    """Gap operator by contact: the columns each contact touches and its 3 values in each."""
+    """Gap operator by contact: the columns with entries of each contact, and its 3 values in each."""
 
     columns: IntArray  # (n_contacts, width); unused entries repeat column 0 with value 0
     values: FloatArray  # (n_contacts, 3, width)
 
     def gaps(self, vector: FloatArray) -> FloatArray:
-        """Return the (m, 3 n_contacts) gaps of coordinates `vector` (m, n), in C order both."""
+        """Return the (m, 3 n_contacts) gaps of coordinates `vector` (m, n), both in C order."""
         gap = np.zeros((vector.shape[0], 3 * len(self.columns)))
         add_gaps(self.columns, self.values, vector, gap)
         return gap
 
     def add_forces(self, force: FloatArray, out: FloatArray) -> None:
-        """Add what the contact forces (m, 3 n_contacts) do at the coordinates to `out` (m, n)."""
+        """Add the forces on the coordinates from contact forces (m, 3 n_contacts) to `out` (m, n)."""
         add_forces(self.columns, self.values, force, out)
 
 
@@ -165,7 +165,7 @@ def add_gaps(columns, values, vector, gap):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def add_forces(columns, values, force, out):  # type: ignore[no-untyped-def]
-    """Add what contact forces `force` (m, 3 n_contacts) do at the coordinates to `out` (m, n); the rest from `sparse_rows`."""
+    """Add the forces on the coordinates from contact forces `force` (m, 3 n_contacts) to `out` (m, n); `columns` and `values` from `sparse_rows`."""
     for q in range(out.shape[0]):
         for c in range(columns.shape[0]):
             for j in range(columns.shape[1]):

@@ -296,7 +296,7 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
 def contact_period_threads(  # type: ignore[no-untyped-def]
     shares, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
 ):
-    """Do the same as `contact_period` in `shares` that threads take in turn."""
+    """Evaluate as `contact_period`, in `shares` that are distributed over threads."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(

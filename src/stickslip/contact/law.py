@@ -26,15 +26,15 @@ UNCOUPLED_TANGENTS, COUPLED_TANGENTS, FULLY_COUPLED = 5, 7, 9
 
 
 class ContactLaw(Protocol):
-    """What an interface needs of a law; frozen dataclasses implement it.
+    """Protocol of contact laws; frozen dataclasses implement it.
 
     Attributes
     ----------
     kernel
         Step compiled by `law_kernel`.
     pairs
-        Blocks that can differ from zero: 5 if neither tangent feels the other, 7 if they are coupled, 9 if the normal force depends
-        on them too.
+        Number of derivative blocks that can differ from zero: 5 if the tangents are independent, 7 if they are coupled, 9 if the
+        normal force also depends on them.
     """
 
     @property
@@ -44,11 +44,11 @@ class ContactLaw(Protocol):
     def pairs(self) -> int: ...  # noqa: D102
 
     def parameters(self) -> FloatArray:
-        """Return the (n_parameters,) array handed to the step; of one length for all laws of a class with as many states."""
+        """Return the (n_parameters,) array passed to the step; its length is the same for all laws of a class with as many states."""
         ...
 
     def initial_state(self) -> FloatArray:
-        """Return the (n_state,) state before t = 0; where it holds NaN, one step at the last sample before t = 0 settles it."""
+        """Return the (n_state,) state before t = 0; NaN entries are replaced by one step at the last sample before t = 0."""
         ...
 
     def stuck_stiffness(self) -> FloatArray:
@@ -65,7 +65,7 @@ def scaled(law: Law, factor: float) -> Law:
     Parameters
     ----------
     law
-        A dataclass whose force-like fields are marked as shared (`stickslip.units.quantity`); a field ``preload`` always is one.
+        A dataclass whose force-like fields are marked as ``shared`` (`stickslip.units.quantity`); a field ``preload`` always counts.
     factor
         Above zero.
 
@@ -101,21 +101,21 @@ class Restoring(Protocol):
 
 
 def holding_directions(law: ContactLaw) -> BoolArray:
-    """Return the (3,) directions t, w, n along which a contact that sticks and is closed holds what it touches."""
+    """Return the (3,) directions t, w, n along which a closed, sticking contact has stiffness."""
     holds = law.stuck_stiffness() > 0.0
     return holds | law.restores() if isinstance(law, Restoring) else holds
 
 
 @runtime_checkable
 class Rigid(Protocol):
-    """A law whose force is no function of its gap: while it sticks nothing moves; solvers find its force as a reaction.
+    """A law whose force is no function of its gap: a sticking contact does not move, and solvers find its force as a reaction.
 
     Attributes
     ----------
     mu
         Friction coefficient.
     preload
-        Constant normal load, N; None: the normal force is a reaction, too.
+        Constant normal load, N; None: the normal force is a reaction as well.
     initial_gap
         Normal gap at zero displacement, m.
     """
@@ -130,17 +130,17 @@ class Rigid(Protocol):
     def initial_gap(self) -> float: ...  # noqa: D102
 
     def softened(self, stiffness: float) -> ContactLaw:
-        """Return the law with springs (N/m) that tends to this one as they stiffen."""
+        """Return the law with springs of `stiffness` (N/m), which tends to this law as `stiffness` grows."""
         ...
 
 
 def softened(laws: Iterable[ContactLaw], stiffness: float) -> tuple[ContactLaw, ...]:
-    """Return laws with springs of a stiffness (N/m) in place of rigid ones."""
+    """Return the laws with springs of `stiffness` (N/m) in place of rigid ones."""
     return tuple(law.softened(stiffness) if isinstance(law, Rigid) else law for law in laws)
 
 
 def held_stiffness(laws: Iterable[ContactLaw], holds: BoolArray, rigid: float) -> FloatArray:
-    """Return the (3 p,) stiffnesses t, w, n in N/m of p contacts: zero where a contact does not hold (p,), `rigid` of rigid laws."""
+    """Return the (3 p,) stiffnesses t, w, n in N/m of p contacts: zero where `holds` (p,) is False, `rigid` for rigid laws."""
     own = zip(softened(laws, rigid), holds, strict=True)
     rows = [law.stuck_stiffness() if held else np.zeros(3) for law, held in own]
     return np.array(rows, dtype=float).reshape(-1)
@@ -148,7 +148,7 @@ def held_stiffness(laws: Iterable[ContactLaw], holds: BoolArray, rigid: float) -
 
 @runtime_checkable
 class PiecewiseLinear(Protocol):
-    """A law that is a sum of elementary contacts, whose periods are evaluated by intervals or exact events."""
+    """A law that is a sum of elementary contacts; a period is evaluated by intervals or exact events."""
 
     def elements(self) -> FloatArray:
         """Return (n_elements, 7) rows k_t, k_w, k_n, mu, preload, residual traction or NaN, unilateral; see `contact.element`."""
@@ -157,10 +157,10 @@ class PiecewiseLinear(Protocol):
 
 @runtime_checkable
 class PlanarFriction(Protocol):
-    """A law with isotropic planar friction, whose periods are evaluated at located events."""
+    """A law with isotropic planar friction; a period is evaluated at located events."""
 
     def planar(self) -> FloatArray | None:
-        """Return the (4,) tangential stiffness, normal stiffness, friction coefficient and preload; None: it is marched."""
+        """Return the (4,) tangential stiffness, normal stiffness, friction coefficient and preload; None: the law is marched."""
         ...
 
 
@@ -170,25 +170,25 @@ def law_kernel(step: Callable[..., None]) -> Any:
     Parameters
     ----------
     step
-        Function ``step(displacement, velocity, state, parameters, force, new_state, jac, status)`` in the part of Python that numba
-        compiles. It reads the first four and fills the others: ``force`` (3,) = (T_t, T_w, -N) in N, ``new_state`` (n_state,),
+        Function ``step(displacement, velocity, state, parameters, force, new_state, jac, status)`` that numba can
+        compile. It reads the first four and fills the others: ``force`` (3,) = (T_t, T_w, -N) in N, ``new_state`` (n_state,),
         ``jac`` (3 + n_state, 6 + n_state) derivatives of force and new state by displacement, velocity and state (it arrives
         zeroed), ``status`` (2,) what each tangent does: 0 stick, 1 slip, 2 open.
 
     Returns
     -------
     object
-        To be stored as the class attribute `kernel` of the law, without an annotation; the step is compiled when that is first read.
+        Value of the class attribute `kernel` of the law, without an annotation; the step is compiled when the attribute is first read.
 
     Notes
     -----
-    The compiled code is kept on disk beside the file of the step. A step typed at a prompt has no file and is compiled anew.
+    The compiled code is stored on disk beside the file of the step. A step typed at a prompt has no file and is compiled anew.
     """
     return _Kernel(step)
 
 
 def kernel_in(name: str) -> Any:
-    """Return the same for a step in ``contact/steps``, which is loaded when it is first asked for, and numba with it."""
+    """Return the kernel of a step in ``contact/steps``; its module, and numba, are imported when the kernel is first read."""
     return _Kernel(name)
 
 

@@ -15,28 +15,28 @@ WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides
 
 
 def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0) -> None:
-    """Compare the derivatives of a law with differences along a random path, and its normal force and stuck stiffness with them.
+    """Check a law along a random path: its derivatives by finite differences, the sign of its normal stiffness, its stuck stiffness.
 
     A positive normal gap is open: the pressure ``N = -force[2]`` must not grow with it. A law that never opens, such as a spring of negative
-    stiffness, may pull the other way if its `stuck_stiffness` says so. Whether a contact may give the law a preload or gap is not asked: that
-    needs its fields ``preload`` and ``k_n``.
+    stiffness, may pull the other way if its `stuck_stiffness` says so. Preload and gap are not checked: they
+    need the fields ``preload`` and ``k_n``.
 
     Parameters
     ----------
     law
         A contact law.
     size, rate
-        Typical displacement, m, and velocity, m/s: large enough that the law shows all its states.
+        Typical displacement, m, and velocity, m/s: large enough that all states of the law occur.
     steps
-        Length of the path.
+        Number of steps of the path.
     seed
-        Of the path.
+        Seed of the random path.
 
     Raises
     ------
     InputError
         If `pairs` is none of 5, 7, 9 or leaves out a block that differs from zero, an output is not filled, a derivative is wrong,
-        the pressure grows as the bodies part, `stuck_stiffness` is none that the law has where it sticks, or each point was next to a kink; it
+        the pressure grows as the bodies part, `stuck_stiffness` is none that the law has where it sticks, or each point was next to a kink; the message
         names the entry and both numbers.
     """
     if law.pairs not in ALLOWED:

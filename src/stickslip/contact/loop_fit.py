@@ -24,20 +24,20 @@ TRIED = (np.geomspace(1.0, 300.0, 24), np.linspace(0.4, 1.0, 13))  # stiffnesses
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopFit:
-    """What measured loops show of a contact with elastic Coulomb friction; NaN for what they do not show.
+    """Parameters of elastic Coulomb friction from measured loops; NaN for parameters that the loops do not determine.
 
     Parameters
     ----------
     k_t
-        Tangential stiffness, N/m, without the machine's where that was given.
+        Tangential stiffness, N/m, without the compliance of the machine if that was given.
     limit
-        Friction force at which all slips, N.
+        Friction force in full slip, N.
     covariance
-        (2, 2) of `k_t` and `limit`.
+        (2, 2) covariance of `k_t` and `limit`.
     normal_load, normal_load_deviation
-        Constant normal force and its standard deviation, N; None where the load is not known.
+        Constant normal force and its standard deviation, N; None if unknown.
     least
-        Stiffness and limit that are certainly reached; NaN where they are told themselves.
+        Lower bounds of stiffness and limit; NaN where the loops determine the value.
     residual
         Standard deviation of the measured force about the fitted one, N.
     loops
@@ -45,7 +45,7 @@ class LoopFit:
     fitted
         (n,) fitted forces of each recording, offset and drift included.
     notes
-        What the loops cannot tell, and what is doubtful.
+        Parameters that the loops do not determine, and doubtful estimates.
     """
 
     k_t: float
@@ -74,7 +74,7 @@ class LoopFit:
 
     @property
     def law(self) -> ElasticCoulomb | None:
-        """The law of one point under the constant load; None where the loops do not tell all of it."""
+        """The law of one point under the constant load; None if the loops do not determine all parameters."""
         if not (math.isfinite(self.k_t) and math.isfinite(self.limit)):
             return None
         load = self.normal_load or 1.0
@@ -105,17 +105,17 @@ def fit_loops(
 ) -> LoopFit:
     """Fit tangential stiffness and friction coefficient to hysteresis loops of force over displacement.
 
-    The law is `ElasticCoulomb` under a constant normal load, walked along the measured displacements. Whether the loops show slip and
-    stick at all is decided first: each must improve the sum of squares by 25 variances.
+    The law is `ElasticCoulomb` under a constant normal load, evaluated along the measured displacements. First it is decided whether the
+    loops show slip and stick at all: each must reduce the sum of squares by 25 variances.
 
     Parameters
     ----------
     loops
-        Recordings: displacements (n,) in m and forces (n,) in N, in the order of time; such as `read_loops` gives.
+        Recordings: displacements (n,) in m and forces (n,) in N, in the order of time, as `read_loops` returns them.
     normal_load, normal_load_deviation
-        Normal force in N, the same in all recordings, and its standard deviation; without it only the limit force is found.
+        Normal force in N, the same in all recordings, and its standard deviation; without a load only the limit force is found.
     machine_stiffness
-        Stiffness in N/m of what lies in series with the contact between the places whose displacement was measured; left out: rigid.
+        Stiffness in N/m of the machine in series with the contact, between the points of the displacement measurement; None: rigid.
     offset, drift
         Whether the force of each recording has an unknown offset, and a drift linear in time.
 

@@ -21,7 +21,7 @@ Loop = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class LoopModel:
-    """Recordings, and what is unknown of them.
+    """Measured recordings and their unknown offsets and drifts.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class LoopModel:
 
     @cached_property
     def sensor(self) -> FloatArray:
-        """(samples, k) what offsets and drifts add to the forces, each of size one."""
+        """(samples, k) contributions of offsets and drifts to the forces, each of size one."""
         columns = []
         for j, (x, _) in enumerate(self.loops):
             rising = np.linspace(-1.0, 1.0, x.size)
@@ -72,7 +72,7 @@ class LoopModel:
 
     @cached_property
     def signs(self) -> FloatArray:
-        """(samples,) forces of a rigid contact of limit one: 1 where the motion goes or went last forward, -1 backward."""
+        """(samples,) forces of a rigid contact with limit one: 1 if the last motion was forward, -1 if backward."""
         ahead = [np.argmax(np.diff(x) != 0.0) for x, _ in self.loops]  # the first sample that moves
         held = [np.sign(np.diff(x)[i]) for (x, _), i in zip(self.loops, ahead, strict=True)]
         return np.sign(self.friction(RIGID * self.stuck, 1.0, held)[0])
@@ -85,7 +85,7 @@ class LoopModel:
         Parameters
         ----------
         stiffness, limit
-            N/m and N.
+            Tangential stiffness, N/m, and friction limit, N.
         held
             Force of the spring at the first sample of each recording, N.
         """
@@ -100,7 +100,7 @@ class LoopModel:
         return np.concatenate(forces), np.concatenate(slips)
 
     def both_ways(self, slips: FloatArray) -> bool:
-        """Whether a recording slips forward and backward, by the signs (samples,) of its slip."""
+        """Whether a recording slips both forward and backward, given the signs (samples,) of slip."""
         return any({-1.0, 1.0} <= set(part.tolist()) for part in np.split(slips, self.first[1:]))
 
     def line(self) -> "Line":
@@ -115,7 +115,7 @@ class LoopModel:
         return _line(np.stack([moved / self.stroke, *intercepts, *drifts], axis=1), self.measured, self.stroke)
 
     def direction(self) -> "Line":
-        """Fit a contact that always slips; the first value is the limit. First samples tell nothing of it."""
+        """Fit a contact that always slips; the first value is the limit. First samples are left out: their direction of slip is unknown."""
         columns = np.column_stack([self.signs, self.sensor])
         known = np.delete(np.arange(self.signs.size), self.first)
         fit = _line(columns[known], self.measured[known])
@@ -131,7 +131,7 @@ class LoopModel:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A linear fit: its values, the standard deviation of the first, whether that is told, the sum of squares, the fitted forces."""
+    """A linear fit: its values, the standard deviation of the first value, whether the loops determine this value, sum of squares, fitted forces."""
 
     values: FloatArray
     deviation: float

@@ -316,7 +316,7 @@ def _settle(  # type: ignore[no-untyped-def]
 
 @cache
 def period_march() -> Any:
-    """Return `march_period`, compiled when it is first asked for: half a minute that exact events never need."""
+    """Return `march_period`, compiled at first use: this takes half a minute, which exact events do not need."""
     return njit(_SIGNATURE, cache=True)(march_period)
 
 

@@ -23,17 +23,17 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: Bool
     Parameters
     ----------
     a, b
-        The two sides; all nodes of A belong to facets, and all of A is opposite to B.
+        The two sides; all nodes of A belong to facets, and all of A faces B.
     reach
         Largest distance of partners, m; None: the radius of the largest facet.
     held
-        (n_A,) nodes of A that do not move, where B does not either: their rows are empty, and the difference vanishes in the mean
-        weighted by the shape functions of the others; None for none.
+        (n_A,) supported nodes of A, where B is supported too: their rows are empty, and the difference vanishes in the mean
+        weighted by the shape functions of the other nodes; None: no such nodes.
 
     Returns
     -------
     Matrix
-        (n_A, n_B) CSR; without held nodes each row adds up to one.
+        (n_A, n_B) CSR; without supported nodes each row adds up to one.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def neighbour_interface(
     sectors
         Number of sectors.
     law
-        One law for all contacts, or a function from the number of the node in its set.
+        One law for all contacts, or a function from the index of the node in its set to a law.
     low, high
         Names of the sets; the i-th nodes of both are partners.
     axis
@@ -49,7 +49,7 @@ def neighbour_interface(
     -------
     Interface
         Contacts ``sector0.1`` ... in the order of the sectors. t lies in the face along the radius, w = n × t; gaps are
-        positive when open. The faces count as touching at rest: a clearance or a preload belongs to the law.
+        positive when open. The faces touch at rest; clearances and preloads are parameters of the law.
 
     Raises
     ------

@@ -35,15 +35,15 @@ class Pairing:
     gap_operator
         (3 n_points, n_dofs) sparse; rows t, w, n of each point: ``gap = gap_operator @ u = frameᵀ (u_B − u_A)``.
     positions
-        (n_points, 3) places on side A, m.
+        (n_points, 3) positions on side A, m.
     frames
         (n_points, 3, 3) columns t, w, n; n is the outward normal of body A.
     weights
-        (n_points,) area in m² that each point stands for; ones where there are no facets. Contact force = weight × law per area.
+        (n_points,) area in m² of each point; ones without facets. Contact force = weight × law per area.
     initial_gap
         (n_points,) normal distance at rest in m, negative where the bodies overlap.
     unpaired
-        Nodes of side A (numbers; for segments: facets of side A) that were left out with ``outside="skip"``.
+        Nodes of side A (numbers; for segments: facets of side A) left out with ``outside="skip"``.
     """
 
     gap_operator: Matrix
@@ -67,7 +67,7 @@ def contact_frames(normal: FloatArray, direction: Direction) -> FloatArray:
     normal
         (p, 3) unit normals.
     direction
-        (3,), or (p, 3) one a point: its part in the tangent plane gives t.
+        (3,), or (p, 3) one for each point: its projection on the tangent plane gives t.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def node_to_segment(
 ) -> Pairing:
     """Pair each node of side A with its closest point on the facets of side B: for non-matching meshes.
 
-    Simple and cheap, but a uniform pressure does not pass exactly. Let A be the side with the finer mesh.
+    Simple and cheap, but a uniform pressure is not transferred exactly. Let A be the side with the finer mesh.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def node_to_segment(
     reach
         Largest distance of partners, m; None: the radius of the largest facet.
     tolerance
-        Distance in m by which a node may stand beyond the rim of side B; None: nothing but rounding.
+        Distance in m by which a node may lie beyond the rim of side B; None: rounding only.
     direction
         Its part in the tangent plane is the tangent t; one for all nodes of A, or (n, 3).
     outside
@@ -231,8 +231,8 @@ def segment_to_segment(
 ) -> Pairing:
     """Pair quadrature points on the common pieces of both sides' facets: "Mortar-like" contact.
 
-    On plane surfaces a uniform pressure passes exactly through any two meshes of triangles and parallelograms. Points are placed on side
-    A, and partners along its normal, so that normal forces have no moment about each other.
+    On plane surfaces a uniform pressure is transferred exactly between any two meshes of triangles and parallelograms. Points lie on side
+    A, and their partners along its normal, so that a pair of normal forces has no moment.
 
     Parameters
     ----------
@@ -242,12 +242,12 @@ def segment_to_segment(
         Largest distance of partners, m; None: the radius of the largest facet.
     degree
         Polynomials integrated exactly on each piece; None: products of the shape functions of both sides. The degree of the shape functions
-        of one side is enough to pass a uniform pressure, with fewer points.
+        of one side suffices to transfer a uniform pressure, with fewer points.
     direction
         Its part in the tangent plane is the tangent t.
     outside
-        What to do about facets of A no part of which has a partner: ``"error"`` or ``"skip"``. A facet that
-        reaches beyond side B takes part as far as it is opposite to it.
+        Treatment of facets of A without any partner: ``"error"`` or ``"skip"``. A facet that
+        reaches beyond side B takes part where it faces B.
 
     Raises
     ------
@@ -269,14 +269,14 @@ def segment_to_segment(
 def paired_interface(
     pairing: Pairing, law: ContactLaw | Callable[[float], ContactLaw], name: str = "contact"
 ) -> Interface:
-    """Put a law per area at every point of a pairing.
+    """Return the interface with a law per area at every point of a pairing.
 
     Parameters
     ----------
     pairing
         Points, gap operator and areas.
     law
-        One law for all points, with stiffnesses in N/m³ and pressures in Pa; it takes the bodies as touching at rest, whatever the
+        One law for all points, with stiffnesses in N/m³ and pressures in Pa; it assumes that the bodies touch at rest, whatever the
         initial gaps of the pairing. Or a function from the initial gap of a point in m to its law, e.g.
         ``lambda gap: ElasticCoulomb(..., k_n=k_n, preload=-k_n * gap)``.
     name

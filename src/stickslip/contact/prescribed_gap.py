@@ -22,7 +22,7 @@ _SIGNATURE = types.void(
 
 
 def forces_along(law: ContactLaw, gap: FloatArray, start: FloatArray | None = None) -> tuple[FloatArray, IntArray]:
-    """Return forces and states along a path that is walked slowly: velocities count as zero.
+    """Return forces and states along a quasi-static path of the gap, with zero velocities.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def forces_along(law: ContactLaw, gap: FloatArray, start: FloatArray | None = No
     gap
         (n, 3) along t, w, n, m.
     start
-        State before the first sample; left out: that of the law.
+        State before the first sample; None: `initial_state` of the law.
 
     Returns
     -------

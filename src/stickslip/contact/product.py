@@ -17,7 +17,7 @@ _SUMS = {"reassoc", "contract"}  # sums in any order: else no sum is vectorised
 
 @njit(cache=True, nogil=True)
 def _gap(columns, values, vector, gap):  # type: ignore[no-untyped-def]
-    """Set `gap` (3, m) to what `vector` (m, n) makes it at one contact."""
+    """Set `gap` (3, m) to the gap of coordinates `vector` (m, n) at one contact."""
     gap[:] = 0.0
     for j in range(columns.size):
         for d in range(3):
@@ -77,7 +77,7 @@ def contact_product(blocks, columns, values, vector, transposed, gap, force, out
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def subtract_lower(blocks, columns, values, vector, before, first, last, factor, gap, out):  # type: ignore[no-untyped-def]
-    """Subtract from the rows `first` to `last` of `out` what the coefficients before them contribute to ``factor Bᵀ K B v``.
+    """Subtract from the rows `first` to `last` of `out` the part of ``factor Bᵀ K B v`` that comes from coefficients before `first`.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def subtract_lower(blocks, columns, values, vector, before, first, last, factor,
     vector
         (m, n) coefficients of the coordinates; only those before `first` are read.
     before, first, last
-        Rows before `before` have their gaps in `gap` already; those up to `first` are added to it.
+        Gaps of the rows before `before` are in `gap` already; gaps of the rows from there to `first` are added to it.
     factor
         Scale of the result.
     gap
@@ -333,10 +333,10 @@ def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, forc
 
 
 def harmonic_means(blocks: FloatArray) -> ComplexArray:
-    """Return what is left of `blocks` when each harmonic of a force depends on the same harmonic of a gap by a complex number.
+    """Return the part of `blocks` by which each harmonic of a force depends on the same harmonic of a gap, as complex numbers.
 
-    A block acts on ``(C_h, S_h)`` as a real 2 × 2 matrix ``[a b; c d]``; the nearest one that multiplies ``C_h - i S_h`` by a number has
-    ``(a + d)/2 + i (b - c)/2``.
+    A block acts on ``(C_h, S_h)`` as a real 2 × 2 matrix ``[a b; c d]``; the nearest multiplication of ``C_h - i S_h`` by a complex number
+    is that by ``(a + d)/2 + i (b - c)/2``.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ def harmonic_means(blocks: FloatArray) -> ComplexArray:
 
 
 def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
-    """Return `blocks` without the part that `means` stand for; these come from `harmonic_means`, perhaps of other blocks."""
+    """Return `blocks` minus the blocks that `means` represent; `means` come from `harmonic_means`, perhaps of other blocks."""
     left = blocks.copy()
     for pair, (force, gap) in enumerate(_PAIRS[: blocks.shape[1]]):
         mean = means[:, :, force, gap].T

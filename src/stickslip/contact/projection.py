@@ -16,16 +16,16 @@ INSIDE = 1e-12  # in reference coordinates
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Feet of perpendiculars from p points to a surface.
+    """Feet of the perpendiculars from p points to a surface.
 
     Parameters
     ----------
     facet
-        (p,) facet that holds the foot; -1 where no facet is near.
+        (p,) facet of the foot; -1 if no facet is near.
     reference
-        (p, 2) its place in reference coordinates.
+        (p, 2) reference coordinates of the foot.
     overhang
-        (p,) distance in metres by which the point stands beyond the rim of the surface, measured along the surface; infinite without a facet.
+        (p,) distance in metres by which the point lies beyond the rim of the surface, measured along the surface; infinite without a facet.
     """
 
     facet: IntArray
@@ -59,7 +59,7 @@ def near_pairs(
 
 
 def facet_balls(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Return the (m, 3) middle of each facet and the (m,) radius about it that holds its nodes."""
+    """Return the (m, 3) centre of each facet and the (m,) radius of a ball about it that contains its nodes."""
     middle = positions(surface.points, surface.facets, centres(surface.facets))
     apart = np.linalg.norm(surface.points[surface.facets] - middle[:, None], axis=2)
     return middle, np.where(surface.facets >= 0, apart, 0.0).max(axis=1)
@@ -71,13 +71,13 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
     Parameters
     ----------
     points
-        (p, 3) places in metres.
+        (p, 3) positions in metres.
     outward
-        (p, 3) normals of the body that the points belong to; only facets that look the other way are considered.
+        (p, 3) outward normals of the body with the points; only facets with an opposite normal are considered.
     surface
         The other side.
     reach
-        Facets further away are not considered, m.
+        Largest distance of a facet, m.
     """
     middle, radius = facet_balls(surface)
     point, facet = near_pairs(points, np.zeros(len(points)), middle, radius, reach)
@@ -112,7 +112,7 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
 def closest(points: FloatArray, facets: IntArray, target: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the closest point of one facet to each target: reference coordinates (p, 2) and its edge (p,), -1 inside.
 
-    Gauss-Newton on the distance; where its result lies outside the facet, the best point of the edges.
+    Gauss-Newton on the distance; if the result lies outside the facet, the closest point of the edges.
     """
     reference = centres(facets)
     for _ in range(ROUNDS):
@@ -152,7 +152,7 @@ def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatAr
     origin
         (p, 3) a point of the line.
     axes
-        (p, 2, 3) two unit vectors across it.
+        (p, 2, 3) two unit vectors normal to the line.
 
     Returns
     -------

@@ -40,7 +40,7 @@ class RigidPeriod:
 
 
 def project(predicted: FloatArray, mu: FloatArray, constant: FloatArray, order: int) -> RigidPeriod:
-    """Correct predicted forces to what Coulomb's and Signorini's laws allow.
+    """Project predicted forces on the forces that Coulomb's and Signorini's laws allow.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def project(predicted: FloatArray, mu: FloatArray, constant: FloatArray, order: 
     mu
         (n_contacts,) friction coefficients.
     constant
-        (n_contacts,) constant normal loads, N; NaN where the contact is unilateral and its normal force the predicted one.
+        (n_contacts,) constant normal loads, N; NaN if the contact is unilateral, with the predicted normal force.
     order
         Highest harmonic of the derivatives.
     """
@@ -76,7 +76,7 @@ def project(predicted: FloatArray, mu: FloatArray, constant: FloatArray, order: 
 
 
 def weighted_products(weight: FloatArray, order: int) -> FloatArray:
-    """Return the (n, m, m) matrices that take the coefficients of a signal to those of `weight` (n, samples) times the signal."""
+    """Return the (n, m, m) matrices from the Fourier coefficients of a signal to the coefficients of `weight` (n, samples) times the signal."""
     samples = weight.shape[1]
     spectrum = np.fft.fft(weight, axis=1)[:, np.arange(2 * order + 1) % samples] / samples
     cos, sin = spectrum.real, -spectrum.imag

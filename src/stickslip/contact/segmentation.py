@@ -86,14 +86,14 @@ _PARTS = {
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Quadrature points of the pieces that two surfaces have in common.
+    """Quadrature points on the common pieces of two surfaces, in the plane of side A.
 
     Parameters
     ----------
     facet_a, facet_b
         (p,) facets of both sides.
     place
-        (p, 3) places in the plane of the cell of side A, m.
+        (p, 3) positions in the plane of the cell of side A, m.
     axes
         (p, 2, 3) two unit vectors of that plane.
     weight
@@ -131,16 +131,16 @@ def cells_of(surface: Surface) -> tuple[FloatArray, IntArray]:
 
 
 def segments(a: Surface, b: Surface, reach: float, degree: int) -> Segments:
-    """Cut both surfaces along each other's edges and put quadrature points on the pieces.
+    """Cut both surfaces along each other's edges and place quadrature points on the pieces.
 
     Parameters
     ----------
     a, b
-        The two sides; planes are those of `a`.
+        The two sides; facets of `b` are projected on the planes of `a`.
     reach
         Largest distance between the sides, m.
     degree
-        Polynomials up to this degree are integrated exactly on each piece.
+        Degree of polynomials that are integrated exactly on each piece.
     """
     cells_a, owner_a = cells_of(a)
     cells_b, owner_b = cells_of(b)
@@ -174,7 +174,7 @@ def clip(subject: FloatArray, window: FloatArray) -> tuple[FloatArray, IntArray]
 
     Returns
     -------
-    polygons : (p, 8, 2) corners of the common part; the first `count` of a row hold
+    polygons : (p, 8, 2) corners of the common part; the first `count` of a row are valid
     count : (p,) number of corners, 0 where the polygons do not overlap
     """
     polygon, count = subject, np.full(len(subject), subject.shape[1])
@@ -276,13 +276,13 @@ class SegmentPoints:
     facet_a, facet_b
         (p,) facets.
     on_a, on_b
-        (p, 2) reference coordinates there.
+        (p, 2) reference coordinates on both sides.
     place, partner, normal
-        (p, 3) places on both sides, m, and the unit normal of side A.
+        (p, 3) positions on both sides, m, and the unit normal of side A.
     weight
         (p,) area, m².
     unpaired
-        Facets of side A no part of which has a partner.
+        Facets of side A without any partner.
     """
 
     facet_a: IntArray
@@ -344,7 +344,7 @@ def _across(normal: FloatArray) -> FloatArray:
 
 
 def need_facets(place: str, *sides: Surface) -> None:
-    """Refuse sides that have none."""
+    """Refuse sides without facets."""
     for name, side in zip("AB"[-len(sides) :], sides, strict=True):
         if len(side.facets) == 0:
             raise input_error(place, f"side {name} has no facets", "Give facets, or pair by node_to_node.")

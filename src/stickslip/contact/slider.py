@@ -32,7 +32,7 @@ _EXTREMUM, _OPENING, _CLOSING = 0, 1, 2  # kinds of nodes
 
 
 class Scratch(NamedTuple):
-    """Arrays that the evaluation of a contact writes on, m = 2H+1 long unless said otherwise."""
+    """Work arrays of the evaluation of a contact, of length m = 2H+1 unless stated otherwise."""
 
     normal: FloatArray  # pressure as long as it is positive
     limit: FloatArray  # of friction
@@ -59,7 +59,7 @@ class Scratch(NamedTuple):
 
 @njit(cache=True)
 def scratch(m, width, samples):  # type: ignore[no-untyped-def]
-    """Allocate for polynomials of `m` coefficients, a search grid of `width` columns and `samples`; every array is bounded by the order."""
+    """Allocate a `Scratch` for polynomials of `m` coefficients, a search grid of `width` columns and `samples`."""
     most = most_sign_changes((m - 1) // 2)
     most_nodes = 3 * most + 2
     return Scratch(
@@ -87,7 +87,7 @@ def scratch(m, width, samples):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def zeros(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
-    """Return the number of sign changes, put into `roots`, and whether the polynomial begins negative."""
+    """Write the sign changes into `roots`; return their number and whether the polynomial begins negative."""
     derivative(polynomial, work.slope)
     count = sign_changes(polynomial, work.slope, grid, work.values, work.slopes, work.cells, roots)
     return count, work.values[0] < 0.0
@@ -95,7 +95,7 @@ def zeros(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
-    """Return the number of extrema, put into `roots`."""
+    """Write the extrema into `roots`; return their number."""
     derivative(polynomial, work.slope)
     derivative(work.slope, work.curvature)
     return sign_changes(work.slope, work.curvature, grid, work.values, work.slopes, work.cells, roots)
@@ -283,11 +283,11 @@ def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work)
     d
         Tangent, 0 or 1.
     row
-        (7,) of the element, see `contact.element`; its stiffness is not zero.
+        (7,) row of the element, see `contact.element`; its stiffness is not zero.
     limit_slope
         Derivative of the limit by the normal gap while it is closed, N/m.
     n_roots, starts_open
-        Of the pressure, in ``work.roots[0]``.
+        Number of zeros of the pressure, in ``work.roots[0]``, and whether the contact starts open.
     n_x
         In and out: number of extrema of both tangential gaps, in ``work.roots[3:]``; -1: not yet known.
     grid, work

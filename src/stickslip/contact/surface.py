@@ -30,13 +30,13 @@ class Surface:
     Parameters
     ----------
     points
-        (n, 3) places of the nodes in metres.
+        (n, 3) positions of the nodes in metres.
     displacement
         (3 n, n_dofs) sparse operator from the structure's coordinates to the displacements x, y, z of the nodes, node by node.
     facets
         (m, k) nodes (positions in `points`) of triangles and quadrilaterals, linear or quadratic: k = 3, 4, 6 or 8, corners
         anticlockwise seen from outside the body, then mid nodes. Shorter rows are filled up with -1, so that kinds can be mixed. May be
-        empty for contacts node to node that know their normals.
+        empty for node-to-node contacts with given `normals`.
     normals
         (n, 3) outward unit normals at the nodes; None: means of the facets around each node, by angle.
     numbers
@@ -76,7 +76,7 @@ class Surface:
 
     @property
     def used(self) -> IntArray:
-        """Nodes that belong to a facet, in rising order; all of them where there are no facets."""
+        """Nodes that belong to a facet, in ascending order; all nodes if there are no facets."""
         if len(self.facets) == 0:
             return np.arange(len(self.points))
         nodes = np.unique(self.facets)
@@ -85,8 +85,8 @@ class Surface:
     def corner_normals(self) -> FloatArray:
         """Return the (m, k, 3) outward unit normals of the facets at their nodes.
 
-        They are common to all facets around a node, so that interpolated normals are continuous, except at edges: a facet whose
-        own normal is more than 30 degrees off the mean keeps its own.
+        Facets around a node share the mean normal, so that interpolated normals are continuous. At an edge, a facet whose
+        own normal deviates from the mean by more than 30 degrees keeps its own.
         """
         if self.normals is not None:
             return np.asarray(self.normals[self.facets])
@@ -119,7 +119,7 @@ class Surface:
         return _unit(mean)
 
     def tributary_areas(self) -> FloatArray:
-        """Return the (n,) area in m² that belongs to each node; ones where there are no facets."""
+        """Return the (n,) tributary area of each node in m²; ones if there are no facets."""
         if len(self.facets) == 0:
             return np.ones(len(self.points))
         areas = np.zeros(len(self.points))
@@ -135,7 +135,7 @@ class Surface:
         facet
             (p,) facet of each point.
         reference
-            (p, 2) its reference coordinates.
+            (p, 2) reference coordinates of each point.
         """
         facets = self.facets[facet]
         return self.weighted(np.maximum(facets, 0), interpolation(facets, reference))
@@ -155,9 +155,9 @@ def nodal_surface(points: FloatArray, dofs: IntArray, n: int, facets: IntArray) 
     Parameters
     ----------
     points
-        (n_points, 3) places in metres.
+        (n_points, 3) positions in metres.
     dofs
-        (n_points, 3) dof indices of x, y, z of each node; -1 where it is held.
+        (n_points, 3) dof indices of x, y, z of each node; -1 for supported components.
     n
         Number of dofs of the whole structure.
     facets
@@ -176,7 +176,7 @@ def structure_surface(structure: Structure, facets: IntArray) -> Surface:
     Parameters
     ----------
     structure
-        Holds x, y, z of every node of the surface as coordinates.
+        Structure whose coordinates include x, y, z of every node of the surface.
     facets
         (m, k) node numbers as in the structure's table of dofs, otherwise as in `Surface`.
 
@@ -211,7 +211,7 @@ def rigid_surface(body: RigidBody, points: FloatArray, dofs: IntArray, n: int, f
     Parameters
     ----------
     body
-        Moves the points.
+        Rigid body that moves the points.
     points, facets
         As in `Surface`.
     dofs

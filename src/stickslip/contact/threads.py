@@ -7,7 +7,7 @@ _SHARES_PER_THREAD = 4  # contacts that slip and open take longer than those tha
 
 
 def thread_shares(n_contacts: int) -> int:
-    """Return into how many shares the contacts are split: one for few contacts or one thread (``NUMBA_NUM_THREADS=1``)."""
+    """Return the number of shares into which the contacts are split: one for few contacts or one thread (``NUMBA_NUM_THREADS=1``)."""
     if n_contacts < CONTACTS_WORTH_THREADS:
         return 1
     threads = numba.get_num_threads()

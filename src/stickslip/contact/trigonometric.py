@@ -84,7 +84,7 @@ def bounds(polynomial):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def root_between(polynomial, level, left, f_left, right, f_right, guess, size, second):  # type: ignore[no-untyped-def]
-    """Return where ``polynomial - level`` vanishes between `left` and `right`, where it has opposite signs.
+    """Return the zero of ``polynomial - level`` between `left` and `right`, where it has opposite signs.
 
     Newton's method from `guess`, kept in the bracket by bisection, ends when the next step or the value is round-off; `size` and
     `second` bound the polynomial and its second derivative.
@@ -130,18 +130,18 @@ def _guess(left, f_left, d_left, right, f_right, d_right):  # type: ignore[no-un
 
 @njit(cache=True)
 def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type: ignore[no-untyped-def]
-    """Find where a polynomial changes its sign in [0, 2π], in ascending order; zero counts as positive.
+    """Find the sign changes of a polynomial in [0, 2π], in ascending order; zero counts as positive.
 
     Parameters
     ----------
     polynomial, slope
-        (m,) coefficients, and those of the derivative.
+        (m,) coefficients of the polynomial and of its derivative.
     grid
         From `search_grid`.
     values, slopes
         (cells + 1,) out: both on the grid.
     cells
-        (40, 3) scratch: parts of a cell that wait to be searched.
+        (40, 3) work array: parts of a cell still to be searched.
     roots
         Out: sign changes; they alternate, the first one ends the sign of ``values[0]``.
 

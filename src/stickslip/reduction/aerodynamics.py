@@ -36,21 +36,21 @@ class InfluenceCoefficients:
     Parameters
     ----------
     distances
-        (d,) whole numbers j: sector n feels the motion of sector n + j. None twice; those that are left out are zero.
+        (d,) different whole numbers j: the motion of sector n + j acts on sector n. Coefficients of other distances are zero.
     values
-        (s, f, d, m, m) at each speed and frequency the L_j between m patterns: the row feels, the column moves.
+        (s, f, d, m, m) L_j at each speed and frequency between m patterns: rows are forces, columns motions.
     frequencies
         (f,) ascending, rad/s; empty where f is 1 and the coefficients hold at any frequency. Between them real and imaginary part
         are interpolated by monotone cubics (PCHIP), whose slope is continuous.
     speeds
         (s,) ascending, rad/s; empty where s is 1 and the coefficients hold at any speed. Between them: linear.
     beyond
-        What happens at frequencies outside: ``refuse``, or take the ``nearest``. Speeds outside are always refused.
+        Frequencies outside of the table: ``refuse``, or take the ``nearest``. Speeds outside are always refused.
 
     Raises
     ------
     InputError
-        If shapes do not agree, numbers are not finite, or something does not ascend.
+        If shapes do not agree, numbers are not finite, or frequencies or speeds do not ascend.
     """
 
     distances: IntArray
@@ -90,7 +90,7 @@ class InfluenceCoefficients:
                 raise input_error(f"InfluenceCoefficients.{name}", "do not ascend from zero on", "Sort them.")
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its numbers."""
+        """Describe the coefficients in a line, without their numbers."""
         return (
             f"<InfluenceCoefficients: neighbours {self.distances.tolist()}; {self.patterns} patterns; "
             f"{max(self.frequencies.size, 1)} frequencies; {max(self.speeds.size, 1)} speeds>"
@@ -103,7 +103,7 @@ class InfluenceCoefficients:
 
     @property
     def depends_on_frequency(self) -> bool:
-        """Whether the coefficients are those of several frequencies."""
+        """Whether coefficients of several frequencies are given."""
         return self.frequencies.size > 1
 
     @property
@@ -112,7 +112,7 @@ class InfluenceCoefficients:
         return self.depends_on_frequency and self.beyond == "refuse"
 
     def at_speed(self, speed: float) -> "InfluenceCoefficients":
-        """Return the coefficients at a speed in rad/s; an `InputError` tells the range where it is outside."""
+        """Return the coefficients at a speed in rad/s; an `InputError` names the range if the speed is outside of it."""
         if not self.speeds.size:
             return self
         low, high = self.speeds[[0, -1]]
@@ -129,7 +129,7 @@ class InfluenceCoefficients:
         return replace(self, values=values, speeds=_none())
 
     def at(self, omega: float) -> ComplexArray:
-        """Return the (d, m, m) coefficients at ω in rad/s, of coefficients that hold at any speed.
+        """Return the (d, m, m) coefficients at ω in rad/s; the table must have a single speed.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class InfluenceCoefficients:
         return _summed(self.slope(omega), self._phases(phase_angle))
 
     def frozen(self, phase_angle: float, reference: float) -> tuple[ComplexArray, ComplexArray]:
-        """Return the (m, m) stiffness and damping, to be subtracted, that give the force of ω_r at that frequency.
+        """Return the (m, m) stiffness and damping to subtract from the wave's: with them the force is exact at ω_r.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class InfluenceCoefficients:
         return _summed(L.real, phases), _summed(L.imag / reference, phases)
 
     def force(self, phase_angle: float, omega: complex, reference: float) -> ComplexArray:
-        """Return the (m, m) G of a wave at ω in rad/s: of the table, or, of coefficients of one frequency, of their frozen form.
+        """Return the (m, m) G of a wave at ω in rad/s, from the table; if that has one frequency, from the frozen form.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class InfluenceCoefficients:
         Raises
         ------
         InputError
-            With the range of the table and that of the need, unless those outside are to have the nearest.
+            With both ranges, unless `beyond` is ``nearest``.
         """
         if not self.refuses:
             return
@@ -236,16 +236,16 @@ class InfluenceCoefficients:
 def from_phase_angles(
     angles: Sequence[float] | FloatArray, values: ComplexArray, *, sectors: int | None = None
 ) -> tuple[IntArray, ComplexArray]:
-    """Return distances and influence coefficients from those of waves, by the discrete Fourier transform.
+    """Return distances and influence coefficients from the coefficients G of waves, by the discrete Fourier transform.
 
     Parameters
     ----------
     angles
-        (N,) inter-blade phase angles in rad, N of them spread evenly over the whole circle from zero on, in any order.
+        (N,) inter-blade phase angles in rad, evenly spaced over the whole circle from zero on, in any order.
     values
-        (N, ...) G of each.
+        (N, ...) G of each angle.
     sectors
-        Number of sectors; None: not looked at. N may be smaller: blades farther apart than N/2 then feel nothing of each other.
+        Number of sectors; None: not checked. N may be smaller: blades farther apart than N/2 are then uncoupled.
 
     Returns
     -------
@@ -257,7 +257,7 @@ def from_phase_angles(
     Raises
     ------
     InputError
-        If two angles are the same, they are not spread evenly, or there are more than sectors.
+        If two angles are the same, angles are not evenly spaced, or there are more of them than sectors.
     """
     turned = np.mod(np.asarray(angles, dtype=float) + SAME_ANGLE, 2 * np.pi) - SAME_ANGLE
     order = np.argsort(turned)
@@ -286,7 +286,7 @@ def from_phase_angles(
 
 
 def one_twice(numbers: Sequence[int] | IntArray, sectors: int) -> tuple[int, int] | None:
-    """Return the first two of some neighbours, or wave numbers, that are the same one on a wheel; None where all differ."""
+    """Return the first two neighbours, or wave numbers, that coincide modulo the sectors; None where all differ."""
     found: dict[int, int] = {}
     for own in (int(number) for number in numbers):
         if own % sectors in found:
@@ -296,14 +296,14 @@ def one_twice(numbers: Sequence[int] | IntArray, sectors: int) -> tuple[int, int
 
 
 def to_phase_angles(distances: IntArray, values: ComplexArray, angles: Sequence[float] | FloatArray) -> ComplexArray:
-    """Return G (a, ...) at inter-blade phase angles in rad (a,) from coefficients (d, ...) by neighbour."""
+    """Return G (a, ...) at inter-blade phase angles (a,) in rad from coefficients (d, ...) by neighbour."""
     phases = np.exp(1j * np.outer(np.asarray(angles), distances))
     return np.asarray(np.tensordot(phases, values, axes=1))
 
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """The aerodynamic force on one wave, in coordinates of it: ``f = P G(ω) Pᴴ q``.
+    """The aerodynamic force on one wave, in its coordinates: ``f = P G(ω) Pᴴ q``.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ class Feedback:
     influence
         Coefficients of one speed.
     reference
-        ω_r in rad/s: where matrices stand for the force, they are those of this frequency.
+        ω_r in rad/s, frequency of the frozen form: matrices that replace the force.
     """
 
     patterns: Matrix
@@ -334,19 +334,19 @@ class Feedback:
 
     @property
     def conjugate(self) -> "Feedback":
-        """That on the wave that travels the other way, whose patterns are the conjugates."""
+        """The force on the wave that travels the other way, whose patterns are the conjugates."""
         return replace(self, patterns=np.conj(self.patterns), phase_angle=-self.phase_angle)
 
     def in_coordinates(self, way: Matrix) -> "Feedback":
-        """Return it in other coordinates, given the matrix (n, n_new) from them to its own."""
+        """Return the force in other coordinates, given the matrix (n, n_new) from these to the present ones."""
         return replace(self, patterns=np.asarray(way.conj().T @ self.patterns))
 
     def stiffness(self) -> Matrix:
-        """Return the (n, n) stiffness that the frozen form subtracts, N/m; its real forces do work over no period."""
+        """Return the (n, n) stiffness that the frozen form subtracts, N/m; its forces do no work over a period."""
         return self._outer(self.influence.frozen(self.phase_angle, self.reference)[0])
 
     def frozen(self, structure: Structure) -> Structure:
-        """Return a wave with the force as matrices: exact at ω_r, and real for the wheel as a whole.
+        """Return the wave with the frozen form of the force in its matrices: exact at ω_r, and real for the wheel as a whole.
 
         ``K − P Σ_j Re(L_j) e^{ijθ} Pᴴ`` and ``C − P Σ_j Im(L_j)/ω_r e^{ijθ} Pᴴ``: not Hermitian in general; the wave that travels
         the other way has the conjugates.
@@ -362,11 +362,11 @@ class Feedback:
         return replace(structure, stiffness=K - self._outer(stiff), damping=C - self._outer(damp))
 
     def force(self, omega: complex) -> ComplexArray:
-        """Return the (m, m) G at ω in rad/s; of coefficients of one frequency their frozen form, also where a motion grows or decays."""
+        """Return the (m, m) G at ω in rad/s. Coefficients of one frequency give their frozen form, also for complex ω, where a motion grows or decays."""
         return self.influence.force(self.phase_angle, omega, self.reference)
 
     def beyond_frozen(self, omega: complex) -> tuple[ComplexArray, ComplexArray]:
-        """Return what G at ω has beyond the frozen form, (m, m), and the derivative by ω; a table knows the real part alone."""
+        """Return the (m, m) difference of G at ω from the frozen form, and its derivative by ω; a table takes the real part of ω."""
         stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
         slope = self.influence.slope_of_wave(self.phase_angle, omega.real)
         return self.force(omega) - stiff - 1j * omega * damp, slope - 1j * damp

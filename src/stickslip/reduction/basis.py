@@ -41,7 +41,7 @@ def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
 
 
 def in_coordinates(structure: Structure, basis: Matrix, dofs: Dofs, sets: Mapping[str, IntArray]) -> Structure:
-    """Return a structure in other coordinates: all its matrices projected, the way back chained.
+    """Return a structure in other coordinates: matrices are projected, and `basis` is the product of both bases.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def in_coordinates(structure: Structure, basis: Matrix, dofs: Dofs, sets: Mappin
     basis
         (n, m) with ``u = basis @ new``.
     dofs, sets
-        Of the m new coordinates.
+        Table and sets of the m new coordinates.
     """
     return Structure(
         in_basis(structure.mass, basis),
@@ -69,7 +69,7 @@ def is_hermitian(matrix: Matrix) -> bool:
 
 
 def even_part(matrix: Matrix) -> Matrix | None:
-    """Return ``(A + Aᴴ) / 2`` of a matrix that equals its conjugate transpose to rounding; None of another."""
+    """Return ``(A + Aᴴ) / 2`` if a matrix equals its conjugate transpose to rounding; None otherwise."""
     if not min(matrix.shape):
         return matrix
     difference = matrix - matrix.conj().T
@@ -98,7 +98,7 @@ def dof_indices(place: str, structure: Structure, keep: IntArray) -> IntArray:
     Raises
     ------
     InputError
-        If they are no whole numbers, or one is not in the structure.
+        If `keep` holds anything but whole numbers, or a dof that is not in the structure.
     """
     given = np.asarray(keep)
     if given.size and given.dtype.kind not in "iu":
@@ -134,7 +134,7 @@ def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
     Raises
     ------
     InputError
-        If they are no whole numbers, or one is not in the structure or stands there twice.
+        If `keep` holds anything but whole numbers, a dof that is not in the structure, or one twice.
     """
     keep = dof_indices(place, structure, keep)
     values, counts = np.unique(keep, return_counts=True)
@@ -149,7 +149,7 @@ def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
 
 
 def with_modal_dofs(kept: Dofs, n_modes: int) -> Dofs:
-    """Return the kept rows followed by modal rows, with the parts the kept rows had."""
+    """Return the kept rows followed by `n_modes` modal rows of the same parts."""
     table = join_dofs({"kept": kept, "modal": modal_dofs(n_modes)})
     return Dofs(table.node, table.component, table.position, kept.part + ("",) * n_modes)
 
@@ -160,7 +160,7 @@ def ones_at(rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix
 
 
 def surviving_sets(structure: Structure, keep: IntArray, offset: int = 0) -> dict[str, IntArray]:
-    """Return the sets whose dofs are all kept, by their places among `keep`, shifted by `offset`."""
+    """Return the sets whose dofs are all kept, as positions in `keep`, plus `offset`."""
     place = np.full(structure.n, -1)
     place[keep] = offset + np.arange(len(keep))
     moved = {name: place[index] for name, index in structure.sets.items()}

@@ -24,7 +24,7 @@ FIRST_GUESS = 16  # modes tried first where a frequency limits them
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Dofs that matrices join.
+    """One body: dofs that the matrices couple.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Body:
     solve
         Solves with ``stiffness − shift · mass``.
     shift
-        In rad²/s²; zero where the body is held, slightly negative where it is free to move.
+        In rad²/s²; zero if the body is supported, slightly negative if it is free to move.
     """
 
     dofs: IntArray
@@ -46,7 +46,7 @@ class Body:
 
     @property
     def heavy(self) -> int:
-        """Number of its modes: dofs with mass."""
+        """Number of modes of the body: dofs with mass."""
         return int(np.count_nonzero(self.mass.diagonal()))
 
 
@@ -57,13 +57,13 @@ class BodyModes:
     Parameters
     ----------
     squares
-        (m,) in rad²/s²; rigid motions of a free body have exactly zero.
+        (m,) squares of circular frequencies in rad²/s²; exactly zero for rigid motions of a free body.
     body
-        (m,) which body moves.
+        (m,) number of the body that moves.
     column
-        (m,) column of its shapes.
+        (m,) column in the shapes of this body.
     shapes
-        One mass-normalised array a body.
+        Mass-normalised modes, an array for each body.
     """
 
     squares: FloatArray
@@ -72,22 +72,22 @@ class BodyModes:
     shapes: Sequence[Matrix]
 
     def first(self, count: int) -> "BodyModes":
-        """Return the lowest `count` of them."""
+        """Return the lowest `count` modes."""
         return BodyModes(self.squares[:count], self.body[:count], self.column[:count], self.shapes)
 
     def of(self, body: int) -> tuple[IntArray, Matrix]:
-        """Return which of the modes a body has, and its shapes."""
+        """Return the numbers of the modes in which a body moves, and its shapes."""
         mine = np.flatnonzero(self.body == body)
         return mine, self.shapes[body][:, self.column[mine]]
 
 
 def bodies_fixed_at(structure: Structure, keep: IntArray, place: str, say: Say) -> list[Body]:
-    """Return the bodies that are left when the dofs `keep` are fixed.
+    """Return the bodies that remain when the dofs `keep` are fixed.
 
     Raises
     ------
     SingularError
-        If one is not held; the message names it and begins with `place`.
+        If a body can move rigidly; the message names it and begins with `place`.
     """
     inner = np.setdiff1d(np.arange(structure.n), keep)
     if not inner.size:
@@ -101,7 +101,7 @@ def bodies_fixed_at(structure: Structure, keep: IntArray, place: str, say: Say) 
 
 
 def loose_bodies(structure: Structure, inner: IntArray, say: Say) -> list[Body]:
-    """Return the bodies among the dofs `inner` with all others fixed; those that can move rigidly get a shift."""
+    """Return the bodies among the dofs `inner` with all other dofs fixed; bodies that can move rigidly get a shift."""
     bodies = []
     for part in _parts(structure, inner):
         K, M = _own(structure, part)
@@ -126,13 +126,13 @@ def _own(structure: Structure, part: IntArray) -> tuple[Matrix, Matrix]:
 
 
 def lowest_of(bodies: Sequence[Body], count: int, say: Say) -> BodyModes:
-    """Return the `count` lowest modes of all bodies, or all they have."""
+    """Return the `count` lowest modes of all bodies, or all there are."""
     found = [_modes(body, min(count, body.heavy), say) for body in bodies]
     return _sorted(found).first(count)
 
 
 def modes_up_to(bodies: Sequence[Body], limit: float, say: Say, most: float = np.inf) -> BodyModes:
-    """Return all modes below `limit` (rad/s); where a body has more than `most`, as many or a few more."""
+    """Return all modes below `limit` (rad/s); of a body with more than `most` modes, that many or a few more."""
     found = []
     for body in bodies:
         count = min(FIRST_GUESS, body.heavy)
@@ -165,7 +165,7 @@ def _sorted(found: Sequence[tuple[FloatArray, Matrix]]) -> BodyModes:
 def fill_constraint_modes(
     structure: Structure, keep: IntArray, bodies: Sequence[Body], columns: Matrix, say: Say
 ) -> None:
-    """Write the static shapes of unit displacements of `keep` into `columns` (n, k), zeros before."""
+    """Write the static shapes of unit displacements of `keep` into `columns` (n, k), which holds zeros."""
     columns[keep, np.arange(keep.size)] = 1.0
     say(f"{keep.size} constraint modes")
     for body in bodies:

@@ -24,20 +24,20 @@ LAYOUT = 1  # raised when the same input no longer gives the same hash
 def cached(
     reduction: Callable[..., Structure], structure: Structure, *arguments: object, folder: Path | str, say: Say = silent
 ) -> Structure:
-    """Return ``reduction(structure, *arguments)``, from disk where it was computed before.
+    """Return ``reduction(structure, *arguments)``, or read it from disk if it was computed before.
 
     Parameters
     ----------
     reduction
         A function of a module, such as `craig_bampton`, `rubin` or `reduce_interface`.
     structure
-        What is reduced. Every number of its matrices, dofs, sets and basis counts.
+        Structure to reduce. All numbers of its matrices, dofs, sets and basis enter the key.
     *arguments
         Further arguments: numbers, texts, None, arrays, and dataclasses of these such as `ModesBelow`.
     folder
-        Where the files lie; it is made if need be, and may be deleted at any time.
+        Folder of the files; it is made if need be, and may be deleted at any time.
     say
-        Called with a sentence where a file is used, written, or of no use.
+        Called with a sentence when a file is used, written, or unusable.
 
     Returns
     -------
@@ -47,12 +47,12 @@ def cached(
     Raises
     ------
     InputError
-        If the function has no name of its own, or an argument is of another kind.
+        If the function has no name of its own, or an argument is of a kind that is not listed above.
 
     Notes
     -----
-    A file is named by the SHA-256 of the function's name, the version of this package and all content, and holds plain
-    arrays, nothing that could be executed. It is put in place once it is whole; a damaged one is computed again.
+    The name of a file is the SHA-256 of the function's name, the version of this package and all content. It holds plain
+    arrays, nothing that could be executed. It is put in place when complete; a damaged file is computed again.
     """
     path = Path(folder) / f"{_key(reduction, structure, arguments)}.npz"
     if path.exists():

@@ -35,7 +35,7 @@ class Reduction:
     Raises
     ------
     InputError
-        If the method is unknown or cannot tell its error.
+        If the method is unknown, or gives no error estimate but `n_modes` asks for one.
     """
 
     n_modes: ModeChoice = 25
@@ -67,6 +67,6 @@ class Reduction:
 
     @property
     def in_words(self) -> str:
-        """What is kept, for a line about the part."""
+        """Method and number of modes, for a line about the part."""
         modes = f"{self.n_modes} modes" if isinstance(self.n_modes, int) else repr(self.n_modes)
         return f"{self.method}, {modes}"

@@ -24,19 +24,19 @@ from stickslip.reduction.cyclic import CyclicSector
 
 @dataclass(frozen=True, eq=False)
 class NodalCoordinates:
-    """How contacts know the coordinates of the waves; `nodal_coordinates` makes it.
+    """Nodal coordinates of travelling waves, in which gaps are real combinations; `nodal_coordinates` makes them.
 
-    The new coordinates are the old ones in the phase in which contacts know them first, then the copies in other phases, then the
-    forces that hold the copies.
+    The new coordinates are, in order: the old ones, in the first phase in which contacts act on them; copies in other phases; the
+    constraint forces of the copies.
 
     Parameters
     ----------
     ahead
-        (m,) number of sectors by which the phase of each old coordinate is ahead.
+        (m,) sectors by which the phase of each old coordinate is ahead.
     copied
         (c,) old coordinate of each copy.
     farther
-        (c,) number of sectors by which a copy is ahead of it.
+        (c,) sectors by which a copy is ahead of its coordinate.
     operator
         (3 n_contacts, m + 2 c) from the new coordinates to the gaps.
     """
@@ -58,7 +58,7 @@ class NodalCoordinates:
         Parameters
         ----------
         structure
-            In the old ones.
+            The wave in the old coordinates.
         phase
             ``exp(i θ)`` of the wave.
         """
@@ -104,14 +104,14 @@ class NodalCoordinates:
 def nodal_coordinates(
     sector: CyclicSector, place: IntArray, n: int, gaps: tuple[Matrix, Matrix | None]
 ) -> NodalCoordinates:
-    """Find in which phases contacts know the coordinates of the waves.
+    """Find the phases in which contacts act on the coordinates of the waves.
 
     Parameters
     ----------
     sector
         One sector.
     place
-        (m,) positions, among its independent dofs, of the first coordinates of the waves: contacts act on these alone.
+        (m,) positions, among its independent dofs, of the first coordinates of the waves, the only ones on which contacts act.
     n
         Number of coordinates of a wave.
     gaps
@@ -155,16 +155,16 @@ def nodal_coordinates(
 
 
 def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
-    """Return the (n, m) matrix from the coordinates of a wave that move by themselves to all of its coordinates.
+    """Return the (n, m) matrix from the independent coordinates of a wave to all of its coordinates.
 
-    The copies of coordinates follow as the constraints of the wave say; the forces of the constraints are zero in it.
+    Copies follow by the constraints of the wave; the rows of constraint forces are zero.
 
     Parameters
     ----------
     structure
-        In coordinates of `NodalCoordinates`, or any where nothing is tied.
+        The wave in `NodalCoordinates`, or in any coordinates without constraints.
     multipliers
-        (c,) coordinates that are forces of constraints, the last ones; the c before them are the copies.
+        (c,) coordinates that are constraint forces, the last ones; the c coordinates before them are the copies.
     """
     n, ties = structure.n, multipliers.size
     if not np.array_equal(multipliers, np.arange(n - ties, n)):
@@ -183,27 +183,27 @@ DIRECTIONS = ("t", "w", "n")
 def in_relative_coordinates(
     structure: Structure, gap_operator: Matrix, names: Sequence[str] = ()
 ) -> tuple[Structure, Matrix]:
-    """Write a structure in the gaps of its contacts and the coordinates that leave the gaps alone.
+    """Transform a structure to the gaps of its contacts and to coordinates that do not change the gaps.
 
     ``u = L [g, rest]`` with ``L = [B⁺ N]``, the pseudo-inverse and the null space of the gap operator, block by block over the groups of
     contacts that share dofs (eq. 51 and 52; dofs that no contact touches stay as they are). A contact force then acts on its gap
-    alone (eq. 54), so that only the gaps need to be retained: half the unknowns between two flexible bodies.
+    alone (eq. 54), so that only the gaps are retained: half as many unknowns between two flexible bodies.
 
     Parameters
     ----------
     structure
-        Structure that the contacts join; also a travelling wave.
+        Structure with the contacts; also a travelling wave.
     gap_operator
         (3 n_contacts, n) rows t, w, n of each contact; rows of zeros are directions without a gap and get no coordinate. Complex
         for contacts between neighbouring sectors of a travelling wave, ``g = B u`` with the neighbour's phase in B.
     names
-        Names of the contacts, for labels and messages; numbers where none are given.
+        Names of the contacts, for labels and messages; numbers by default.
 
     Returns
     -------
     structure
         The same structure in the coordinates gaps [m], rest [m], untouched dofs. Sets of untouched dofs survive; ``gaps`` holds the gaps
-        in the order of the rows, ``rest`` the coordinates that move no gap. `basis` leads back.
+        in the order of the rows, ``rest`` the coordinates that do not change a gap. `basis` leads back.
     gap_operator
         (3 n_contacts, n) in the new coordinates: a single one in each row that had an entry.
 

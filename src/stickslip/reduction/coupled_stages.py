@@ -38,9 +38,9 @@ class Flange:
     stages
         Names of the two.
     dofs
-        Of both, on the sectors: the nodes of a sector's piece of the flange.
+        Dofs of both sides: the nodes on each sector's piece of the flange.
     harmonics
-        Spatial harmonics of the circumference that are tied, from 0 on; those of both senses are.
+        Spatial harmonics of the circumference that are tied, from 0 on, in both senses of rotation.
     """
 
     stages: tuple[str, str]
@@ -55,11 +55,11 @@ class Multistage:
     Parameters
     ----------
     stages
-        A sector of each, at its own number of sectors.
+        One sector of each stage; numbers of sectors may differ.
     flanges
-        What ties them.
+        Flanges that tie the stages.
     places
-        Of each flange the circles on which the nodes of both sides lie.
+        For each flange the circles on which the nodes of both sides lie.
     """
 
     stages: Mapping[str, CyclicSector]
@@ -95,7 +95,7 @@ class Multistage:
 
     @cached_property
     def nodal_diameters(self) -> tuple[int, ...]:
-        """Kept harmonics, of those that vibrate together the lowest."""
+        """Nodal diameters of the assembly: the lowest kept harmonic of each group that vibrates together."""
         seen: set[Wave] = set()
         lowest = []
         for m in self.harmonics:
@@ -107,7 +107,7 @@ class Multistage:
 
     @property
     def unreached(self) -> tuple[Wave, ...]:
-        """Waves, up to half the sectors of their stage, that no nodal diameter of the assembly has: no kept harmonic leads to them."""
+        """Waves, up to half the sectors of their stage, that occur in no nodal diameter of the assembly, as no kept harmonic belongs to them."""
         found = {own for m in self.nodal_diameters for own in self.waves(m)}
         found |= {self._wave(name, -k) for name, k in found}
         each = [(name, k) for name, s in self.stages.items() for k in range(s.sectors // 2 + 1)]
@@ -133,18 +133,18 @@ class MultistageModes:
     Parameters
     ----------
     assembly
-        What vibrates.
+        The assembly.
     nodal_diameter
-        Of the assembly.
+        Nodal diameter of the assembly.
     squares
-        (n,) of circular frequencies, rad²/s².
+        (n,) squares of circular frequencies, rad²/s².
     stiffest
-        (n,) the same with all other harmonics of these waves held at the flanges: what the harmonics left out can do at most;
-        infinite where so many modes are not left.
+        (n,) the same with all other harmonics of these waves fixed at the flanges: an upper bound for the effect of neglected harmonics;
+        infinite where fewer modes remain.
     shapes
         Wave -> (N, n) displacements of sector 0 of the stage in this wave; the whole assembly has unit mass.
     shares
-        (stages, n) of each stage in the kinetic energy.
+        (stages, n) share of each stage in the kinetic energy.
     """
 
     assembly: Multistage
@@ -156,7 +156,7 @@ class MultistageModes:
 
     @property
     def frequencies_hz(self) -> FloatArray:
-        """(n,) in Hz."""
+        """(n,) natural frequencies in Hz."""
         return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / HZ)
 
     @property
@@ -180,15 +180,15 @@ def multistage(stages: Mapping[str, CyclicSector], flanges: Sequence[Flange]) ->
     Parameters
     ----------
     stages
-        A sector of each wheel by name; all have one axis.
+        One sector of each wheel by name; all have the same axis.
     flanges
-        What is tied. The nodes of both sides lie on the same circles about the axis; how many there are on a circle, and at which
-        angles, may differ.
+        Flanges. The nodes of both sides lie on the same circles about the axis; their number on a circle and their angles may
+        differ.
 
     Raises
     ------
     InputError
-        If sides have other circles, a stage has no such name, or a harmonic is one too many for the nodes of a circle.
+        If both sides lie on different circles, a flange names an unknown stage, or a circle has too few nodes for a harmonic.
     """
     places = []
     for flange in flanges:
@@ -210,7 +210,7 @@ def multistage_modes(assembly: Multistage, nodal_diameter: int, n: int, *, say: 
     Parameters
     ----------
     assembly
-        From `multistage`.
+        The assembly, from `multistage`.
     nodal_diameter
         One of the kept harmonics.
     n
@@ -221,7 +221,7 @@ def multistage_modes(assembly: Multistage, nodal_diameter: int, n: int, *, say: 
     Raises
     ------
     InputError
-        If there are fewer modes.
+        If the assembly has fewer modes.
     """
     waves = assembly.waves(nodal_diameter)
     moving = [travelling_wave(assembly.stages[name], k) for name, k in waves]

@@ -26,23 +26,23 @@ ROUNDING = 1e-9  # entries of null vectors below are rounding
 
 @dataclass(frozen=True, eq=False)
 class CyclicSector:
-    """A sector of a wheel and how it meets its neighbours: ``u_high = e^{iθ} R u_low``.
+    """A sector of a wheel and its coupling to the neighbours: ``u_high = e^{iθ} R u_low``.
 
     `cyclic_sector` makes one from geometry. A lumped sector is made directly, with ``axis=None``: its coordinates are
-    scalars that mean the same in every sector. It holds a copy of the neighbour's coordinates in `high`, without
-    their mass, for the springs that lead there: for a ring of masses, ``Structure`` of two coordinates, mass
+    scalars that mean the same in every sector. The coordinates `high` are a massless copy of the neighbour's
+    coordinates, for the springs that lead there: for a ring of masses, ``Structure`` of two coordinates, mass
     ``diag(m, 0)``, a spring between them, ``low=[0]``, ``high=[1]``. A coordinate in both `low` and `high` is shared
     by all sectors (a hub); give it the mass and stiffness of one sector's share.
 
     Parameters
     ----------
     structure
-        The sector, its faces free.
+        The sector with free faces.
     sectors
         Number of sectors n_s; sector n lies at angle ``n * pitch`` about the axis.
     low, high
-        (m,) dofs that meet the sector before and the one behind; those at the same place in both are partners, and
-        a node has its components side by side.
+        (m,) dofs on the faces to the sector before and to the one behind; the i-th dofs of both are partners, and
+        the components of a node are adjacent.
     axis
         Axis of rotation; None for coordinates that no rotation changes.
     weights
@@ -91,7 +91,7 @@ class CyclicSector:
             )
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its matrices."""
+        """Describe the sector in a line, without its matrices."""
         return f"<CyclicSector: one of {self.sectors}; {self.low.size} dofs on a face; {self.structure!r}>"
 
     @property
@@ -111,7 +111,7 @@ class CyclicSector:
 
     @property
     def following(self) -> tuple[IntArray, IntArray, Matrix]:
-        """Dofs of the high face that follow, those of the low face that they follow, and the CSR weights (followers, followed)."""
+        """Dependent dofs of the high face, the dofs of the low face on which they depend, and the CSR weights (dependent, independent)."""
         high, low = self._tied()
         weights = (
             scipy.sparse.eye_array(high.sum(), format="csr")
@@ -129,7 +129,7 @@ class CyclicSector:
 
     @property
     def tie(self) -> Matrix:
-        """Real CSR matrix P_0 (n, m) of the displacements ``tie @ q`` that all sectors have alike."""
+        """Real CSR matrix P_0 (n, m) of displacements ``tie @ q`` that are equal in all sectors."""
         return self.wave_tie(0)
 
     def wave_tie(self, wave_number: int) -> Matrix:
@@ -143,8 +143,8 @@ class CyclicSector:
         Returns
         -------
         scipy.sparse.csr_array
-            (n, m), real for standing waves. Columns: `independent` dofs, then what a wave leaves free at nodes on
-            the axis (the axial motion for k = 0, a whirl for k = 1 and n_s − 1, nothing for others).
+            (n, m), real for standing waves. Columns: `independent` dofs, then the motion of nodes on the axis
+            that the wave allows (axial for k = 0, a whirl for k = 1 and n_s − 1, none for others).
         """
         phase = wave(wave_number, self.sectors).phase
         n, free = self.structure.n, self.independent
@@ -196,27 +196,27 @@ def cyclic_sector(
     Parameters
     ----------
     structure
-        One sector, its faces free; nodes clamped (removed) on both faces are no obstacle.
+        One sector with free faces; nodes may be clamped (removed) on both faces.
     sectors
         Number of sectors of the wheel.
     low, high
         Names of the sets of dofs; `high` is `low` turned by 2π/sectors about `axis` by the right-hand rule. A node
-        on the axis may stand in either or both.
+        on the axis may be in either set or in both.
     axis
         Axis of the wheel.
     tolerance
-        Largest distance of partners in metres; None takes 1e-5 of the size of the faces.
+        Largest distance of partners in metres; None: 1e-5 of the size of the faces.
 
     Returns
     -------
     CyclicSector
-        With the pairs in the order of `low`.
+        The sector, with pairs in the order of `low`.
 
     Raises
     ------
     InputError
-        If nodes have no partner; the message lists them, and says so where faces are swapped or the number of
-        sectors is another. If nodes on the axis stand in neither face.
+        If nodes have no partner; the message lists them, and detects swapped faces and a wrong number of
+        sectors. If nodes on the axis are in neither face.
     """
     check_sectors("cyclic_sector", sectors)
     faces = [face(structure.dofs, structure.dof_set(name), name) for name in (low, high)]

@@ -23,9 +23,9 @@ class Face:
     Parameters
     ----------
     name
-        Of the set.
+        Name of the set.
     node
-        (p,) numbers.
+        (p,) node numbers.
     position
         (p, 3) in metres.
     table
@@ -38,12 +38,12 @@ class Face:
     table: IntArray
 
     def take(self, index: IntArray) -> "Face":
-        """Return some of the nodes."""
+        """Return the face with the nodes `index` alone."""
         return Face(self.name, self.node[index], self.position[index], self.table[index])
 
 
 def face(dofs: Dofs, members: IntArray, name: str) -> Face:
-    """Return the nodes whose dofs are `members`."""
+    """Return the face made of the nodes with the dofs `members`."""
     here = dofs.take(members)
     table = node_table(here)
     if np.count_nonzero(table >= 0) != members.size:
@@ -59,12 +59,12 @@ def face(dofs: Dofs, members: IntArray, name: str) -> Face:
 
 
 def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -> None:
-    """Refuse nodes on the axis that stand in neither face: each sector would have a copy of them.
+    """Refuse nodes on the axis that are in neither face: each sector would have a copy of them.
 
     Parameters
     ----------
     dofs
-        Of the sector.
+        Table of the sector's dofs.
     pairs
         Dofs of both faces.
     axis
@@ -73,7 +73,7 @@ def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -
     Raises
     ------
     InputError
-        Naming the nodes.
+        If there are such nodes; the message names them.
     """
     others = np.setdiff1d(np.flatnonzero(dofs.node >= 0), np.concatenate(pairs))
     faces = dofs.position[pairs[0]]
@@ -100,7 +100,7 @@ def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float
     axis
         Axis of the wheel.
     tolerance
-        Largest distance of partners in metres; None takes 1e-5 of the size of the faces.
+        Largest distance of partners in metres; None: 1e-5 of the size of the faces.
 
     Returns
     -------
@@ -110,8 +110,8 @@ def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float
     Raises
     ------
     InputError
-        If a node has no partner, or its partner other components. The message lists the nodes, and says so where the
-        faces are swapped or the number of sectors is another.
+        If a node has no partner, or its partner has other components. The message lists the nodes, and detects
+        swapped faces and a wrong number of sectors.
     """
     points = np.vstack([low.position, high.position])
     if not np.all(np.isfinite(points)):

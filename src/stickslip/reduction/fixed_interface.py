@@ -44,13 +44,13 @@ def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, 
     Parameters
     ----------
     structure
-        Full model, dense or sparse, real symmetric or complex Hermitian (a travelling wave); held against rigid
-        motion by supports or by `keep`.
+        Full model, dense or sparse, real symmetric or complex Hermitian (a travelling wave). Supports or `keep` must
+        prevent rigid motion.
     keep
-        (k,) indices of the dofs that stay physical: contact, excitation, output. None (an empty array) leaves the lowest
-        modes of a held structure alone: modal truncation.
+        (k,) indices of the dofs that stay physical: contact, excitation, output. An empty array keeps the lowest
+        modes of a supported structure only: modal truncation.
     n_modes
-        Number of fixed-interface modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as it takes.
+        Number of fixed-interface modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as this error needs.
     say
         Called with a sentence before each long step.
 
@@ -63,9 +63,9 @@ def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, 
     Raises
     ------
     InputError
-        If `keep` or `n_modes` does not fit the structure, or an error would take too many modes.
+        If `keep` or `n_modes` does not fit the structure, or an error needs too many modes.
     SingularError
-        If the stiffness with `keep` fixed is singular: a body is not held.
+        If the stiffness with `keep` fixed is singular: a body can move rigidly.
 
     Notes
     -----
@@ -87,7 +87,7 @@ def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, 
 def fixed_interface_reduction(
     structure: Structure, keep: IntArray, bodies: list[Body], n_modes: ModeChoice, say: Say
 ) -> Structure:
-    """Return the reduction of `craig_bampton`, given the bodies that are left when `keep` is fixed."""
+    """Return the reduction of `craig_bampton`, given the bodies that remain when `keep` is fixed."""
     if isinstance(n_modes, FrequencyError):
         return _until_exact_enough(structure, keep, bodies, n_modes, say)
     if isinstance(n_modes, ModesBelow):
@@ -176,12 +176,12 @@ def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeCho
     Parameters
     ----------
     structure
-        What `craig_bampton` or `rubin` returned, real or of a travelling wave.
+        Result of `craig_bampton` or `rubin`, real or of a travelling wave.
     interface
-        (c,) dofs to replace: cut faces and joints that stick. Leave out those that contact laws need; they stay
-        physical, and the answer to static forces on them stays exact.
+        (c,) dofs to replace: cut faces and joints that stick. Leave out dofs that contact laws need; these stay
+        physical, and the response to static forces on them stays exact.
     n_modes
-        Number of characteristic modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as it takes.
+        Number of characteristic modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as this error needs.
     say
         Called with a sentence before each long step.
 
@@ -194,17 +194,17 @@ def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeCho
     Raises
     ------
     InputError
-        If `interface` or `n_modes` does not fit the structure, modal coordinates are to be replaced, or an error would
-        take too many modes.
+        If `interface` or `n_modes` does not fit the structure, modal coordinates are to be replaced, or an error
+        needs too many modes.
     SingularError
-        If the replaced dofs are not held when the others are fixed.
+        If the replaced dofs can move rigidly when the others are fixed.
 
     Notes
     -----
     A Craig-Bampton reduction of the reduced structure: ``u_c = Ψ u_a + Φ η`` with the other coordinates a kept,
     ``Ψ = −K_cc⁻¹ K_ca`` and Φ the lowest modes of ``K_cc, M_cc``, matrices into which the interior was condensed
-    statically. Where no nodal coordinate is left, Φ are the characteristic constraint modes of the paper, and rigid
-    motions are among them. What is lost, `frequency_errors` estimates.
+    statically. Where no nodal coordinate remains, Φ are the characteristic constraint modes of the paper, and rigid
+    motions are among them. `frequency_errors` estimates the loss of accuracy.
     """
     interface = kept_dofs(PLACE, structure, interface)
     modal = [i for i in interface if structure.dofs.component[i] == "mode"]

@@ -27,11 +27,11 @@ class Circles:
     owner
         (p,) circle of each node.
     dofs
-        (p, 3) its dofs x, y, z; -1 where it is held.
+        (p, 3) dofs x, y, z of each node; -1 for supported components.
     angle
         (p,) about the axis, rad.
     weight
-        (p,) share of the circle's arc within a sector; those of a circle add up to one.
+        (p,) share of each node in its circle's arc within a sector; the shares of a circle add up to one.
     frame
         (p, 3, 3) rows: radial, circumferential and axial unit vector.
     """
@@ -55,18 +55,18 @@ class Circles:
         return int(np.bincount(self.owner).min())
 
     def reordered(self, order: IntArray) -> "Circles":
-        """Return the same with circle ``order[i]`` as the i-th."""
+        """Return the circles in another order: ``order[i]`` becomes the i-th."""
         new = np.argsort(order)
         return Circles(self.sector, self.place[order], new[self.owner], self.dofs, self.angle, self.weight, self.frame)
 
 
 def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
-    """Return the circles on which the nodes with the dofs `members` lie; of nodes on both cut faces those of the low one count.
+    """Return the circles on which the nodes with the dofs `members` lie; a node on the high cut face is left out for its copy on the low one.
 
     Raises
     ------
     InputError
-        If there are none, the stage has no axis, or nodes lie on the axis; `name` is that of the stage.
+        If there are no such nodes, the stage has no axis, or nodes lie on the axis; `name` is the name of the stage.
     """
     where = f"multistage: {name}"
     if sector.axis is None:
@@ -97,12 +97,12 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
 
 
 def same_circles(one: Circles, other: Circles, names: tuple[str, str]) -> tuple[Circles, Circles]:
-    """Return both with their circles in the same order.
+    """Return both sides with their circles in the same order.
 
     Raises
     ------
     InputError
-        If the stages turn about different axes, or a circle of one is none of the other.
+        If the stages turn about different axes, or a circle of one stage has no partner on the other.
     """
     a, b = one.sector.axis, other.sector.axis
     assert a is not None
@@ -129,7 +129,7 @@ def same_circles(one: Circles, other: Circles, names: tuple[str, str]) -> tuple[
 def projection(side: Circles, harmonic: int) -> Matrix:
     """Return the (3 c, n) CSR operator from a sector's displacements to a harmonic of the radial, circumferential and axial displacement.
 
-    Of the wave that has this harmonic, ``(1/2π) ∮ u e^{-imφ} dφ`` by the trapezoidal rule; it is the least-squares fit where nodes are evenly
+    For the wave that contains this harmonic it is ``(1/2π) ∮ u e^{-imφ} dφ`` by the trapezoidal rule; it is the least-squares fit where nodes are evenly
     spaced.
     """
     factor = side.weight * np.exp(-1j * harmonic * side.angle)

@@ -30,7 +30,7 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
     Parameters
     ----------
     structure
-        Full model, dense or sparse, real symmetric or complex Hermitian (a travelling wave); free bodies are welcome.
+        Full model, dense or sparse, real symmetric or complex Hermitian (a travelling wave); bodies may be free.
     keep
         (k,) indices of the dofs that stay physical: contact, excitation, output.
     n_modes
@@ -47,7 +47,7 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
     Raises
     ------
     InputError
-        If `keep` or `n_modes` does not fit the structure, or rigid motions are left out.
+        If `keep` or `n_modes` does not fit the structure, or `n_modes` is smaller than the number of rigid motions.
     SingularError
         If kept dofs have no residual flexibility of their own; the message names them.
 
@@ -55,7 +55,7 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
     -----
     ``u = [I 0; Δ Φ_del − Δ Φ_ret] q`` (eq. 58) with the mass-normalised free modes Φ and ``Δ = R_del R_ret⁻¹`` from the
     residual flexibility ``R = K⁻¹ − Φ ω⁻² Φᴴ`` (eq. 59; the published one divides by ω). It is computed without
-    cancellation as the answer to loads from which the kept modes were taken, ``R = K⁺ (I − M Φ Φᴴ)``; that exists for free
+    cancellation as the response to loads without their share in the kept modes, ``R = K⁺ (I − M Φ Φᴴ)``; that exists for free
     bodies, too (inertia relief). Exact in statics for loads on `keep`; the kept modes are exact, rigid motions among them.
     """
     keep = kept_dofs("rubin", structure, keep)

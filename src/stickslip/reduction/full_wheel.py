@@ -24,10 +24,10 @@ def wheel(sector: CyclicSector) -> Structure:
     Returns
     -------
     Structure
-        CSR. Coordinates: sector by sector the dofs without the high face, then what all sectors share. A set that
-        lies inside a sector becomes one of the whole wheel, sector by sector, and one a sector, ``sector3.tip``.
-        `basis` is None: the coordinates are the full field; with a sector that was reduced it leads to the sectors'
-        full models, stacked, each in the axes of its own sector.
+        CSR. Coordinates: sector by sector the dofs without the high face, then the dofs that all sectors share. A set
+        inside a sector becomes a set of the whole wheel, sector by sector, and one of each sector, ``sector3.tip``.
+        `basis` is None: the coordinates are the full field. For a reduced sector it leads to the stacked full models of
+        the sectors, each in the axes of its own sector.
 
     Raises
     ------
@@ -76,11 +76,11 @@ def wheel_shape(
     sector
         The sector.
     wave_number
-        k of the wave.
+        Wave number k.
     vector
         (m,) coordinates on `structure`.
     structure
-        The travelling-wave structure or what it was reduced to; None for ``travelling_wave(sector, wave_number)``.
+        The travelling-wave structure, full or reduced; None for ``travelling_wave(sector, wave_number)``.
     dofs
         Table of the full model that `structure` expands to; None for that of the sector. Needed where the sector
         itself is a reduced model.

@@ -19,7 +19,7 @@ ROUNDING = 1e-12  # imaginary part over the largest entry: below, what waves mak
 
 
 def couplings(waves: Sequence[Matrix]) -> Matrix:
-    """Return what sector n feels of sector n - d, for each distance d (eq. 41).
+    """Return the coupling of sector n to sector n - d, for each distance d (eq. 41).
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def strip(blocks: Matrix, sector: int) -> Matrix:
 
 
 def repeated(operators: Sequence[Matrix], sectors: int) -> Matrix:
-    """Return the CSR operator of all sectors from that of one on itself, on the next sector, on the one after it and so on.
+    """Return the CSR operator of all sectors from the operators of one sector on itself, on the next one, on the one after it and so on.
 
     Parameters
     ----------
     operators
-        (r, m) each, on the sectors 0, 1, 2, ... places ahead.
+        (r, m) operators on the sectors 0, 1, 2, ... ahead.
     sectors
-        Their number n_s; rows and columns go sector by sector.
+        Number of sectors n_s; rows and columns go sector by sector.
     """
     rows, columns = operators[0].shape
     entries: list[tuple[FloatArray, IntArray, IntArray]] = []
@@ -74,7 +74,7 @@ def repeated(operators: Sequence[Matrix], sectors: int) -> Matrix:
 
 
 def travelling(force: Matrix, phase_angle: float, sectors: int) -> ComplexArray:
-    """Return the load on all sectors of a load (m,) on one, of which each leads the one before it by a phase."""
+    """Return the load (n_s m,) of a wave on all sectors from the load (m,) on sector 0; each sector leads the one before it by `phase_angle` (rad)."""
     return np.asarray(np.outer(np.exp(1j * phase_angle * np.arange(sectors)), force).ravel())
 
 
@@ -88,7 +88,7 @@ def of_alike(blocks: Matrix, gram: Matrix, factors: FloatArray) -> FloatArray:
     gram
         (r, r) symmetric A, or a function ``rows -> A @ rows``.
     factors
-        (n_s,) of each sector.
+        (n_s,) factor of each sector.
     """
     count, _, m = blocks.shape
     first = strip(blocks, 0)
@@ -111,15 +111,15 @@ class MistunedWheel:
     Parameters
     ----------
     structure
-        The wheel: real matrices, sector by sector.
+        The mistuned wheel: real matrices with the deviations, sector by sector.
     waves
         Stiffness, damping, mass and structural damping (n_s, m, m) of the waves 0 to n_s - 1 of the tuned wheel.
     shares
-        (n_s, r, m) by wave number: what of a sector's motion the deviations act on.
+        (n_s, r, m) by wave number: rows that take from a sector's motion the r shares on which the deviations act.
     factors
-        (n_s, r) stiffness of each share that a sector has beyond the tuned one.
+        (n_s, r) deviation of the stiffness on each share from the tuned one, N/m.
     springs
-        (n_s m, n_s m) CSR further stiffness.
+        (n_s m, n_s m) CSR matrix of springs to the ground, N/m, which `structure` has and `waves` lack.
     """
 
     structure: Structure
@@ -129,7 +129,7 @@ class MistunedWheel:
     springs: Matrix = field(default_factory=lambda: scipy.sparse.csr_array((0, 0)))
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its matrices."""
+        """Describe the wheel in a line, without its matrices."""
         own, active = self.n // self.sectors, np.count_nonzero(self.factors)
         return f"<MistunedWheel: {self.sectors} sectors of {own} coordinates; {active} deviations>"
 
@@ -150,7 +150,7 @@ class MistunedWheel:
 
     @property
     def multipliers(self) -> IntArray:
-        """No coordinate is the force of a constraint."""
+        """Coordinates that are forces of constraints: none."""
         return self.structure.multipliers
 
     @property
@@ -160,12 +160,12 @@ class MistunedWheel:
 
     @property
     def speed_follows_frequency(self) -> bool:
-        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        """Whether the speed changes with the frequency: no (see `LinearSide`)."""
         return False
 
     @property
     def reduced(self) -> bool:
-        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        """Whether coordinates away from the contacts are condensed: yes (see `LinearSide`)."""
         return True
 
     @property
@@ -196,16 +196,16 @@ class MistunedWheel:
 
 
 def mistuned_wheel(waves: list[Structure], shares: list[Matrix], factors: FloatArray, dofs: Dofs) -> MistunedWheel:
-    """Put all sectors together.
+    """Assemble all sectors of a mistuned wheel.
 
     Parameters
     ----------
     waves
-        Of the wave numbers 0 to n_s - 1, all on the same coordinates.
+        Structures of the wave numbers 0 to n_s - 1, all on the same coordinates.
     shares, factors
-        (r, m) of each wave, and (n_s, r); see `MistunedWheel`.
+        (r, m) for each wave, and (n_s, r); see `MistunedWheel`.
     dofs
-        Table of all sectors.
+        Table of the coordinates of all sectors.
     """
     size = (len(waves), waves[0].n, waves[0].n)
     lossy = waves[0].loss is not None

@@ -30,7 +30,7 @@ class SpeedBasis:
     Parameters
     ----------
     speeds
-        (3,) ascending, in rad/s, whose modes the basis holds.
+        (3,) speeds whose modes the basis holds, ascending, rad/s.
     stiffness
         (3, r, r) at these speeds.
     damping
@@ -67,9 +67,9 @@ def speed_basis(
     speed_range
         Lowest and highest speed.
     n_modes
-        Modes that are wanted.
+        Number of modes to be represented.
     coriolis
-        Whether the damping holds Coriolis terms that count.
+        Whether Coriolis terms in the damping are taken into account.
     """
     low, high = speed_range
     # in the middle of the squares, on which the stiffness depends
@@ -110,7 +110,7 @@ COMMON = 0.7  # cosine of the angle between what modes of two states span, above
 
 
 class ModesExchangedError(ValueError):
-    """The lowest modes of two states are not the same ones: no turn brings them together."""
+    """The lowest modes of two states span different spaces: no rotation aligns them."""
 
 
 def modes_of(structure: Structure, keep: IntArray, reduction: Reduction) -> Matrix:
@@ -123,25 +123,25 @@ def on_modes_of_others(
 ) -> Structure:
     """Return a structure reduced to the dofs `keep` and modal coordinates that change smoothly from state to state.
 
-    Modes of neighbouring states, as those of two speeds, may differ in sign and order, and change fast where frequencies come
-    close; what they span changes little.
+    Modes of neighbouring states, such as two speeds, may differ in sign and order, and change fast where frequencies are
+    close; the space that they span changes little.
 
     Parameters
     ----------
     structure
-        In one state.
+        The structure in one state.
     keep
         (k,) dofs that stay physical.
     reduction
-        How it is reduced.
+        Its reduction.
     others
-        Modes in other states (`modes_of`). Of one: the structure's own modes are turned to be as near to them as can be. Of
-        several: most of what all of them span takes the place of its own, half as many modes again.
+        Modes in other states (`modes_of`). One state: the structure's own modes are rotated to be as close to these as possible.
+        Several states: a basis of most of the space that all of them span replaces the own modes; it has 1.5 times as many vectors.
 
     Raises
     ------
     ModesExchangedError
-        If there is one other state, and a mode has taken the place of another one.
+        If there is one other state and the modes span another space.
     """
     small, basis = _basis(structure, keep, reduction)
     static, modes = basis[:, : len(keep)], basis[:, len(keep) :]

@@ -22,7 +22,7 @@ REMEMBERED = 8  # speeds whose matrices are kept
 
 
 def speed_nodes(lowest: float, highest: float, intervals: int) -> FloatArray:
-    """Return speeds whose squares are Chebyshev points, both ends among them, in growing order; those of half as many intervals are every second one."""
+    """Return ascending speeds whose squares are Chebyshev points, ends included; every second one belongs to half as many intervals."""
     angles = np.pi * np.arange(intervals + 1) / intervals
     middle, half = (highest**2 + lowest**2) / 2, (highest**2 - lowest**2) / 2
     nodes = np.sqrt(middle - half * np.cos(angles))
@@ -32,18 +32,18 @@ def speed_nodes(lowest: float, highest: float, intervals: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SpeedLine:
-    """What vibrates at ``ω = m Ω``, as one linear side whose matrices follow the frequency.
+    """A structure or wheel along the engine-order line ``ω = m Ω``: a linear side whose matrices follow the frequency.
 
     Parameters
     ----------
     engine_order
         m, from 1.
     speeds
-        (k,) as `speed_nodes` gives them, rad/s.
+        (k,) speeds from `speed_nodes`, rad/s.
     sides
-        What vibrates at each of them, on the same coordinates: one structure each, or a tuned wheel each.
+        Structure or tuned wheel at each speed, all on the same coordinates.
     loads
-        Harmonic -> (k, n) load at each of them, N; 0: the static one.
+        Harmonic -> (k, n) load at each speed, N; 0: the static load.
 
     Raises
     ------
@@ -75,16 +75,16 @@ class SpeedLine:
             )
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave what can be computed again behind."""
+        """Drop cached values, which can be computed again."""
         return self.__dict__ | {"known": {}, "stacks": {}}
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        """Take what was kept."""
+        """Restore the fields."""
         self.__dict__.update(state)
 
     @property
     def top(self) -> AtRest:
-        """What vibrates at the highest speed, which stands for all where matrices are asked for without a frequency."""
+        """Structure or wheel at the highest speed, used where matrices are needed without a frequency."""
         return self.sides[-1]
 
     @property
@@ -123,7 +123,7 @@ class SpeedLine:
         return True
 
     def at_frequency(self, omega: float) -> AtRest:
-        """Return what vibrates at a frequency in rad/s, at the speed of this frequency."""
+        """Return the structure or wheel at the speed that belongs to a frequency in rad/s."""
         return self.at(self.speed(omega))
 
     def of_harmonic(self, harmonic: int) -> Structure:
@@ -134,16 +134,16 @@ class SpeedLine:
         """Return the aerodynamic force on a harmonic: none."""
 
     def grounded(self, springs: Matrix) -> "SpeedLine":
-        """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
+        """Return the line with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         sides = tuple(side.grounded(springs) for side in self.sides)
         return replace(self, sides=sides, known={}, stacks={})
 
     def speed(self, omega: float) -> float:
-        """Return the speed at which the engine order has a frequency, both in rad/s."""
+        """Return the speed at which the engine order excites a frequency, both in rad/s."""
         return omega / self.engine_order
 
     def at(self, speed: float) -> AtRest:
-        """Return what vibrates at a speed in rad/s."""
+        """Return the structure or wheel at a speed in rad/s."""
         found = self.known.get(speed)
         if found is None:
             while len(self.known) >= REMEMBERED:
@@ -156,7 +156,7 @@ class SpeedLine:
         return np.asarray(self.weights(speed) @ self.loads[harmonic])
 
     def weights(self, speed: float) -> FloatArray:
-        """Return the (k,) values at a speed of the polynomials that are one at one of the speeds and zero at the others."""
+        """Return the (k,) values of the Lagrange polynomials of the speeds at a speed in rad/s."""
         distance = speed**2 - self.speeds**2
         if np.any(distance == 0.0):
             return np.asarray(distance == 0.0, dtype=float)

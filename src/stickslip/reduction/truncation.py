@@ -57,8 +57,8 @@ class FrequencyError:
     up_to_hz
         Highest frequency that the reduced model is meant for.
     most
-        Number of component modes beyond which none are added. The reduction ends with an `InputError` where they do not
-        suffice, and as soon as the errors fall too slowly for that.
+        Largest number of component modes. The reduction ends with an `InputError` if they do not
+        suffice, as soon as the rate at which errors fall shows it.
 
     Raises
     ------
@@ -79,17 +79,17 @@ ModeChoice = int | ModesBelow | FrequencyError
 
 @dataclass(frozen=True, eq=False)
 class FrequencyErrors:
-    """Natural frequencies of a reduced model and the estimated errors of each.
+    """Natural frequencies of a reduced model and their estimated errors.
 
     Parameters
     ----------
     frequencies_hz
-        (m,) of the reduced model.
+        (m,) natural frequencies of the reduced model.
     relative
-        (m,) estimated relative errors: the full model's frequency is lower by that share; zero for rigid motions.
+        (m,) estimated relative errors, by which the full model's frequency is lower; zero for rigid motions.
     missing
-        Number of frequencies of the full model below the limit that the reduced model lacks; those above the first one
-        lacked are then numbered wrongly, and their errors mean the nearest frequency. None where they could not be counted:
+        Number of frequencies of the full model below the limit that the reduced model lacks; frequencies above the first missing
+        one are then numbered wrongly, and their errors refer to the nearest frequency. None if they could not be counted, as with
         SuperLU's factors of a very large model, see `negative_eigenvalues`.
     """
 
@@ -113,16 +113,16 @@ def frequency_errors(
     structure
         The model before the reduction.
     reduced
-        The same after `craig_bampton`, `rubin`, `reduce_interface`, or several of them.
+        The model after `craig_bampton`, `rubin`, `reduce_interface`, or several of them.
     up_to_hz
-        Frequencies up to here.
+        Highest frequency for which errors are estimated, Hz.
     say
         Called with a sentence before each long step.
 
     Returns
     -------
     FrequencyErrors
-        Of the natural frequencies of `reduced` that may lie below the limit once their error is taken off.
+        Errors of the natural frequencies of `reduced` that may lie below the limit after correction by their error.
 
     Raises
     ------
@@ -135,8 +135,8 @@ def frequency_errors(
     space. To first order ``λ`` is too large by ``Σ |φ_dᴴ r|² / (λ_d − λ)`` over the modes left out. Instead of these modes
     it takes one solution ``y = K⁻¹ r``: ``t0 = rᴴ y`` and ``t1 = λ yᴴ M y`` begin the series in ``λ/λ_d``, of which
     ``t0 / (1 − t1/t0)`` is the sum where one mode dominates. The exact sum is not smaller (Cauchy-Schwarz); the ratio to
-    the true error tends to one as modes are added. A mode to which all of the reduced space is orthogonal leaves no residual:
-    the frequencies of the full model below the limit are counted by the signs of the pivots of ``K − λ M``.
+    the true error tends to one as modes are added. A mode orthogonal to all of the reduced space leaves no residual;
+    therefore the frequencies of the full model below the limit are counted by the signs of the pivots of ``K − λ M``.
     """
     _positive("frequency_errors", up_to_hz=up_to_hz)
     basis = _basis_between(structure, reduced)
@@ -153,7 +153,7 @@ def frequencies_below(structure: Structure, limit_hz: float, say: Say) -> int | 
 def errors_of(
     structure: Structure, reduced: Structure, basis: Matrix, bodies: list[Body], up_to_hz: float, count: int | None
 ) -> FrequencyErrors:
-    """Return the estimated errors, given the basis and what solves with the stiffness.
+    """Return the estimated errors, given the basis and the factorised bodies.
 
     Parameters
     ----------
@@ -162,13 +162,13 @@ def errors_of(
     reduced
         The model after it, m coordinates.
     basis
-        (n, m) from the coordinates of `reduced` to those of `structure`.
+        (n, m) matrix from the coordinates of `reduced` to the dofs of `structure`.
     bodies
-        Of the structure, free, or fixed at dofs whose unit displacements are in the reduced space.
+        Bodies of the structure, free, or fixed at dofs whose unit displacements are in the reduced space.
     up_to_hz
-        Frequencies up to here.
+        Highest frequency for which errors are estimated, Hz.
     count
-        Number of frequencies of the structure below, if known.
+        Number of the structure's frequencies below `up_to_hz`, if known.
     """
     modes = normal_modes(reduced, int(np.count_nonzero(reduced.mass.diagonal())))
     below: BoolArray = modes.frequencies_hz <= REACH * up_to_hz
@@ -200,23 +200,23 @@ def enough_modes(
 ) -> int:
     """Return the number of modes at which the estimated errors suffice.
 
-    The number grows by 15 to 40 % at a time where a few steps will do, else by 80 %.
+    The number grows by 15 to 40 % a step where a few steps suffice, else by 80 %.
 
     Parameters
     ----------
     choice
-        What suffices.
+        Required error and limits.
     start, available
-        Number tried first; number of modes there are.
+        First number of modes; number of available modes.
     errors
-        Estimate with a given number of modes.
+        Function from a number of modes to the estimated errors.
     say
-        Called with a sentence a step.
+        Called with a sentence before each step.
 
     Raises
     ------
     InputError
-        If more than `choice.most` modes would be needed, by the measured rate at which the errors fall.
+        If the rate at which the errors fall shows that more than `choice.most` modes are needed.
     """
     count = min(start, available)
     tried: list[tuple[int, float]] = []

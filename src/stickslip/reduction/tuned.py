@@ -33,25 +33,25 @@ Write = Callable[[int], tuple[Structure, Matrix]]  # a wave in other coordinates
 
 @dataclass(frozen=True, eq=False)
 class TunedWheel:
-    """One sector of a wheel whose sectors all move alike, one after the other; `tuned_wheel` makes one.
+    """One sector of a wheel whose sectors all do the same, one after the other; `tuned_wheel` makes one.
 
-    Harmonic h of the vibration has the wave number ``h m mod n_s`` of the engine order m, and its structure is that of this
-    wave. The first coordinates mean the same in all waves: the gaps of the contacts, or the kept dofs of a sector, those of a
-    neighbour on which a contact acts in its phase. The others differ from wave to wave.
+    Harmonic h of the vibration has the wave number ``h m mod n_s`` of the engine order m, and it vibrates as the structure of
+    this wave. The first coordinates mean the same in all waves: the gaps of the contacts, or the kept dofs of a sector; a neighbour's dof on
+    which a contact acts is the sector's own dof in another phase. The other coordinates differ from wave to wave.
 
     Parameters
     ----------
     waves
-        Wave number -> structure, in these coordinates.
+        Wave number -> structure in these coordinates.
     sectors
         Number of sectors.
     engine_order
-        m.
+        Engine order m.
     harmonics
         Highest temporal harmonic for which there is a wave.
     multipliers
-        Coordinates that are forces of constraints: between the motion of a sector and that of a neighbour, where contacts touch the
-        same dof of both.
+        Coordinates that are constraint forces between a sector and its neighbour, where contacts touch the same dof
+        of both.
     feedback
         Wave number -> aerodynamic force on it, in these coordinates; the waves hold its frozen form (`with_aerodynamics`).
     """
@@ -64,7 +64,7 @@ class TunedWheel:
     feedback: Mapping[int, Feedback] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its matrices."""
+        """Describe the wheel in a line, without its matrices."""
         waves = ", ".join(str(k) for k in sorted(self.waves))
         return (
             f"<TunedWheel: {self.sectors} sectors; engine order {self.engine_order}; harmonics 0 to {self.harmonics}; "
@@ -96,7 +96,7 @@ class TunedWheel:
         Raises
         ------
         InputError
-            If the wheel was made for fewer harmonics and has not every wave.
+            If the wheel was made for fewer harmonics and lacks the wave of this one.
         """
         if harmonic < 0 or (harmonic > self.harmonics and not self.has_every_wave):
             raise input_error(
@@ -107,11 +107,11 @@ class TunedWheel:
         return self.waves[excited_wave(self.engine_order, self.sectors, harmonic)]
 
     def feedback_of(self, harmonic: int) -> Feedback | None:
-        """Return the aerodynamic force on temporal harmonic `harmonic`, of which `of_harmonic` holds the frozen form; None for none."""
+        """Return the aerodynamic force on temporal harmonic `harmonic`, or None. The structure of `of_harmonic` contains its frozen form."""
         return self.feedback.get(excited_wave(self.engine_order, self.sectors, harmonic))
 
     def with_aerodynamics(self, feedback: Mapping[int, Feedback]) -> "TunedWheel":
-        """Return the wheel with an aerodynamic force on each wave: frozen in its matrices, whole where frequencies are known.
+        """Return the wheel with an aerodynamic force on each wave: its frozen form in the matrices, and the force itself for use at known frequencies.
 
         Parameters
         ----------
@@ -133,11 +133,11 @@ class TunedWheel:
 
     @property
     def has_every_wave(self) -> bool:
-        """Whether there is a structure for each wave number: what all sectors in time need, each of which may do something else."""
+        """Whether there is a structure for each wave number, as time integration of all sectors needs."""
         return all(k in self.waves for k in range(self.sectors))
 
     def travelling_as(self, wave_number: int) -> "TunedWheel":
-        """Return the same wheel, which has every wave, under another engine order."""
+        """Return the wheel under another engine order; it must have every wave."""
         return replace(self, engine_order=wave_number)
 
     def grounded(self, springs: Matrix) -> "TunedWheel":
@@ -146,7 +146,7 @@ class TunedWheel:
         return replace(self, waves=waves)
 
     def project(self, load: Matrix, harmonic: int) -> Matrix:
-        """Return the load on the coordinates of a load (n_full,) on the sector's dofs in a harmonic, N."""
+        """Return the (n,) load on the coordinates in a harmonic from the load (n_full,) on the sector's dofs, N."""
         return self.of_harmonic(harmonic).project(load)
 
     def expand(self, vector: Matrix, harmonic: int) -> Matrix:
@@ -167,35 +167,35 @@ def tuned_wheel(  # noqa: PLR0913
     relative: bool | None = None,
     waves: Sequence[int] = (),
 ) -> tuple[TunedWheel, Matrix]:
-    """Reduce the travelling waves that an engine order excites, and write them so that the gaps are the same in all of them.
+    """Reduce the travelling waves that an engine order excites, to coordinates in which the gap operator is the same for all waves.
 
     Parameters
     ----------
     sector
-        One sector; also parts joined, of which some are on no face: a disk segment with its blade and rigid dampers.
+        One sector. It may consist of joined parts without cyclic faces: a disk segment with its blade and rigid dampers.
     engine_order
-        m; harmonic h travels with the wave number ``h m mod n_s``.
+        Engine order m; harmonic h travels with the wave number ``h m mod n_s``.
     harmonics
         Highest temporal harmonic.
     gaps
         Two operators (3 n_contacts, n) on the displacements of a sector in its own axes: ``gap = own u^(0) + next u^(1)``,
         rows t, w, n of each contact. The second is None for contacts inside a sector; see `neighbour_gaps`.
     keep
-        (k,) dofs of the sector that stay physical in the reduction, those of the contacts among them and none of the high
+        (k,) dofs of the sector that stay physical in the reduction, including those of the contacts and none of the high
         face; None: nothing is reduced.
     n_modes
-        Number of modes of each wave beside them.
+        Number of modes of each wave beside the kept dofs.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
         dofs `keep` of the wave, as many coordinates in every wave.
     names
         Names of the contacts.
     relative
-        Whether the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`); False: the kept dofs in the order of
-        `keep` are (`nodal_coordinates`), for outputs on nodes of contacts and gaps that depend on each other; None: where gaps
-        allow it.
+        True: the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`). False: the kept dofs in the order of
+        `keep` are (`nodal_coordinates`), for outputs on nodes of contacts and for gaps that depend on each other. None: True where
+        gaps are independent.
     waves
-        Further wave numbers that are reduced, for disturbances and for all sectors in time.
+        Further wave numbers to reduce, for stability and for time integration of all sectors.
 
     Returns
     -------
@@ -208,7 +208,7 @@ def tuned_wheel(  # noqa: PLR0913
     ------
     InputError
         If operators do not fit, dofs of the contacts are not kept, gaps that are to be coordinates depend on each other in one of
-        the waves, or `reduce` returns something else than described.
+        the waves, or `reduce` does not return what is described above.
     """
     _refuse_misfits(sector, gaps)
     orders = range(harmonics + 1)

@@ -24,7 +24,7 @@ def node_table(dofs: Dofs) -> IntArray:
     -------
     numpy.ndarray
         (p, 6) rows of the components ``x y z rx ry rz``, -1 where a node lacks one; modal and other scalar
-        coordinates do not appear.
+        coordinates are left out.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def dof_rotation(dofs: Dofs, rotation: FloatArray, place: str) -> Matrix:
     rotation
         (3, 3) rotation of vectors.
     place
-        Who asks, for messages.
+        Name of the caller, for messages.
 
     Returns
     -------
     scipy.sparse.csr_array
-        (n, n), one at coordinates that are no component of a vector.
+        (n, n), with ones on the diagonal for coordinates that are no components of a vector.
 
     Raises
     ------

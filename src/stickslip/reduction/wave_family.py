@@ -34,13 +34,13 @@ class SharedInterior:
     Parameters
     ----------
     sectors
-        Of the wheel.
+        Number of sectors.
     parts
         A_0 and A_1 in CSR.
     coupling
-        (m,) dofs that the sector behind sees.
+        (m,) dofs that couple to the sector behind.
     factors
-        Of all other dofs; their Schur complement is that of `coupling` and of its copies.
+        Factors of all other dofs, with the Schur complement on `coupling` and its copies.
     """
 
     sectors: int
@@ -49,7 +49,7 @@ class SharedInterior:
     factors: Multifrontal
 
     def factorise(self, wave_number: int, matrix: Matrix) -> Factorisation | None:
-        """Return the factorisation of the matrix of a wave; None where it is no member of the family, or not positive definite."""
+        """Return the factorisation of the matrix of a wave; None if it is no member of the family, or not positive definite."""
         phase = wave(wave_number, self.sectors).phase
         if not _alike(self._of_wave(phase), matrix):
             return None
@@ -101,25 +101,25 @@ class SharedInterior:
 def shared_interior(
     standing: Matrix, travelling: Matrix, wave_number: int, sectors: int, *, say: Say = silent
 ) -> SharedInterior | None:
-    """Factorise what all waves of a sector share.
+    """Factorise the common interior of all waves of a sector.
 
     Parameters
     ----------
     standing
         (n, n) real CSR matrix of wave number 0.
     travelling
-        The matrix of another wave, neither standing; a phase angle near a right one leaves the most digits.
+        Matrix of a wave that is not standing; a phase angle near 90° keeps the most digits.
     wave_number
-        Its wave number.
+        Wave number of `travelling`.
     sectors
-        Of the wheel.
+        Number of sectors.
     say
         Called with a sentence before the long step.
 
     Returns
     -------
     SharedInterior or None
-        None where the two are not of a family of real matrices, or the interior is not positive definite.
+        None if the two do not belong to a family of real matrices, or the interior is not positive definite.
     """
     parts = _parts(standing, travelling, wave(wave_number, sectors).phase)
     if parts is None:
@@ -173,16 +173,16 @@ def _alike(one: Matrix, other: Matrix) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class WaveFamily:
-    """The waves of one sector at one speed, for their modes.
+    """The waves of one sector at one speed; they share factors for the computation of modes.
 
     Parameters
     ----------
     at
-        Wave number -> structure.
+        Function from a wave number to the structure.
     sectors
-        Of the wheel.
+        Number of sectors.
     numbers
-        Wave numbers whose modes are wanted.
+        Wave numbers whose modes will be computed.
     say
         Called with a sentence before long steps.
     """
@@ -193,7 +193,7 @@ class WaveFamily:
     say: Say = silent
 
     def shifted(self, wave_number: int, structure: Structure) -> tuple[float | None, Factors | None]:
-        """Return the shift of all waves and what factorises ``K − shift M`` of one; None where a wave is better factorised by itself."""
+        """Return the common shift of all waves and the function that factorises ``K − shift M`` of one; None where a wave is better factorised alone."""
         if structure.n <= LARGE or len(self.numbers) < 2 or self._shared is None:
             return None, None
         shift, shared = self._shared

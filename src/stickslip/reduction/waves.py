@@ -19,7 +19,7 @@ NO_WAVE = -1  # stored as the wave number of a single structure
 
 @dataclass(frozen=True)
 class Wave:
-    """What a wave number means (Krack et al. 2017, table 3).
+    """A travelling wave of a wheel by its wave number (Krack et al. 2017, table 3).
 
     Parameters
     ----------
@@ -48,14 +48,14 @@ class Wave:
 
     @property
     def nodal_diameter(self) -> int:
-        """Number of nodal diameters: the smaller one of k and n_s − k."""
+        """Number of nodal diameters: the smaller of k and n_s − k."""
         return min(self.wave_number, self.sectors - self.wave_number)
 
     @property
     def kind(self) -> Kind:
         """``standing`` at k = 0 and n_s/2, ``backward`` below n_s/2, ``forward`` above.
 
-        As an observer on the wheel sees it, with the rotation forward: sector n leads sector 0 by n θ_k.
+        In the rotating frame, with the direction of rotation as forward: sector n leads sector 0 by n θ_k.
         """
         if self.wave_number == 0 or 2 * self.wave_number == self.sectors:
             return "standing"
@@ -63,7 +63,7 @@ class Wave:
 
     @property
     def phase_angle(self) -> float:
-        """Inter-blade phase angle θ_k = 2πk/n_s in rad, by which a sector leads the one before it."""
+        """Inter-blade phase angle θ_k = 2πk/n_s in rad, by which each sector leads the previous one."""
         return 2 * math.pi * self.wave_number / self.sectors
 
     @property
@@ -75,7 +75,7 @@ class Wave:
 
 
 def wave(wave_number: int, sectors: int) -> Wave:
-    """Return the wave of any whole number: −1 is sectors − 1."""
+    """Return the wave of any whole number, modulo the sectors: −1 is sectors − 1."""
     check_sectors("wave", sectors)
     return Wave(wave_number % sectors, sectors)
 
@@ -86,16 +86,16 @@ def excited_wave(engine_order: int, sectors: int, harmonic: int = 1) -> int:
     Parameters
     ----------
     engine_order
-        Waves of the pressure field around the casing; negative for a field that turns faster than the wheel.
+        Number of waves of the pressure field around the casing; negative for a field that turns faster than the wheel.
     sectors
         Number of sectors.
     harmonic
-        Harmonic of the vibration, 1 for that of the excitation.
+        Harmonic of the vibration; 1 is the frequency of the excitation.
 
     Returns
     -------
     int
-        ``harmonic * engine_order mod sectors``, in the frame of the wheel that turns towards the next sector.
+        ``harmonic * engine_order mod sectors``, in the rotating frame, the wheel turning towards the next sector.
     """
     check_sectors("excited_wave", sectors)
     return harmonic * engine_order % sectors
@@ -123,6 +123,6 @@ def to_sectors(waves: Matrix) -> ComplexArray:
 
 
 def check_sectors(place: str, sectors: int) -> None:
-    """Refuse a number of sectors that is none."""
+    """Refuse an invalid number of sectors."""
     if sectors != int(sectors) or sectors < 1:
         raise input_error(f"{place}: sectors", f"must be a whole number from 1, got {sectors}", "Count the blades.")

@@ -34,12 +34,12 @@ class ReducedWheel:
         The wheel: sector by sector the kept dofs in global axes, then modal coordinates. Sets are those of `wheel`:
         ``tip`` of all sectors, ``sector3.tip`` of one.
     sector
-        What was reduced.
+        The full sector.
     waves
-        Reduced travelling waves of the wave numbers 0 to n_s/2, of which the others are the conjugates; of all wave numbers where
-        complex matrices tell the two directions apart.
+        Reduced travelling waves of the wave numbers 0 to n_s/2, whose conjugates are the others; all wave numbers if
+        complex matrices distinguish the two directions.
     to_global
-        (m, m) turn of a sector's coordinates by one pitch.
+        (m, m) rotation of a sector's coordinates by one pitch.
     """
 
     structure: Structure
@@ -48,7 +48,7 @@ class ReducedWheel:
     to_global: FloatArray
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its matrices."""
+        """Describe the wheel in a line, without its matrices."""
         own = self.structure.n // self.sector.sectors
         return f"<ReducedWheel: {self.sector.sectors} sectors of {own} coordinates; {self.structure!r}>"
 
@@ -74,13 +74,13 @@ class ReducedWheel:
         return sectors.real if both_ways and np.isrealobj(vector) else sectors
 
     def load(self, force: Matrix, wave_number: int = 0) -> ComplexArray:
-        """Return the (N,) load on the wheel's coordinates of a load that travels around it.
+        """Return the (N,) load on the wheel's coordinates from a load that travels around it.
 
         Parameters
         ----------
         force
-            (n,) load on the sector's dofs in N, real or complex: sector n carries ``R^n force exp(2πi k n / n_s)``. What
-            acts on the cut faces is this sector's share, as an assembled load is.
+            (n,) load on the sector's dofs in N, real or complex: sector n carries ``R^n force exp(2πi k n / n_s)``. Forces
+            on the cut faces are this sector's share, as in an assembled load.
         wave_number
             k: 0 for a steady centrifugal load, `excited_wave` of an engine order.
         """
@@ -131,16 +131,16 @@ def reduced_wheel(
     sector
         One sector of a full model.
     keep
-        (k,) dofs of the sector that stay physical in every sector: contacts between sectors, excitation, outputs; none of
-        the high face or of the axis. All components of a node, if the axis turns them.
+        (k,) dofs that stay physical in every sector: contacts between sectors, excitation, outputs; none of
+        the high face or on the axis. All components of a node, if the axis rotates them.
     n_modes
-        Modes of every wave number kept beside them, and so modal coordinates of every sector.
+        Number of modes kept for every wave number, and so of modal coordinates of every sector.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
         dofs `keep` of the wave, as many coordinates in every wave.
     feedback
-        From a wave number and the reduced wave to the aerodynamic force on it, which is added in its frozen form; None: none. It has to
-        give waves k and n_s − k each other's conjugates (`Feedback.conjugate`).
+        Function from a wave number and the reduced wave to the aerodynamic force on it, whose frozen form is added; None: no force.
+        The forces on waves k and n_s − k must be conjugates (`Feedback.conjugate`).
 
     Returns
     -------
@@ -150,8 +150,8 @@ def reduced_wheel(
     Raises
     ------
     InputError
-        If a kept dof is not among the coordinates of a travelling wave, or `reduce` returns something else than
-        described.
+        If a kept dof is not among the coordinates of a travelling wave, or `reduce` does not return what is
+        described above.
 
     Notes
     -----
@@ -195,13 +195,13 @@ def reduced_wheel(
 
 
 def goes_both_ways(sector: CyclicSector, moving: Structure) -> bool:
-    """Whether the wave that travels the other way is the conjugate of `moving`: real matrices do not tell the directions apart."""
+    """Whether the wave that travels the other way is the conjugate of `moving`, because real matrices do not distinguish the directions."""
     own = (moving.stiffness, moving.mass)
     return not sector.structure.is_complex and all(is_hermitian(matrix) for matrix in own)
 
 
 def refuse_reduced(who: str, sector: CyclicSector) -> None:
-    """Refuse a sector that is a reduced model: it would be reduced twice, and its fields would be lost."""
+    """Refuse a sector that is a reduced model: a second reduction would lose its full field."""
     if sector.structure.basis is not None:
         raise input_error(
             f"{who}: sector", "is a reduced model already", "Give the sector of the full model: it is reduced here."
@@ -211,25 +211,25 @@ def refuse_reduced(who: str, sector: CyclicSector) -> None:
 def reduced_wave(
     who: str, reduce: Reduce, sector: CyclicSector, wave_number: int, place: IntArray, n_modes: int
 ) -> Structure:
-    """Return a travelling wave as `reduce` leaves it, after a look at what that is.
+    """Return a travelling wave reduced by `reduce`, whose result is checked.
 
     Parameters
     ----------
     who
-        Function that asks, for messages.
+        Name of the caller, for messages.
     reduce
-        Of a user, maybe.
+        Function of reduction, which may be a user's.
     sector, wave_number
-        What travels.
+        The sector and its wave.
     place
-        (k,) coordinates of the wave that have to come first.
+        (k,) coordinates of the wave that must come first in the result.
     n_modes
-        For `reduce`.
+        Number of modes, passed to `reduce`.
 
     Raises
     ------
     InputError
-        If that is no structure of the same model, or its first coordinates are others.
+        If the result is no structure of the same model, or its first coordinates are not those of `place`.
     """
     moving = travelling_wave(sector, wave_number)
     reduced = reduce(moving, place, n_modes)
@@ -250,7 +250,7 @@ def reduced_wave(
 
 
 def refuse_unequal(who: str, waves: Mapping[int, Structure]) -> None:
-    """Refuse waves of different numbers of coordinates: harmonics and sectors could not be put together."""
+    """Refuse waves with different numbers of coordinates: harmonics and sectors could not be assembled."""
     sizes = {k: wave.n for k, wave in waves.items()}
     if len(set(sizes.values())) > 1:
         few, many = min(sizes, key=sizes.__getitem__), max(sizes, key=sizes.__getitem__)
@@ -262,7 +262,7 @@ def refuse_unequal(who: str, waves: Mapping[int, Structure]) -> None:
 
 
 def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
-    """Return where the kept dofs of a sector stand among the coordinates of a travelling wave."""
+    """Return the positions of a sector's kept dofs among the coordinates of a travelling wave."""
     keep = dof_indices(who, sector.structure, keep)
     free = sector.independent
     lost = np.setdiff1d(keep, free)

@@ -5,7 +5,7 @@ from importlib import import_module
 
 
 class _Registry(Mapping[str, type]):
-    """Law classes by name; a file is loaded, and its step compiled, when its law is first asked for."""
+    """Law classes by name; a module is imported, and its step compiled, when its law is first used."""
 
     def __init__(self, classes: dict[str, str]) -> None:
         self._classes = classes
@@ -41,6 +41,6 @@ ALL_LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP | {"rigid_coulomb": "RigidC
 
 
 def law_name(law: object) -> str:
-    """Return the name that a study file has for a law, of one of your own its class."""
+    """Return the name of a law in study files; for a user's law, the name of its class."""
     package, _, name = type(law).__module__.rpartition(".")
     return name if package == __name__ and name in ALL_LAWS else type(law).__name__

@@ -19,7 +19,7 @@ from stickslip.units import check_quantities
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bonded:
-    """Contact that holds whatever happens: a linear spring along each direction, pulling as well as pushing.
+    """Contact that never slips or opens: a linear spring along each direction, in tension and compression.
 
     Parameters
     ----------

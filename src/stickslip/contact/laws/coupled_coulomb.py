@@ -15,12 +15,12 @@ from stickslip.units import check_quantities, quantity
 class CoupledCoulomb:
     """Contact that sticks, slips in any direction of its plane and lifts off.
 
-    ``N = max(0, preload - k_n g_n)`` as of `ElasticCoulomb`, but one spring in the plane, whose force is limited as a vector:
+    ``N = max(0, preload - k_n g_n)`` as in `ElasticCoulomb`, but one spring in the plane, whose force is limited as a vector:
     ``T_t² + T_w² <= (mu N)²``. A slider that slips moves along the force. With one stiffness the law does not depend on the orientation of
     t and w in the plane.
 
-    A step takes path and normal force as straight from the step before; what happens within it is followed: stick up to the
-    limit, slip along it, opening and closing.
+    A step assumes that displacement and normal force change linearly from the previous step, and follows stick up to the
+    limit, slip along it, opening and closing within the step.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ class CoupledCoulomb:
     k_w
         Contact stiffness along w, N/m; None: as along t.
     slider
-        Tangential gaps (t, w) at which the spring is unstretched before t = 0, m, such as `stickslip.response.frozen_sliders`
-        finds them; None: zero.
+        Tangential gaps (t, w) at which the spring is unstretched before t = 0, m, as found by
+        `stickslip.response.frozen_sliders`; None: zero.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class Dahl:
 
     Independent of the rate. Acts along t and w, each for itself and with the same limit; along n stands a linear spring that also
     pulls. A tangent is said to slip where its stiffness has fallen below half of its first value. A force whose mean is not
-    zero relaxes over many cycles, however small they are: the periodic state has none.
+    zero relaxes over many cycles, however small they are: the mean of the periodic force is zero.
 
     Parameters
     ----------

@@ -37,12 +37,12 @@ class ElasticCoulomb:
     preload
         Normal force at zero normal gap, N; negative for a contact with a clearance.
     residual_traction
-        None: each tangential spring is unstretched at zero displacement, or where `slider` says. A number m in [-1, 1]: the
+        None: each tangential spring is unstretched at zero displacement, or at `slider`. A number m in [-1, 1]: the
         tangential force just before t = 0 is ``m mu N`` (Ferhatoglu & Zucca's start value), which chooses one of the
         admissible mean forces of a contact that does not slip.
     slider
-        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m, such as `stickslip.response.frozen_sliders`
-        finds them; None: zero. Not beside a residual traction.
+        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m, as found by
+        `stickslip.response.frozen_sliders`; None: zero. Not together with a residual traction.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from stickslip.units import check_quantities, quantity
 
 
 class Population(Protocol):
-    """What the Iwan element needs of its sliders."""
+    """Protocol of a population of sliders."""
 
     def sliders(self) -> FloatArray:
         """Return (2, n) shares of the stiffness, with sum 1, and of the limit, the finite ones with sum 1."""
@@ -38,11 +38,11 @@ class UniformBand:
     Parameters
     ----------
     n_sliders
-        Sliders, without the elastic spring.
+        Number of sliders, without the elastic spring.
     half_width
-        Half of the band over the mean distance, above 0 and at most 1; 1: sliders from distance zero on.
+        Half-width of the band over the mean distance, above 0 and at most 1; 1: the band begins at zero.
     elastic_share
-        Share of the stiffness that never slips, 0 to below 1; the limit is that of the others.
+        Share of the stiffness that never slips, from 0 to below 1; the limit is that of the sliders.
 
     Raises
     ------
@@ -70,18 +70,18 @@ class UniformBand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FourParameter:
-    """Segalman's population (2005): ``ρ = R φ^chi`` up to φ_max and a group of sliders that break free there together.
+    """Segalman's population (2005): ``ρ = R φ^chi`` up to φ_max and a group of sliders that all break free at φ_max.
 
-    Two of the four parameters are stiffness and limit of the element.
+    The other two of the four parameters are stiffness and limit of the element.
 
     Parameters
     ----------
     chi
-        Exponent, above -1 and at most 0: energy lost in micro-slip grows with the power 3 + chi of the amplitude.
+        Exponent, above -1 and at most 0: energy dissipated in micro-slip grows with the power 3 + chi of the amplitude.
     beta
         Stiffness of the sliders at φ_max over that of all others, not negative.
     n_sliders
-        Sliders below φ_max, in cells that grow geometrically from φ_max / 1000.
+        Number of sliders below φ_max, in cells that grow geometrically from φ_max / 1000.
 
     Raises
     ------
@@ -108,20 +108,20 @@ class FourParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstLoading:
-    """Sliders of any first-loading curve, which slip one after the other at its corners (Segalman & Starr 2008).
+    """Sliders that reproduce a first-loading curve: they slip one after the other at its corners (Segalman & Starr 2008).
 
-    The curve begins at the origin; where it ends all have slipped, and the force stays. Only its shape counts: the element scales
+    The curve begins at the origin; at its end all sliders slip, and the force stays constant. Only its shape counts: the element scales
     it to its own stiffness and limit.
 
     Parameters
     ----------
     displacement, force
-        Corners of the curve after the origin, in any units; slopes fall from piece to piece.
+        Corners of the curve after the origin, in any units; slopes must decrease.
 
     Raises
     ------
     InputError
-        If the corners do not make such a curve.
+        If the corners do not form such a curve.
     """
 
     displacement: tuple[float, ...] = quantity("displacements of the corners after the origin")
@@ -146,7 +146,7 @@ class FirstLoading:
             )
 
     def _slopes(self) -> FloatArray:
-        """Slopes of the pieces."""
+        """Slopes of the curve between its corners."""
         force, displacement = np.array([0.0, *self.force]), np.array([0.0, *self.displacement])
         return np.asarray(np.diff(force) / np.diff(displacement))
 

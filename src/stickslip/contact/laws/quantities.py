@@ -7,7 +7,7 @@ from stickslip.units import quantity
 
 
 def tangential_stiffness(**given: Any) -> Any:
-    """Return the field of the stiffness along t; ``default=`` makes it optional, here and below."""
+    """Return the field of the stiffness along t; ``default=`` makes it optional, as in the functions below."""
     return _stiffness("tangent t", "tangential_stiffness", given)
 
 
@@ -39,7 +39,7 @@ def _stiffness(where: str, key: str, given: dict[str, Any]) -> Any:
 
 
 def check_not_negative(law: object, *names: str) -> None:
-    """Raise `InputError` if one of the named numbers of `law` is negative; None is not."""
+    """Raise `InputError` if one of the named numbers of `law` is negative; None is allowed."""
     for name in names:
         value = getattr(law, name)
         if value is not None and value < 0:

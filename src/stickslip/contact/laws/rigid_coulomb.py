@@ -18,16 +18,16 @@ class RigidCoulomb:
     """Set-valued Coulomb friction and Signorini's condition (Nacivet et al. 2003): the limit of `ElasticCoulomb` as it stiffens.
 
     Each tangent sticks without moving while its force stays below ``mu N``, and slips against ``mu N`` otherwise. The force is no
-    function of the gap, so that harmonic balance cannot evaluate it alone; `dynamic_lagrangian` solves for it.
+    function of the gap: harmonic balance cannot evaluate it, and `dynamic_lagrangian` solves for it.
 
     Parameters
     ----------
     mu
-        Friction coefficient, the same for both tangents, which do not feel each other.
+        Friction coefficient, the same for both tangents, which are independent.
     preload
-        None: the normal direction is rigid and unilateral, ``g + initial_gap >= 0``, ``N >= 0``, one of them zero, and N is what
-        equilibrium asks for. A preload then comes with the static load, or as interference. A number: a constant normal load N_0 presses
-        the contact whatever it does, the limit is ``mu N_0`` and the normal direction is left alone, N.
+        None: the normal direction is rigid and unilateral, ``g + initial_gap >= 0``, ``N >= 0``, one of them zero, and N follows from
+        equilibrium. A preload then comes with the static load, or as interference. A number: a constant normal load N_0 in N presses
+        the contact at all times, the limit is ``mu N_0``, and the normal direction is free.
     initial_gap
         Normal gap at zero displacement, m; negative for an interference.
 

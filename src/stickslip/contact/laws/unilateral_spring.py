@@ -58,7 +58,7 @@ class UnilateralSpring:
         return self.parameters()[None]
 
     def initial_state(self) -> FloatArray:
-        """Return the (2,) slider positions before t = 0; the law has no use for them."""
+        """Return the (2,) slider positions before t = 0, which this law does not use."""
         return slider_start(None)
 
     def stuck_stiffness(self) -> FloatArray:

@@ -58,7 +58,7 @@ def _place_of(course, x, y, limit):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def one_period(run, course, x, y, limit):  # type: ignore[no-untyped-def]
-    """Follow one period from the state that is there; its memory is the derivative of the place at the end by that at the start."""
+    """Follow one period from the present state; its memory is the derivative of the slider's place at the end by that at the start."""
     course.counts[:3] = 0
     memory, state = course.memory, course.state
     course.begun[:] = state
@@ -77,7 +77,7 @@ def one_period(run, course, x, y, limit):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def forgets(memory):  # type: ignore[no-untyped-def]
-    """Return the pseudo-inverse of ``1 - M``, and whether no direction keeps its memory."""
+    """Return the pseudo-inverse of ``1 - M``, M being the memory, and whether all directions forget their start."""
     a, b, c, d = 1.0 - memory[0, 0], -memory[0, 1], -memory[1, 0], 1.0 - memory[1, 1]
     inverse = np.zeros((2, 2))
     det = a * d - b * c
@@ -191,14 +191,14 @@ def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # ty
     run
         `course.run`.
     course
-        With its motion filled; its segments are those of the last period.
+        Course with its motion filled; on return its segments are those of the last period.
     correction
-        Out: (2,) what the place at the start of this period still lacks, small enough for derivatives to bridge.
+        Out: (2,) remaining error of the slider's place at the start of this period, small enough for a correction by derivatives.
     follow_rows, k, slope
-        `rows.follow_rows` and what it needs.
+        The function `sensitivities.follow_rows` and its arguments.
     rows
-        With `carries`: those of the place at the start of the first period, and on return those at the end of the last one. Steps of
-        Newton's method move them as they move the state.
+        With `carries`: derivatives of the place at the start of the first period, and on return at the end of the last one. Steps of
+        Newton's method change them as they change the state.
 
     Returns
     -------

@@ -263,7 +263,7 @@ def _shared(  # type: ignore[no-untyped-def]
     state,
     settled,
 ):
-    """Do the same as `_some` for all contacts, in `shares` that threads take in turn."""
+    """Evaluate all contacts as `_some` does, in `shares` that are distributed over threads."""
     n = gap.shape[0]
     for share in prange(shares):
         some = _some_at(some_address)
@@ -311,17 +311,17 @@ def planar_period(
     gap_coefficients
         (2H+1, 3 n) real coefficients of the gaps (t, w, n of each contact), m.
     elements
-        (n, 7) rows, see `contact.element`, of which both tangential stiffnesses are the same.
+        (n, 7) rows, see `contact.element`; both tangential stiffnesses of a row are equal.
     gap
-        (n, 3, samples) the gaps on samples where forces and states are wanted; there may be none.
+        (n, 3, samples) gaps on samples at which forces and states are returned; there may be no samples.
     pairs
-        Derivative blocks a contact, at least seven.
+        Number of derivative blocks of a contact, at least seven.
 
     Returns
     -------
     tuple
         (2H+1, 3 n) coefficients of the forces, N; (n, pairs, 2H+1, 2H+1) derivatives, N/m; (n, 3, samples) forces, N;
-        (n, 2, samples) states; contacts whose state does not repeat. All NaN, and open, where a gap is not finite or beyond 1e152 m.
+        (n, 2, samples) states; number of contacts whose state does not repeat. All forces are NaN, and states open, where a gap is not finite or beyond 1e152 m.
     """
     m, width = gap_coefficients.shape
     n = width // 3

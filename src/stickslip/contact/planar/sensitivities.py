@@ -50,7 +50,7 @@ _NODES_AT_ONCE = 16 * STAGES  # whose products are left to BLAS together
 
 
 class Rows(NamedTuple):
-    """Arrays of the derivatives, q = 3 m + 2."""
+    """Arrays of the derivatives by q = 3 m + 2 quantities."""
 
     place: FloatArray  # (2, q) of the slider's place
     angle: FloatArray  # (q,) of the angle of slip
@@ -153,7 +153,7 @@ def _to_slip(motion, angle, tau, k, rows):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def to_stick(motion, angle, tau, k, slope, rows):  # type: ignore[no-untyped-def]
-    """Turn the row of the angle into those of the place."""
+    """Convert the row of the angle into the rows of the place."""
     m = motion.waves.shape[1]
     _, _, limit = place(motion, tau)
     limit = max(limit, 0.0)
@@ -323,9 +323,9 @@ def _follow_slip(course, segment, k, slope, waiting, rows, adds):  # type: ignor
 
 @njit(cache=True, error_model="numpy")
 def follow_rows(course, k, slope, rows, adds):  # type: ignore[no-untyped-def]
-    """Carry the rows along the stored segments; with `adds` the integrals of the force and its rows are added to `sums`.
+    """Integrate the rows along the stored segments; with `adds`, add the integrals of the force and its rows to `sums`.
 
-    Where the first segment begins the period, `rows.place` holds the rows at its start, and those at its end on return.
+    If the first segment begins the period, `rows.place` holds the rows at its start, and on return the rows at its end.
     """
     waiting = np.int64(0)  # a literal would be compiled once more
     for i in range(course.counts[0]):

@@ -130,7 +130,7 @@ def linearise(at, angle, matrix, right):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def predict(width, kind, piece):  # type: ignore[no-untyped-def]
-    """Begin with the parabola of the piece before."""
+    """Start with the parabola of the previous piece."""
     slope, bend = piece.guess[0] * width, 0.5 * piece.guess[1] * width * width
     size = abs(slope) + abs(bend)
     share = 1.0 if size <= 1.0 else 1.0 / size
@@ -141,7 +141,7 @@ def predict(width, kind, piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def collocate(piece):  # type: ignore[no-untyped-def]
-    """Find θ at the stages of a piece whose motion is known, from what stands there; return whether Newton's method did."""
+    """Find θ at the stages of a piece whose motion is known, starting from the present values; return whether Newton's method converged."""
     for _ in range(_MOST_STEPS):
         linearise(piece.at, piece.angle, piece.matrix, piece.right)
         if not factorise(piece.matrix, piece.pivots):
@@ -159,7 +159,7 @@ def collocate(piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def remember_end(width, piece):  # type: ignore[no-untyped-def]
-    """Keep what the next piece begins with."""
+    """Store the start values of the next piece."""
     slope = bend = 0.0
     for i in range(STAGES + 1):
         slope += RATE[STAGES - 1, i] * piece.angle[i]
@@ -201,9 +201,9 @@ def slip_speed(piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def slip_ends(speed):  # type: ignore[no-untyped-def]
-    """Return the share of the piece after which slip ends, 2 where it goes on.
+    """Return the share of the piece at which slip ends, 2 if it continues.
 
-    The polynomial through the speed at the nodes is looked at on points between them, too.
+    The polynomial through the speed at the nodes is also evaluated at points between them.
     """
     left, f_left = 0.0, max(speed[0], TINY)
     for i in range(FINE):

@@ -18,7 +18,7 @@ _TIME_TOLERANCE = 1e-8
 
 @njit(**INNER)
 def never_reached(motion, z_x, z_y):  # type: ignore[no-untyped-def]
-    """Whether bounds alone tell that the force of a spring whose slider is at z stays inside the limit for ever."""
+    """Whether bounds prove that the force of a spring with its slider at z stays below the limit for ever."""
     bounds = motion.bounds
     reach = np.hypot(motion.waves[X, 0] - z_x, motion.waves[Y, 0] - z_y) + bounds[0]
     return reach <= motion.waves[L, 0] - (bounds[4] - abs(motion.waves[L, 0]))
@@ -77,12 +77,12 @@ def _below(gap, slope, bend, third):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def slip_begins(motion, z_x, z_y, tau, end, after_slip):  # type: ignore[no-untyped-def]
-    """Return when a contact that sticks from `tau` on reaches its limit; `end` if it does not before.
+    """Return the time at which a contact that sticks from `tau` on reaches its limit; `end` if it does not.
 
     Parameters
     ----------
     motion
-        Of the contact.
+        Motion under the contact.
     z_x, z_y
         Place of its slider, in units of force.
     tau, end

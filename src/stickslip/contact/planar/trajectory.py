@@ -46,7 +46,7 @@ _BRIEF = 10.0  # pieces shorter than 1 / 10 have as much less weight
 
 
 class Course(NamedTuple):
-    """Arrays that the course of a contact is written on."""
+    """Arrays that store the course of a contact."""
 
     motion: Motion
     piece: Piece
@@ -60,9 +60,9 @@ class Course(NamedTuple):
 
 @njit(**INNER)
 def course_room(m):  # type: ignore[no-untyped-def]
-    """Allocate for polynomials of `m` coefficients.
+    """Allocate a `Course` for polynomials of `m` coefficients.
 
-    A limit has 2 H zeros at most, and each end of an interval may need pieces that shrink to nothing.
+    A limit has at most 2 H zeros, and each end of an interval may need ever shorter pieces.
     """
     order = (m - 1) // 2
     return Course(
@@ -127,7 +127,7 @@ def _start_to_slip(course, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def stop_slipping(course, tau):  # type: ignore[no-untyped-def]
-    """Turn the state from slip to stick: the slider rests where it is."""
+    """Change the state from slip to stick: the slider rests at its present place."""
     x, y, limit = place(course.motion, tau)
     state, memory = course.state, course.memory
     limit = max(limit, 0.0)
@@ -279,7 +279,7 @@ def _slip(course, tau, end, origin, opens, widest):  # type: ignore[no-untyped-d
 
 @njit(cache=True, error_model="numpy")
 def run(course, tau, end, origin):  # type: ignore[no-untyped-def]
-    """Follow the closed contact from `tau` to `end`; segments and pieces are appended, state and memory are those at the end."""
+    """Follow the closed contact from `tau` to `end`: append segments and pieces, and set state and memory at the end."""
     motion, state, counts, segments = course.motion, course.state, course.counts, course.segments
     widest = WIDEST / max((motion.waves.shape[1] - 1) // 2, 1)
     at_limit = opens = origin == CLOSED

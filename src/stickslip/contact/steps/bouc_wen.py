@@ -65,7 +65,7 @@ def loaded(y, u, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def unloaded(y, u, n, r):  # type: ignore[no-untyped-def]
-    """Solve ``dy/du = -(1 + r yⁿ)`` from y in [0, 1] over u >= 0; where y reaches zero, return it with what is left of u."""
+    """Solve ``dy/du = -(1 + r yⁿ)`` from y in [0, 1] over u >= 0; return y and, if it reaches zero, the rest of u."""
     way = _way_down(y, n, r)
     if u >= way:
         return 0.0, u - way

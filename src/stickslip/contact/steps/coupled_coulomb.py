@@ -58,16 +58,16 @@ def _away_from(half, left):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
-    """Turn the direction e by ``e' = b - (e·b) e`` over the time one.
+    """Integrate ``e' = b - (e·b) e`` for the direction e over the time 1.
 
     Returns
     -------
     e_t, e_w
-        The direction behind.
+        The direction at the end.
     kept
-        Derivative of its angle by the angle before.
+        Derivative of its angle by the initial angle.
     g_t, g_w
-        Derivative of its angle by b.
+        Derivatives of its angle by b.
     """
     size = math.hypot(b_t, b_w)
     if size < FAINT:
@@ -114,14 +114,14 @@ def _pull(k_t, k_w, e_t, e_w, way_t, way_w, rise):  # type: ignore[no-untyped-de
 
 @njit(cache=True, error_model="numpy")
 def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-untyped-def]
-    """Turn the direction of a slipping force over a straight way, while its size goes from `first` to `last`, both positive.
+    """Integrate the direction of a slipping force over a straight displacement, while its size changes from `first` to `last`, both positive.
 
     Returns
     -------
     e_t, e_w
-        The direction behind.
+        The direction at the end.
     kept, q_t, q_w, q_first, q_last
-        Derivatives of its angle by the angle before, the way and both sizes.
+        Derivatives of its angle by the initial angle, the displacement and both sizes.
     """
     mean, mean_first, mean_last = _inverse_mean(first, last, 1.0)
     if k_t == k_w:
@@ -156,14 +156,14 @@ def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-u
 
 @njit(cache=True, error_model="numpy")
 def grown(k_t, k_w, way_t, way_w, last):  # type: ignore[no-untyped-def]
-    """Return the direction of a force that grows from nothing over a straight way, slipping, to the size `last`.
+    """Return the direction of a force that grows from zero to the size `last` in slip over a straight displacement.
 
     Returns
     -------
     e_t, e_w
         The direction.
     q_t, q_w, q_last
-        Derivatives of its angle by the way and the size.
+        Derivatives of its angle by the displacement and the size.
     """
     multiplier = 0.0
     for _ in range(_MAX_STEPS):
