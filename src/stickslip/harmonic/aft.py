@@ -36,8 +36,8 @@ class ContactPeriod:
     unsettled
         Contacts whose state did not become periodic.
     events
-        From which the forces of more harmonics follow by `forces_between`; None where they are not known: of contacts on samples
-        or marched, and where samples were asked for.
+        State changes, from which `forces_between` gives the forces of more harmonics. None for contacts that are evaluated on samples
+        or marched, and where samples were requested.
     """
 
     coefficients: FloatArray
@@ -87,10 +87,10 @@ def contact_forces(
     samples
         Samples per period; at least 8 H keeps aliasing below the truncation error. Exact events need them for display only.
     omega
-        Frequency in rad/s; only laws that depend on velocity ask for it.
+        Frequency in rad/s; only laws that depend on velocity need it.
     history
-        Whether gaps, forces and states over the period are asked for, too: exact events do without them, and are then returned
-        with no samples.
+        Whether gaps, forces and states over the period are returned, too. If not, exact events are evaluated
+        without samples.
     """
     gap_coefficients = np.asarray(gap_coefficients, dtype=float)
     m = gap_coefficients.shape[0] if gap_coefficients.ndim else 0
@@ -177,14 +177,14 @@ def _planar(gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledCon
 
 
 def forces_between(events: Events, contacts: CompiledContacts, order: int) -> ContactPeriod:
-    """Return forces and derivatives up to `order` at a motion with fewer harmonics whose events are known, without samples.
+    """Return forces and derivatives up to `order` for a motion with fewer harmonics and known events, without samples.
 
     Parameters
     ----------
     events
-        All events of that motion, from `ContactPeriod.events`.
+        All events of the motion, from `ContactPeriod.events`.
     contacts
-        The laws with which they were found.
+        The laws with which the events were found.
     order
         Highest harmonic, at least that of the motion.
     """

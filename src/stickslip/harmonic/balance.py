@@ -32,7 +32,7 @@ JacobianForm = Literal["auto", "dense", "structured"]
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Residual and derivatives at one state, all scaled, and the time the contacts took; derivatives may be computed when they are asked for."""
+    """Scaled residual and derivatives at one state, and the time of the contact evaluation; derivatives may be computed at first use."""
 
     residual: FloatArray  # (size,)
     by_x: FloatArray | StructuredJacobian | Callable[[], FloatArray]
@@ -80,7 +80,7 @@ class HarmonicBalance:
 
     @property
     def springs(self) -> Interface:
-        """What stands for the contacts where nothing slips or opens."""
+        """The interface, which gives the stiffness where no contact slips or opens."""
         return self.interface
 
     @cached_property
@@ -95,7 +95,7 @@ class HarmonicBalance:
 
     @cached_property
     def structured(self) -> bool:
-        """Whether the Jacobian is given by its products; without harmonics it is an array, unless nothing is condensed."""
+        """Whether the Jacobian is given by its products; with the static term alone it is an array, unless nothing is condensed."""
         large = self.large if self.jacobian == "auto" else self.jacobian == "structured"
         return large and (self.order > 0 or isinstance(self.linear, SparseStiffness))
 
@@ -107,21 +107,21 @@ class HarmonicBalance:
 
     @cached_property
     def reduced(self) -> bool:
-        """Whether a Jacobian whose systems are solved as arrays is given by its parts, for the solver to leave out what rests."""
+        """Whether a Jacobian that is solved as an array is given by its parts, so that the solver can eliminate unknowns of stuck contacts."""
         return self.jacobian == "auto" and self.order > 0 and self.size >= REDUCED
 
     @cached_property
     def large(self) -> bool:
-        """Whether products cost less than an array, where none was asked for."""
+        """Whether products cost less than an array, for ``jacobian="auto"``."""
         return self.jacobian != "dense" and products_pay(self._costs)
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
-        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""
+        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros for harmonics that are not kept."""
         rows = x.reshape(self.n_rows, self.linear.n)
         return complex_rows(rows, self.harmonics) * self.displacement_scale
 
     def unknowns(self, coefficients: ComplexArray) -> FloatArray:
-        """Return the scaled unknowns of complex `coefficients` (H+1, n), padded or cut to the harmonics kept."""
+        """Return the scaled unknowns of complex `coefficients` (H+1, n), padded or cut to the kept harmonics."""
         return real_rows(coefficients, self.harmonics).reshape(-1) / self.displacement_scale
 
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
@@ -138,10 +138,10 @@ class HarmonicBalance:
         return gaps
 
     def forces(self, x: FloatArray, omega: float, events: Events | None = None) -> ContactPeriod:
-        """Return what the equations ask of the contacts: coefficients and derivatives, of the harmonics kept.
+        """Return the contact forces for the equations: coefficients and derivatives in the kept harmonics.
 
-        Contacts are not evaluated where the `events` of this motion are known from an evaluation with fewer harmonics
-        (`Linearisation.events`): they are integrated once more.
+        If the `events` of this motion are known from an evaluation with fewer harmonics (`Linearisation.events`), forces are
+        integrated between them, without another evaluation of the contacts.
         """
         if events is None:
             gaps = self._gaps(x)
@@ -158,7 +158,7 @@ class HarmonicBalance:
     def linearise(self, x: FloatArray, omega: float, period: ContactPeriod | None = None) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s).
 
-        Contacts are not evaluated where their `period` at `x` is known, from `forces`.
+        Contacts are not evaluated if their `period` at `x` is given, from `forces`.
         """
         start = perf_counter()
         if period is None:
@@ -189,11 +189,11 @@ class HarmonicBalance:
         return rows.reshape(-1) / self.force_scale
 
     def scaled_forces(self, contacts: FloatArray) -> FloatArray:
-        """Return the (size,) scaled equations' share of contact forces with the coefficients (m, 3 n_contacts), N."""
+        """Return the (size,) part of contact forces in the scaled equations, from their coefficients (m, 3 n_contacts), N."""
         return self._with_forces(np.zeros((self.n_rows, self.linear.n)), contacts)
 
     def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
-        """Return the (size,) scaled residual from contacts whose `period` is known: without condensed matrices, if it can be."""
+        """Return the (size,) scaled residual from contacts with a known `period`, without condensed matrices if possible."""
         direct = known_by_vectors(self.linear)
         if direct is None or self.large or self.structured:
             return self.linearise(x, omega, period).residual
@@ -210,9 +210,9 @@ class HarmonicBalance:
         return self._linear_force(x, omega).reshape(-1) / self.force_scale
 
     def by_mass_damping(self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]) -> FloatArray:
-        """Return the (size,) derivative of the scaled residual by a rate, 1/s, of damping in proportion to the `mass` of each harmonic.
+        """Return the (size,) derivative of the scaled residual by the rate, 1/s, of a damping proportional to the `mass` of each harmonic.
 
-        Where no products with vectors give it, the motion is spread over all dofs, and the force of their mass is condensed as a load is.
+        If products with vectors cannot give it, the motion is expanded to all dofs, and its inertia force is condensed like a load.
         """
         direct = known_by_vectors(self.linear)
         if direct is not None:
@@ -271,7 +271,7 @@ class HarmonicBalance:
         return products(self.linear, self.harmonics, omega).load
 
     def linear_block(self, omega: float, harmonic: int) -> Matrix:
-        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will; sparse where nothing is condensed."""
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), as a copy; sparse if nothing is condensed."""
         return products(self.linear, self.harmonics, omega).block(harmonic)
 
     def with_order(self, order: int) -> "HarmonicBalance":
@@ -302,19 +302,19 @@ def harmonic_balance(
     interface
         Contacts on the dofs of the whole structure.
     order
-        Highest harmonic, or those that are kept; the static term is always kept.
+        Highest harmonic, or a list of the kept ones; the static term is always kept.
     samples
         Samples per period of the contact forces.
     evaluator
-        How piecewise-linear laws are evaluated: by ``intervals`` of the samples, at exact ``events``, or as all others by a ``march``.
+        Evaluator of piecewise-linear laws: ``intervals`` of the samples, exact ``events``, or a ``march``, as for all other laws.
     jacobian
-        Its form: an array (``dense``), products (``structured``, for a Krylov method), or what costs less at this size (``auto``).
+        Form of the Jacobian: an array (``dense``), products (``structured``, for a Krylov method), or the cheaper one at this size (``auto``).
 
     Raises
     ------
     InputError
-        If the contacts touch dofs that are not retained, the load excites a harmonic above `order`, there are fewer than four samples a
-        harmonic, or no such evaluator or form.
+        If contacts act on dofs that are not retained, the load excites a harmonic above `order`, there are fewer than four samples a
+        harmonic, or the evaluator or form is unknown.
     """
     harmonics = harmonics_of(order, "order")
     _check_load(linear.load, harmonics)
@@ -348,7 +348,7 @@ def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
 
 
 def check_retained(place: str, linear: DynamicStiffness, interface: Interface) -> None:
-    """Raise `InputError` unless all dofs that the contacts touch are retained."""
+    """Raise `InputError` unless all dofs on which contacts act are retained."""
     missing = np.setdiff1d(interface.coordinates(), linear.retained)
     if missing.size:
         raise input_error(place, f"contact dofs {missing[:5].tolist()} are not retained", "Retain all contact dofs.")

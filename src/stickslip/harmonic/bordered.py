@@ -24,20 +24,20 @@ WANDERED = 3.0  # |ln(ω / scale)| at which a corrector has lost what it was loo
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What extra unknowns and the parameter decide: the periodic problem and its frequency.
+    """The periodic problem and its frequency, as functions of extra unknowns and the parameter.
 
     Attributes
     ----------
     balance
         The periodic problem.
     omega
-        Frequency, rad/s; NaN where the extra unknowns are out of bounds.
+        Frequency, rad/s; NaN if the extra unknowns are out of bounds.
     slopes
-        (m,) derivative of `omega` by the extra unknowns; those for which it is zero change the balance.
+        (m,) derivative of `omega` by the extra unknowns; zero for unknowns that change the balance.
     linear_alone
-        Whether they change nothing of it but its linear forces.
+        Whether extra unknowns change only the linear forces of the balance.
     by_level
-        Derivative (size,) of the balance by the extra unknown that is no frequency, as a function of the state, where it is known.
+        Derivative (size,) of the balance by the extra unknown other than the frequency, as a function of the state; None if unknown.
     """
 
     balance: HarmonicBalance
@@ -52,7 +52,7 @@ Settings = Callable[[FloatArray, float], Setting]  # of the extra unknowns (m,) 
 
 
 def unknown_frequency(family: BalanceAt, scale: float) -> Settings:
-    """Return what decides a problem whose one extra unknown is ``ln(ω / scale)``, `scale` in rad/s, and whose parameter is that of `family`."""
+    """Return the settings of a problem whose only extra unknown is ``ln(ω / scale)``, `scale` in rad/s, with the parameter of `family`."""
 
     def setting(extra: FloatArray, p: float) -> Setting:
         near = abs(extra[0]) < WANDERED
@@ -63,31 +63,31 @@ def unknown_frequency(family: BalanceAt, scale: float) -> Settings:
 
 
 class Condition(Protocol):
-    """One equation beside the balance, of the motion and the extra unknowns."""
+    """An additional equation for the motion and the extra unknowns."""
 
     def value(self, state: "State") -> float:
-        """Return what is zero where the condition holds; infinite where it cannot be said."""
+        """Return the residual of the condition; infinite if it is undefined."""
         ...
 
     def gradient(self, state: "State") -> FloatArray:
-        """Return the (size + m,) derivative of the value by the unknowns of the balance and the extra ones."""
+        """Return the (size + m,) derivative of the value by the unknowns of the balance and the extra unknowns."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A bordered problem at one state, as its conditions see it.
+    """A bordered problem at one state, as the argument of its conditions.
 
     Attributes
     ----------
     problem
         The bordered problem.
     y
-        (size + m,) unknowns of the balance and the extra ones.
+        (size + m,) unknowns of the balance and extra unknowns.
     p
         Parameter.
     setting
-        The balance and its frequency there.
+        The balance and its frequency at this state.
     """
 
     problem: "PeriodicProblem"
@@ -112,12 +112,12 @@ class State:
 
     @cached_property
     def residual(self) -> FloatArray:
-        """(size,) residual of the balance; derivatives wait until they are asked for."""
+        """(size,) residual of the balance; derivatives are computed at first use."""
         return self.setting.balance.residual(self.x, self.setting.omega, self._contacts[0])
 
     @property
     def seconds_contact(self) -> float:
-        """Time that the contacts took."""
+        """Time of the contact evaluation."""
         return self._contacts[1]
 
     @cached_property
@@ -129,7 +129,7 @@ class State:
 
     @cached_property
     def columns(self) -> FloatArray:
-        """(size, m) derivatives of the balance by the extra unknowns: exact by the frequency, else central differences."""
+        """(size, m) derivatives of the balance by the extra unknowns: exact for the frequency, central differences for the others."""
         own = [
             slope * self.at.jac_p if slope != 0.0 else self._by_level(place)
             for place, slope in enumerate(self.setting.slopes)
@@ -142,7 +142,7 @@ class State:
         return self.by_extra(place, State.changed_residual) if known is None else known(self)
 
     def changed_residual(self) -> FloatArray:
-        """Return the residual of the balance, without what extra unknowns do not change."""
+        """Return the residual of the balance without the terms that extra unknowns do not change."""
         balance, omega = self.setting.balance, self.setting.omega
         if self.setting.linear_alone:
             return balance.linear_residual(self.x, omega)
@@ -150,14 +150,14 @@ class State:
 
     @cached_property
     def inverse(self) -> Inverse | None:
-        """How systems are solved with ``[J, ∂r/∂z; row]``, z the first extra unknown and `row` that of the problem; None if it is singular."""
+        """Solver of systems with ``[J, ∂r/∂z; row]``, z being the first extra unknown and `row` that of the problem; None if singular."""
         n = self.x.size
         row = np.eye(1, n + 1, n)[0] if self.problem.row is None else self.problem.row
         return self.problem.invert(Bordered(self.at.jac, self.columns[:, 0], row[:n], float(row[n])))
 
     @cached_property
     def along(self) -> FloatArray | None:
-        """(size + 1,) how the motion and the first extra unknown go on together, to where its product with the row is 1; None if it is unknown."""
+        """(size + 1,) tangent of the motion and the first extra unknown, scaled so that its product with the row is 1; None if undetermined."""
         n = self.x.size
         return None if self.inverse is None else self.inverse(np.eye(1, n + 1, n)[0])
 
@@ -178,21 +178,21 @@ class State:
 class PeriodicProblem:
     """A periodic problem with extra unknowns and as many conditions; an equation in a parameter.
 
-    The unknowns y are those of the balance and the extra ones; the residual is that of the balance and the values of the conditions.
+    The unknowns y are those of the balance and the extra unknowns; the residual consists of the balance and the values of the conditions.
 
     Parameters
     ----------
     settings
-        Balance and frequency from the extra unknowns and the parameter.
+        Function from the extra unknowns and the parameter to balance and frequency.
     conditions
         One for each extra unknown.
     invert
-        How systems with a Jacobian are solved that conditions ask for, None for a singular one; its accuracy is theirs.
+        Function from a Jacobian to a solver for the systems of the conditions, None if singular; it limits the accuracy of the conditions.
     row
-        (size + 1,) what closes the equations of the tangent of the motion and the first extra unknown; None: that unknown grows by one, which
-        it cannot at a fold.
+        (size + 1,) last row of the equations of the tangent of the motion and the first extra unknown. None: this unknown grows by one, which
+        is impossible at a fold.
     by_parameter
-        Derivative of all equations by the parameter at a state, where it is known; None: a central difference.
+        Function from a state to the derivative of all equations by the parameter; None: a central difference.
     """
 
     settings: Settings
@@ -221,14 +221,14 @@ class PeriodicProblem:
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """The equations at one state; their derivatives are computed when they are asked for, which for a trial that is not accepted they never are.
+    """The equations at one state; derivatives are computed at first use, and so never for rejected trials.
 
     Parameters
     ----------
     state
-        Where.
+        The state.
     values
-        (m,) of the conditions.
+        (m,) values of the conditions.
     """
 
     state: State

@@ -27,7 +27,7 @@ Inner = ComplexArray | tuple[InnerOne, ...]  # an array: diagonals
 
 
 class Interiors(Protocol):
-    """Something at one frequency that knows the dynamic stiffness of its interior."""
+    """Protocol of objects at one frequency with the dynamic stiffness of their interior."""
 
     @property
     def omega(self) -> float: ...  # noqa: D102
@@ -76,7 +76,7 @@ class CondensedProduct:
 
     @cached_property
     def transposed(self) -> "CondensedProduct":
-        """The product with the transposed Z; itself where damping is symmetric."""
+        """The structure with transposed Z; the same object if the damping is symmetric."""
         if self.linear.ln is None:
             return self
         sizes = (self.n, self.linear.ll[0].shape[0])
@@ -108,14 +108,14 @@ class CondensedProduct:
         return np.asarray(with_contacts(own, springs, rows))
 
     def mass_product(self, vectors: FloatArray) -> FloatArray:
-        """Return the mass times `vectors` (n, k), the interior, whose stiffness is one, following them statically."""
+        """Return the mass times `vectors` (n, k), with the static response of the interior, whose stiffness is one."""
         k, _, m = self.linear.nl
         moved = k.T @ vectors
         inner = m.T @ vectors - self.linear.ll[2] @ moved
         return np.asarray(self.linear.nn[2] @ vectors - m @ moved - k @ inner)
 
     def projected(self, vectors: FloatArray) -> "CondensedProduct":
-        """Return the same seen from motions of the retained coordinates alone, the columns of `vectors` (n, k), without a load."""
+        """Return the products projected on motions of the retained coordinates, the columns of `vectors` (n, k), without a load."""
         own, none = self.linear, np.zeros((len(self.load), vectors.shape[1]))
 
         def near(matrix: FloatArray) -> FloatArray:
@@ -135,7 +135,7 @@ class CondensedProduct:
         return replace(self, linear=seen, load=none, load_slope=none)
 
     def moved_to(self, other: "Interiors") -> "CondensedProduct":
-        """Return the same at the frequency of `other`, which has the same interior."""
+        """Return the products at the frequency of `other`, which has the same interior."""
         if self.omega == other.omega:
             return self
         return replace(self, omega=other.omega, frequencies=other.frequencies, inner=other.inner)
@@ -169,13 +169,13 @@ def at_frequency(
     Parameters
     ----------
     linear
-        Its matrices, the interior in modes.
+        Matrices of the structure, the interior in modes.
     load
         Complex amplitudes on the retained coordinates (H+1, n) and on the modes of the interior (H+1, l), N.
     omega
         Frequency, rad/s.
     harmonics
-        The harmonics, growing from 0.
+        The harmonics, ascending from 0.
     """
     frequencies = omega * by_row(harmonics)
     near, inner_load = (real_rows(part, harmonics) for part in load)
@@ -289,7 +289,7 @@ def by_row(harmonics: Harmonics) -> FloatArray:
 
 
 def by_omega(slope: FloatArray, harmonics: Harmonics) -> FloatArray:
-    """Turn a derivative by the frequency ``hω`` of each row into one by ω."""
+    """Convert a derivative by the frequency ``hω`` of each row into the derivative by ω."""
     return np.asarray(by_row(harmonics) * slope)
 
 

@@ -35,11 +35,11 @@ def linear_costs(coordinates: int, harmonics: int, derivatives: int, sparse: int
     coordinates
         Retained coordinates.
     harmonics
-        Their number, the static one counted.
+        Number of harmonics, including the static one.
     derivatives
-        Numbers that the derivatives of all contact forces consist of.
+        Number of entries of the derivatives of all contact forces.
     sparse
-        Entries of the sparse stiffness, where nothing is condensed and one factor serves all harmonics; 0: arrays.
+        Number of entries of the sparse stiffness, if nothing is condensed and one factor serves all harmonics; 0: arrays.
     shared
         Whether one real factor serves all harmonics of condensed matrices.
     """
@@ -67,21 +67,21 @@ def _array(unknowns: int) -> float:
 
 
 def products_pay(costs: Costs) -> bool:
-    """Whether a Jacobian is worth having by its products; the solver decides anew for each of them."""
+    """Whether a Jacobian is worth keeping by its products; the solver decides for each Jacobian."""
     return costs.products_pay
 
 
 def reduced_cost(coordinates: int, kept: IntArray, *, known: bool) -> float:
-    """Estimate the seconds of a system that is solved by an array without what rests.
+    """Estimate the seconds of a system that is solved as an array after elimination of the unknowns of stuck contacts.
 
     Parameters
     ----------
     coordinates
         Retained coordinates.
     kept
-        (H+1,) those of each harmonic that do not rest.
+        (H+1,) number of coordinates of each harmonic that are not eliminated.
     known
-        Whether what rests was eliminated at this frequency before.
+        Whether the same unknowns were eliminated at this frequency before.
     """
     own = RESTING_CALL + _array(int(2 * kept.sum() - kept[0]))
     if known:

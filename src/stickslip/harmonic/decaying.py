@@ -22,7 +22,7 @@ class DecayingStiffness:
     Parameters
     ----------
     steady
-        The same for steady motions.
+        The condensed structure for steady motions.
     rate
         β, 1/s; negative where the motion grows.
     """
@@ -42,7 +42,7 @@ class DecayingStiffness:
 
     @property
     def nn(self) -> Blocks:
-        """Stiffness, damping and mass on the retained coordinates; for scales."""
+        """Stiffness, damping and mass on the retained coordinates, for scaling."""
         return self.steady.nn
 
     @property
@@ -72,7 +72,7 @@ class DecayingStiffness:
         return self.steady.condensed(self._at(omega), order)
 
     def products(self, omega: float, harmonics: Harmonics) -> MatrixProducts:
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         return MatrixProducts(self.condensed(omega, harmonics[-1]).kept(list(harmonics)), harmonics)
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
@@ -84,7 +84,7 @@ class DecayingStiffness:
         return self.steady.recover_change(self._at(omega), dq)
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         return self.steady.output_rows(self._at(omega), harmonic, dofs)
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:

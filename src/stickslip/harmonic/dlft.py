@@ -44,9 +44,9 @@ class Penalty:
 def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penalty:
     """Return the geometric mean over the harmonics of ``1 / (h |H(hω)|)``, H being the compliance seen by a force along a coordinate.
 
-    The velocity by τ = ωt has the h-fold amplitude of the displacement: a penalty of that size answers a sliding as the structure answers
-    the force that stops it. It does not depend on the coordinates in which the structure is written, and changes smoothly with ω.
-    The mean of h itself is taken as (order + 1) / e, to which it tends: logarithms of the order would spoil an extrapolation in it.
+    The velocity by τ = ωt has h times the amplitude of the displacement: with this penalty, sliding causes the force with which the structure
+    would respond. The penalty does not depend on the coordinates of the structure, and changes smoothly with ω.
+    The geometric mean of h is replaced by its limit (order + 1) / e: logarithms of the order would spoil an extrapolation in the order.
 
     Parameters
     ----------
@@ -72,9 +72,9 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
 
 @dataclass(frozen=True, eq=False)
 class DynamicLagrangian:
-    """The periodic problem with rigid contacts; `HarmonicBalance` carries the linear side and the contacts that have a stiffness.
+    """The periodic problem with rigid contacts; a `HarmonicBalance` contains the linear side and the contacts with stiffness.
 
-    Scaled like it and solved like it. Build it with `dynamic_lagrangian`.
+    Scales and solvers are those of `HarmonicBalance`. Build it with `dynamic_lagrangian`.
     """
 
     balance: HarmonicBalance
@@ -85,12 +85,12 @@ class DynamicLagrangian:
 
     @property
     def harmonics(self) -> Harmonics:
-        """Harmonics kept: all up to the highest."""
+        """Kept harmonics: all up to the highest."""
         return self.balance.harmonics
 
     @property
     def compiled(self) -> CompiledContacts:
-        """The contacts that have a stiffness."""
+        """The contacts with stiffness."""
         return self.balance.compiled
 
     @cached_property
@@ -100,7 +100,7 @@ class DynamicLagrangian:
 
     @cached_property
     def springs(self) -> Interface:
-        """What stands for the contacts where nothing slips or opens: springs, stiff ones for rigid contacts."""
+        """The interface with springs, stiff ones for rigid contacts: the contacts where none slips or opens."""
         stiffness = np.abs(np.diagonal(self.linear.nn[0]))[self.interface.coordinates()]
         return self.interface.sprung(STIFF * float(stiffness.max()))
 
@@ -142,7 +142,7 @@ class DynamicLagrangian:
         return self.balance.linear_load(omega)
 
     def linear_block(self, omega: float, harmonic: int) -> Matrix:
-        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), as a copy."""
         return self.balance.linear_block(omega, harmonic)
 
     def with_harmonics(self, harmonics: Harmonics) -> "DynamicLagrangian":
@@ -328,22 +328,22 @@ def dynamic_lagrangian(
     linear
         Condensed structure and load.
     interface
-        Contacts on the dofs of the whole structure; each gap of a rigid one must be a retained coordinate, times a factor.
+        Contacts on the dofs of the whole structure; each gap of a rigid contact must be a factor times a retained coordinate.
     order
         Highest harmonic.
     samples
-        Samples per period. With ``2 order + 1``, as many as there are coefficients, the laws hold exactly at the samples, and nothing
-        depends on the penalty; with more, eight a harmonic and up, the answer is more accurate and depends on it by less than the
-        error that the missing harmonics make.
+        Samples per period. With ``2 order + 1``, as many as there are coefficients, the laws hold exactly at the samples, and the solution
+        does not depend on the penalty. With eight a harmonic and more, the solution is more accurate, and its dependence on the penalty is
+        smaller than the error by missing harmonics.
     penalty
-        Penalty ε of the method (N/m); None: for each gap what the structure holds against it at the frequency, see `dynamic_penalty`.
+        Penalty ε of the method (N/m); None: the dynamic stiffness of the structure at each gap, see `dynamic_penalty`.
     evaluator
-        Of the contacts that have a stiffness; see `harmonic_balance`.
+        Evaluator of the contacts with stiffness; see `harmonic_balance`.
 
     Raises
     ------
     InputError
-        If no contact is rigid, or a gap of one is no coordinate, or there are fewer samples than coefficients.
+        If no contact is rigid, a gap of a rigid contact is no coordinate, or there are fewer samples than coefficients.
     """
     rigid = np.array([i for i, law in enumerate(interface.laws) if isinstance(law, Rigid)], dtype=np.int64)
     if not rigid.size:

@@ -38,7 +38,7 @@ class Condensed:
     load_derivative: ComplexArray  # (H+1, n), by ω
 
     def kept(self, harmonics: list[int]) -> "Condensed":
-        """Return those of some harmonics."""
+        """Return the matrices of some harmonics."""
         own = (self.stiffness, self.derivative, self.load, self.load_derivative)
         return Condensed(*(a[harmonics] for a in own))
 
@@ -83,7 +83,7 @@ class CondensedStiffness:
         """Highest harmonic for which there are matrices: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N: the same at all."""
+        """Return the load, N, which is the same at all frequencies."""
         return self.load
 
     def with_load(self, load: HarmonicLoad) -> "CondensedStiffness":
@@ -91,7 +91,7 @@ class CondensedStiffness:
         return replace(self, load=load)
 
     def with_mass_damping(self, rate: float) -> "CondensedStiffness":
-        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; the rate may be negative."""
         nn, nl, ll = (_mass_damped(blocks, rate) for blocks in (self.nn, self.nl, self.ll))
         back = None if self.ln is None else _mass_damped(self.ln, rate)
         interior = Interior(nn, nl, ll, self.diagonal, back, self.loss)
@@ -104,7 +104,7 @@ class CondensedStiffness:
         return self._factorised(omega, order) if sums is None else self._summed(sums, omega, order)
 
     def products(self, omega: float, harmonics: Harmonics) -> CondensedProduct:
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         return at_frequency(self.spectral, self.modal_loads(harmonics[-1]), omega, harmonics)
 
     def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
@@ -145,7 +145,7 @@ class CondensedStiffness:
         return _dynamic(self.spectral.far, s, self.loss and self.loss[1])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
-        """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (eq. 5 with the sign mended).
+        """Return the (H+1, n_all) coefficients of every dof from those of the retained coordinates (eq. 5 with corrected sign).
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class CondensedStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], self.interior.size), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         place = np.full(self.retained.size + self.interior.size, -1)
         place[self.retained] = np.arange(self.n)
         rows = np.zeros((dofs.size, self.n), dtype=complex)
@@ -271,14 +271,14 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     structure
         Reduced or lumped structure; mass, stiffness and loss must be symmetric, damping may have Coriolis terms.
     retained
-        Dof indices that stay unknown: contact coordinates and free rigid bodies.
+        Retained dofs, the unknowns: contact coordinates and free rigid bodies.
     load
         Load on all dofs of the structure, N.
 
     Raises
     ------
     InputError
-        If a matrix is not real, one but the damping not symmetric, `retained` are not different dofs, the interior is too large, or it can move freely.
+        If a matrix is not real, a matrix other than the damping is not symmetric, `retained` has repeated dofs, or the interior is too large or can move freely.
     """
     if load.static.size != structure.n:
         raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")

@@ -23,21 +23,21 @@ PARALLEL = 1e-9  # of a load, that may differ from a multiple of the line's own
 class TurningStiffness:
     """A structure or wheel and its load along an engine-order line, seen from the retained coordinates; `condense_line` makes one.
 
-    Every value is that of the speed ``ω / m`` alone. Derivatives by ω contain that of the matrices by the speed, by a difference: they
-    give branches their direction, no solution depends on them.
+    All values belong to the speed ``ω / m``. Derivatives by ω include the derivative of the matrices by the speed, a finite difference: they
+    determine the direction of branches, but no solution.
 
     Parameters
     ----------
     line
-        What vibrates.
+        The structure or wheel along the line.
     retained
-        Dofs that stay unknown.
+        Retained dofs, the unknowns.
     order
-        Highest harmonic that is condensed.
+        Highest condensed harmonic.
     factors
         Harmonic -> factor on the load of the line.
     rate
-        Of the mass that stands in the damping in addition, 1/s.
+        Rate, 1/s, times which the mass is added to the damping.
     """
 
     line: SpeedLine
@@ -59,7 +59,7 @@ class TurningStiffness:
 
     @property
     def nn(self) -> Blocks:
-        """Stiffness, damping and mass on the retained coordinates at the highest speed; for scales."""
+        """Stiffness, damping and mass on the retained coordinates at the highest speed, for scaling."""
         return self._at_speed(float(self.line.speeds[-1])).nn
 
     @property
@@ -72,12 +72,12 @@ class TurningStiffness:
         return self._load(self.line.speed(omega))
 
     def with_load(self, load: HarmonicLoad) -> "TurningStiffness":
-        """Return the same under multiples of its loads.
+        """Return the same structure under multiples of its loads.
 
         Raises
         ------
         InputError
-            If a load is no multiple of that at the highest speed.
+            If a load is no multiple of the line's load at the highest speed.
         """
         top = float(self.line.speeds[-1])
         given = {0: load.static.astype(complex), **load.harmonics}
@@ -85,7 +85,7 @@ class TurningStiffness:
         return replace(self, factors=factors)
 
     def with_mass_damping(self, rate: float) -> "TurningStiffness":
-        """Return the same with `rate` (1/s) times the mass added to the damping; negative: taken away."""
+        """Return the same structure with `rate` (1/s) times the mass added to the damping; the rate may be negative."""
         return replace(self, rate=self.rate + rate, known={})
 
     def condensed(self, omega: float, order: int) -> Condensed:
@@ -100,7 +100,7 @@ class TurningStiffness:
         )
 
     def products(self, omega: float, harmonics: Harmonics) -> "TurningProducts":
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         here = self.at(omega).products(omega, harmonics)
         return TurningProducts(here, self, omega)
 
@@ -113,7 +113,7 @@ class TurningStiffness:
         return self.at(omega).recover_change(omega, dq)
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         return self.at(omega).output_rows(omega, harmonic, dofs)
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
@@ -121,11 +121,11 @@ class TurningStiffness:
         return self.at(omega).strain_energy(omega, q)
 
     def at(self, omega: float) -> DynamicStiffness:
-        """Return the dynamic stiffness of the speed that belongs to a frequency, under its load."""
+        """Return the dynamic stiffness at the speed that belongs to a frequency, with its load."""
         return self._at_speed(self.line.speed(omega))
 
     def beside(self, omega: float) -> DynamicStiffness:
-        """Return the same at a speed that is higher by a step for differences."""
+        """Return the dynamic stiffness at a slightly higher speed, for finite differences."""
         return self._at_speed(self.line.speed(omega) * (1 + STEP))
 
     def _at_speed(self, speed: float) -> DynamicStiffness:
@@ -157,7 +157,7 @@ class TurningProducts:
 
     @property
     def harmonics(self) -> Harmonics:
-        """The support."""
+        """Harmonics of the motion."""
         return self.here.harmonics
 
     @property
@@ -167,7 +167,7 @@ class TurningProducts:
 
     @property
     def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
+        """(m, n) derivative of the load by ω."""
         change = self._there().load - self.here.load
         return np.asarray(self.here.load_slope + change / (STEP * self.omega))
 
@@ -194,7 +194,7 @@ class TurningProducts:
         return product, slope + (self._there().product(rows) - product) / (STEP * self.omega)
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        """Return ``Z_h``, (n, n) complex in Fortran order, as a copy."""
         block: ComplexArray = self.here.block(harmonic)  # what turns is condensed
         return block
 
@@ -203,7 +203,7 @@ class TurningProducts:
 
 
 def condensed(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
-    """Prepare the exact condensation of what vibrates at one speed (`condense_side`) or along an engine order (`condense_line`)."""
+    """Prepare the exact condensation of a linear side at one speed (`condense_side`) or along an engine order (`condense_line`)."""
     if isinstance(side, SpeedLine):
         return condense_line(side, retained, load, order)
     return condense_side(side, retained, load, order)

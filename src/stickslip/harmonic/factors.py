@@ -29,7 +29,7 @@ class Factors:
     Attributes
     ----------
     lu
-        (n, n) both triangles as LAPACK leaves them.
+        (n, n) both triangles in the layout of LAPACK.
     order
         (n,) rows of the matrix in the order of the pivots.
     lower, upper
@@ -99,7 +99,7 @@ AnyFactors = Factors | SparseFactors
 
 
 def factorise(matrix: Matrix) -> AnyFactors | None:
-    """Factorise a (n, n) matrix, sparse or an array, which is overwritten and best in Fortran order; None if it is singular to its precision."""
+    """Factorise a (n, n) matrix, sparse or an array, which is overwritten (Fortran order is fastest); None if it is singular to its precision."""
     return _sparse(matrix) if scipy.sparse.issparse(matrix) else _dense(matrix)
 
 
@@ -143,7 +143,7 @@ def _row_order(pivots: IntArray) -> IntArray:
 
 
 def with_contacts(matrix: Matrix, stiffness: FloatArray | ComplexArray, rows: SparseRows) -> Matrix:
-    """Return ``matrix + Bᵀ k B``: in the place of an array, a new matrix where it is sparse.
+    """Return ``matrix + Bᵀ k B``: in place for an array, as a new matrix if it is sparse.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def real_part(matrix: Matrix) -> Matrix:
 
 
 def solved(matrix: Matrix, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
-    """Return the solution (n,) of a system, sparse or an array, that is solved once.
+    """Solve a system, sparse or an array, for one right side; return the solution (n,).
 
     Raises
     ------
@@ -191,7 +191,7 @@ def as_array(matrix: Matrix) -> Matrix:
     Raises
     ------
     InputError
-        If it is too large for one.
+        If it is too large for an array.
     """
     if not scipy.sparse.issparse(matrix):
         return np.asarray(matrix)

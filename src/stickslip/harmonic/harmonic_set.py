@@ -14,14 +14,14 @@ ByDof = tuple[Harmonics, ...]  # one support a coordinate
 
 
 def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmonics:
-    """Return a support from the highest harmonic, or from a list of harmonics such as 1, 3, 5.
+    """Return a set of harmonics (support) from the highest one, or from a list such as 1, 3, 5.
 
     Parameters
     ----------
     chosen
-        Highest harmonic of all from 0 on, or the harmonics one by one; the static term is added.
+        Highest harmonic, all lower ones being kept, or a list of harmonics; the static term is added.
     place
-        Named in the error.
+        Place, for messages.
 
     Raises
     ------
@@ -43,13 +43,13 @@ def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmo
 
 
 def multiples(harmonics: Iterable[int], highest: int) -> Harmonics:
-    """Return the multiples, from 0 up to `highest`, of what divides all `harmonics`: a motion of these feeds no others."""
+    """Return the multiples, from 0 up to `highest`, of the common divisor of `harmonics`: a motion of these excites no others."""
     step = math.gcd(*harmonics) or 1
     return tuple(range(0, highest + 1, step))
 
 
 def named(harmonics: Iterable[int]) -> str:
-    """Return a support as text: ``5`` where it holds all up to the fifth, else ``1, 3, 5``."""
+    """Return a support as text: ``5`` if it has all up to the fifth, else ``1, 3, 5``."""
     own = [int(h) for h in harmonics if h > 0]
     if own == list(range(1, len(own) + 1)):
         return str(len(own))
@@ -57,31 +57,31 @@ def named(harmonics: Iterable[int]) -> str:
 
 
 def is_full(harmonics: Harmonics) -> bool:
-    """Whether no harmonic up to the highest is left out."""
+    """Whether all harmonics up to the highest are kept."""
     return len(harmonics) == harmonics[-1] + 1
 
 
 def rows_of(harmonics: Harmonics) -> IntArray:
-    """Return where the real coefficients of a support stand among those of all harmonics up to its highest."""
+    """Return the positions of the real coefficients of a support among those of all harmonics up to its highest."""
     h = np.array(harmonics[1:], dtype=np.int64)
     return np.concatenate([[0], np.stack([2 * h - 1, 2 * h], axis=1).reshape(-1)])
 
 
 def rows_among(harmonics: Harmonics, some: Iterable[int]) -> IntArray:
-    """Return where the real coefficients of `some` harmonics stand among those of a support that holds them."""
+    """Return the positions of the real coefficients of `some` harmonics among those of a support that contains them."""
     chosen = set(some)
     wanted = rows_of((0, *sorted(h for h in chosen if h > 0)))[0 if 0 in chosen else 1 :]
     return np.searchsorted(rows_of(harmonics), wanted)
 
 
 def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
-    """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros where it has none."""
+    """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros for missing harmonics."""
     whole = coefficients if len(coefficients) == harmonics[-1] + 1 else padded(coefficients, harmonics[-1])
     return to_real(whole if is_full(harmonics) else whole[list(harmonics)])
 
 
 def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:
-    """Return the (highest + 1, ...) complex coefficients of the real `rows` of a support; zeros at harmonics left out."""
+    """Return the (highest + 1, ...) complex coefficients of the real `rows` of a support; zeros for harmonics that are not kept."""
     kept = to_complex(rows)
     if is_full(harmonics):
         return kept
@@ -96,7 +96,7 @@ def of_all(by_dof: ByDof) -> Harmonics:
 
 
 def joined(one: ByDof, other: ByDof) -> ByDof:
-    """Return what each coordinate has in either of two."""
+    """Return for each coordinate the harmonics of either of two sets."""
     return tuple(tuple(sorted({*a, *b})) for a, b in zip(one, other, strict=True))
 
 

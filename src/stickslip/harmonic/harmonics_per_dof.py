@@ -21,14 +21,14 @@ from stickslip.harmonic.linear import DynamicStiffness
 
 @dataclass(frozen=True, eq=False)
 class LocalBalance:
-    """A periodic problem with the harmonics of each coordinate.
+    """A periodic problem in which each coordinate has its own harmonics.
 
     Parameters
     ----------
     balance
-        The same with the harmonics of all coordinates together.
+        The same problem with the union of all harmonics.
     by_dof
-        One support a retained coordinate.
+        Support of each retained coordinate.
     """
 
     balance: HarmonicBalance
@@ -36,7 +36,7 @@ class LocalBalance:
 
     @cached_property
     def own(self) -> IntArray:
-        """Where the unknowns stand among those of `balance`."""
+        """Positions of the unknowns among those of `balance`."""
         kept = kept_by_dof(self.by_dof, self.harmonics)
         rows = np.concatenate([kept[:1], np.repeat(kept[1:], 2, axis=0)])
         return np.flatnonzero(rows)
@@ -68,7 +68,7 @@ class LocalBalance:
 
     @property
     def springs(self) -> Interface:
-        """What stands for the contacts where nothing slips or opens."""
+        """The interface, which gives the stiffness where no contact slips or opens."""
         return self.balance.springs
 
     @property
@@ -82,7 +82,7 @@ class LocalBalance:
         return self.balance.force_scale
 
     def whole(self, x: FloatArray) -> FloatArray:
-        """Return the unknowns of `balance`, zeros at what a coordinate does not keep."""
+        """Return the unknowns of `balance`, zeros for harmonics that a coordinate does not keep."""
         out = np.zeros(self.balance.size)
         out[self.own] = x
         return out
@@ -110,11 +110,11 @@ class LocalBalance:
         return self.balance.linear_load(omega)
 
     def linear_block(self, omega: float, harmonic: int) -> Matrix:
-        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), as a copy."""
         return self.balance.linear_block(omega, harmonic)
 
     def with_harmonics(self, harmonics: Harmonics) -> "LocalBalance":
-        """Return the same problem with what its coordinates have of these harmonics."""
+        """Return the same problem; each coordinate keeps those of its harmonics that are in `harmonics`."""
         few = tuple(tuple(h for h in own if h in harmonics) for own in self.by_dof)
         return LocalBalance(self.balance.with_harmonics(harmonics), few)
 

@@ -31,23 +31,23 @@ UNSEEN = float(np.finfo(float).tiny)
 
 
 def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
-    """Return all multiples, 0 among them, of the common divisor of the harmonics that are kept or driven, up to three times the largest.
+    """Return all multiples, 0 among them, of the common divisor of all kept and excited harmonics, up to three times the largest.
 
     Parameters
     ----------
     kept
         Harmonics of the solution.
     driven
-        Harmonics that the load acts in.
+        Harmonics of the load.
     """
     own = {*kept, *driven} - {0}
     return tuple(range(0, REACH * max(own, default=0) + 1, gcd(*own) or 1))
 
 
 def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
-    """Return the combined frequencies j ω1 + k ω2 that a nonlinear force of driven ones may feed first: 2a, 3a, a ± b, 2a ± b and a ± 2b of any a and b.
+    """Return the combined frequencies j ω1 + k ω2 that a nonlinear force first excites from the driven ones: 2a, 3a, a ± b, 2a ± b and a ± 2b of any a and b.
 
-    Of (j, k) and (−j, −k) one is returned, as `half_plane` orders them; (0, 0) is not.
+    Only one of (j, k) and (−j, −k) is returned, as in `half_plane`; (0, 0) is left out.
     """
     own = sorted({*driven} - {(0, 0)})
     fed: set[tuple[int, int]] = set(own)
@@ -59,26 +59,26 @@ def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int],
 
 
 def driven_by(load: HarmonicLoad) -> Harmonics:
-    """Return the harmonics above zero that a load acts in."""
+    """Return the harmonics above zero of a load."""
     return tuple(h for h in sorted(load.harmonics) if h > 0 and np.any(load.harmonics[h]))
 
 
 def judging_set_of(low: HarmonicBalance) -> Harmonics:
-    """Return the judging set of a periodic problem: of the harmonics that it keeps and of those of its load."""
+    """Return the judging set of a periodic problem, from its kept harmonics and those of its load."""
     return judging_set(low.harmonics, driven_by(low.linear.load))
 
 
 def judging_balance(low: HarmonicBalance, also: Iterable[int] = ()) -> HarmonicBalance:
-    """Return the same problem with its judging set, with samples enough for it.
+    """Return the same problem with the harmonics of its judging set, and enough samples for them.
 
-    Of a wheel that was condensed for few harmonics these alone are left: `covers` says no then.
+    A wheel that was condensed for fewer harmonics keeps those; then `covers` is False.
 
     Parameters
     ----------
     low
         The problem of the solution.
     also
-        Further harmonics, such as those with which it would be solved next.
+        Further harmonics, such as those of a repeat.
     """
     most = low.linear.most
     harmonics = tuple(h for h in sorted({*judging_set_of(low), *also}) if most is None or h <= most)
@@ -87,7 +87,7 @@ def judging_balance(low: HarmonicBalance, also: Iterable[int] = ()) -> HarmonicB
 
 
 def covers(low: HarmonicBalance, high: HarmonicBalance) -> bool:
-    """Whether `high` holds the judging set of `low`: only then does its silence make a solution exact."""
+    """Whether `high` contains the judging set of `low`: only then a solution of `low` without forces on its other harmonics is exact."""
     return set(judging_set_of(low)) <= set(high.harmonics)
 
 
@@ -101,7 +101,7 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
     """Return the few harmonics beyond the judging set at which the contact forces of a solution meet a mode.
 
     Each harmonic is solved alone, ``q_h = -(Z_h + Bᵀ K B)⁻¹ Bᵀ λ_h``, with the mean stiffness K of the contacts over the period. Where the gaps are
-    larger than at the harmonics before and after, a mode lies near.
+    larger than at the harmonics before and after, a mode is near.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
     Returns
     -------
     tuple of int
-        Empty for a structure of over `MOST_ROWS` retained coordinates.
+        Harmonics; empty for a structure with more than `MOST_ROWS` retained coordinates.
     """
     judged, most = judging_set_of(low), low.linear.most
     step = judged[1] if len(judged) > 1 else 1
@@ -134,7 +134,7 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
 
 
 def loudest(harmonics: Harmonics, sizes: FloatArray) -> Harmonics:
-    """Return the harmonics at which `sizes` are larger than before and after, at most `MOST_RINGING` of them, growing."""
+    """Return the harmonics at which `sizes` have a local maximum, at most `MOST_RINGING` of them, ascending."""
     before, after = sizes[:-1], np.append(sizes[2:], 0.0)
     tops = 1 + np.flatnonzero((sizes[1:] > before) & (sizes[1:] >= after) & (sizes[1:] > FAINTEST_GAP))
     chosen = tops[np.argsort(-sizes[tops])][:MOST_RINGING]

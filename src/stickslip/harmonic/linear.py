@@ -19,9 +19,9 @@ from stickslip.reduction.tuned import TunedWheel
 
 
 class LinearSide(Protocol):
-    """What vibrates: one structure, or a wheel whose temporal harmonics are waves of their own; all on the same coordinates.
+    """A linear structure before condensation: one structure, or a wheel with a wave for each temporal harmonic, all on the same coordinates.
 
-    Matrices may be complex and unsymmetric, as those of waves and of aerodynamic forces are.
+    Matrices may be complex and unsymmetric, as for waves and aerodynamic forces.
     """
 
     @property
@@ -36,7 +36,7 @@ class LinearSide(Protocol):
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are never condensed: forces of constraints, or all where nothing is reduced."""
+        """Coordinates that are never condensed: constraint forces, or all coordinates if nothing is reduced."""
         ...
 
     @property
@@ -46,12 +46,12 @@ class LinearSide(Protocol):
 
     @property
     def wheel(self) -> TunedWheel | None:
-        """The tuned wheel whose waves the harmonics are; None for all else."""
+        """The tuned wheel if harmonics are its waves; None otherwise."""
         ...
 
     @property
     def speed_follows_frequency(self) -> bool:
-        """Whether the matrices are those of the speed at which an engine order has the frequency."""
+        """Whether the matrices belong to the speed at which an engine order excites the frequency."""
         ...
 
     @property
@@ -60,19 +60,19 @@ class LinearSide(Protocol):
         ...
 
     def at_frequency(self, omega: float) -> "LinearSide":
-        """Return what vibrates at a frequency in rad/s; another one only where the speed follows the frequency."""
+        """Return the side at a frequency in rad/s: itself, unless the speed follows the frequency."""
         ...
 
     def of_harmonic(self, harmonic: int) -> Structure:
-        """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
+        """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; equal structures are the same object."""
         ...
 
     def feedback_of(self, harmonic: int) -> Feedback | None:
-        """Return the aerodynamic force on a harmonic, of which `of_harmonic` holds the frozen form; None for none."""
+        """Return the aerodynamic force on a harmonic, or None. The structure of `of_harmonic` contains its frozen form."""
         ...
 
     def grounded(self, springs: Matrix) -> Self:
-        """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
+        """Return the side with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         ...
 
 
@@ -82,12 +82,12 @@ def full_structure(side: LinearSide, analysis: str) -> Structure:
 
 
 def one_structure(side: LinearSide, analysis: str) -> Structure:
-    """Return the structure that all harmonics vibrate as, for an `analysis` that knows no harmonics.
+    """Return the structure that all harmonics vibrate as, for an `analysis` without harmonics.
 
     Raises
     ------
     InputError
-        If the harmonics vibrate as different structures, or as one whose matrices are complex, or that is not reduced.
+        If the harmonics vibrate as different structures, or if the structure has complex matrices or is not reduced.
     """
     if isinstance(side, Unreduced):
         raise input_error(
@@ -108,7 +108,7 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
 
 
 class StiffnessProducts(Hashable, Protocol):
-    """A condensed dynamic stiffness at one frequency, or at one combined frequency for each place of the support, by its products.
+    """A condensed dynamic stiffness at one frequency, or at one combined frequency for each position in `harmonics`, by its products.
 
     Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
     """
@@ -136,7 +136,7 @@ class StiffnessProducts(Hashable, Protocol):
         ...
 
     def block(self, harmonic: int) -> Matrix:
-        """Return ``Z_h``, (n, n) complex, to be changed at will: an array in Fortran order, or sparse where nothing is condensed."""
+        """Return a copy of ``Z_h``, (n, n) complex: an array in Fortran order, or sparse if nothing is condensed."""
         ...
 
 
@@ -150,7 +150,7 @@ class Products(StiffnessProducts, Protocol):
 
     @property
     def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
+        """(m, n) derivative of the load by ω."""
         ...
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -186,19 +186,19 @@ class Shareable(Products, Protocol):
         ...
 
     def projected(self, vectors: FloatArray) -> CondensedProduct:
-        """Return the same seen from the columns of `vectors` (n, k) alone, without a load."""
+        """Return the products projected on the columns of `vectors` (n, k), without a load."""
         ...
 
 
 class DynamicStiffness(Protocol):
     """A structure and its load, condensed to the retained coordinates.
 
-    `CondensedStiffness` is that of one structure; `TravellingStiffness` that of a tuned wheel, whose harmonics have wave
-    numbers of their own; `TurningStiffness` either of them along an engine-order line, at the speed of each frequency.
+    `CondensedStiffness` is for one structure; `TravellingStiffness` for a tuned wheel, whose harmonics have different wave
+    numbers; `TurningStiffness` for either of them along an engine-order line, at the speed of each frequency.
     """
 
     def __hash__(self) -> int:
-        """Condensed structures are told apart by what they are, not by what they hold."""
+        """Hash by identity, not by content."""
         ...
 
     @property
@@ -213,7 +213,7 @@ class DynamicStiffness(Protocol):
 
     @property
     def nn(self) -> Blocks:
-        """Stiffness, damping and mass on the retained coordinates; for scales."""
+        """Stiffness, damping and mass on the retained coordinates, for scaling."""
         ...
 
     @property
@@ -227,7 +227,7 @@ class DynamicStiffness(Protocol):
         ...
 
     def load_at(self, omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N; the same at all unless it follows the speed."""
+        """Return the load at a frequency, N; it is constant unless it follows the speed."""
         ...
 
     def with_load(self, load: HarmonicLoad) -> Self:
@@ -235,7 +235,7 @@ class DynamicStiffness(Protocol):
         ...
 
     def with_mass_damping(self, rate: float) -> Self:
-        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; the rate may be negative."""
         ...
 
     def condensed(self, omega: float, order: int) -> Condensed:
@@ -243,7 +243,7 @@ class DynamicStiffness(Protocol):
         ...
 
     def products(self, omega: float, harmonics: Harmonics) -> Products:
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         ...
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
@@ -255,7 +255,7 @@ class DynamicStiffness(Protocol):
         ...
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         ...
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:

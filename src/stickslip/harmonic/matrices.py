@@ -13,7 +13,7 @@ SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may di
 
 
 def asymmetry(matrix: Matrix) -> float:
-    """Return the largest difference from the transpose over the largest entry."""
+    """Return the largest difference of a matrix from its transpose, over its largest entry."""
     if not matrix.shape[0]:
         return 0.0
     size = float(abs(matrix).max())
@@ -21,13 +21,13 @@ def asymmetry(matrix: Matrix) -> float:
 
 
 def is_real_symmetric(structure: Structure) -> bool:
-    """Whether all matrices but the damping are real and symmetric: then undamped modes of the interior decouple it."""
+    """Whether all matrices except the damping are real and symmetric, so that undamped modes decouple the interior."""
     matrices = (structure.mass, structure.stiffness, structure.loss)
     return not structure.is_complex and all(asymmetry(m) <= SYMMETRY for m in matrices if m is not None)
 
 
 def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
-    """Return a matrix of a structure as an array, after checking that it is finite and whole."""
+    """Return a matrix of a structure as an array, after checking its size and that it is finite."""
     matrix = getattr(structure, name)
     dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
     if not np.all(np.isfinite(dense)):
@@ -38,7 +38,7 @@ def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray
 
 
 def real_symmetric(structure: Structure, name: str) -> FloatArray:
-    """Return a matrix of a structure as an array, after checking that it is real, and symmetric but for the damping."""
+    """Return a matrix of a structure as an array, after checking that it is real and, except for the damping, symmetric."""
     dense = checked_matrix(structure, name)
     if np.iscomplexobj(dense):
         raise input_error(
@@ -56,7 +56,7 @@ def real_symmetric(structure: Structure, name: str) -> FloatArray:
 
 
 def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, float] | None:
-    """Return a and b with ``c = a k + b m`` to rounding; None if there are none."""
+    """Return a and b with ``c = a k + b m`` to rounding; None if they do not exist."""
     own = np.stack([np.diagonal(k), np.diagonal(m)], axis=1)
     size = np.linalg.norm(own, axis=0)
     if not np.all(size > 0.0):

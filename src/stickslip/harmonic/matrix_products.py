@@ -36,21 +36,21 @@ class SmallBlocks:
     imaginary: FloatArray
 
     def product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the products with the coefficients ``C - iS`` that the (m, n) `rows` stand for."""
+        """Return the products with complex coefficients ``C - iS`` in the form of real (m, n) `rows`."""
         out = np.empty_like(rows)
         multiply_blocks(self.real, self.imaginary, rows, out)
         return out
 
 
 def small_blocks(matrices: list[ComplexArray]) -> SmallBlocks:
-    """Return (n, n) matrices, one a harmonic, in the form that the compiled loops read."""
+    """Return (n, n) matrices, one for each harmonic, in the layout of the compiled loops."""
     stacked = np.stack([matrix.T for matrix in matrices])
     return SmallBlocks(np.ascontiguousarray(stacked.real), np.ascontiguousarray(stacked.imag))
 
 
 @lru_cache(maxsize=2)
 def dynamic_stiffness(linear: StiffnessProducts) -> SmallBlocks:
-    """Return the dynamic stiffness of all harmonics at one frequency, N/m; kept, because a Krylov method multiplies with it many times."""
+    """Return the dynamic stiffness of all harmonics at one frequency, N/m; cached for the many products of a Krylov method."""
     return small_blocks([linear.block(h) for h in linear.harmonics])
 
 
@@ -61,9 +61,9 @@ class MatrixProducts:
     Parameters
     ----------
     condensed
-        Matrices and load of the harmonics of the support.
+        Matrices and load of `harmonics`.
     harmonics
-        The support.
+        Kept harmonics.
     """
 
     condensed: Condensed
@@ -81,7 +81,7 @@ class MatrixProducts:
 
     @cached_property
     def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
+        """(m, n) derivative of the load by ω."""
         return to_real(self.condensed.load_derivative)
 
     def same(self, other: object) -> bool:
@@ -101,7 +101,7 @@ class MatrixProducts:
         return self.product(rows), _times(self.condensed.derivative, rows)
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        """Return a copy of ``Z_h``, (n, n) complex in Fortran order."""
         return np.array(self.condensed.stiffness[self.harmonics.index(harmonic)], order="F")
 
 
@@ -111,7 +111,7 @@ def _times(matrices: ComplexArray, rows: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def matrices(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> MatrixProducts:
-    """Condense the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
+    """Condense the linear side at one frequency; cached, because a Newton iteration at fixed frequency needs it at every step."""
     part = linear.condensed(omega, harmonics[-1])
     if not is_full(harmonics):
         part = part.kept(list(harmonics))
@@ -128,7 +128,7 @@ def products(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Pr
 
 
 def known_by_vectors(linear: DynamicStiffness) -> CondensedStiffness | None:
-    """Return a condensed structure whose interior is diagonal, without structural damping and Coriolis forces; None if it is none."""
+    """Return a condensed structure if its interior is diagonal, without structural damping and Coriolis forces; None otherwise."""
     if isinstance(linear, CondensedStiffness) and linear.diagonal and linear.loss is None:
         return linear if linear.ln is None else None
     return None
@@ -143,7 +143,7 @@ def linear_force(linear: CondensedStiffness, omega: float, q: ComplexArray) -> C
 
 
 def mass_damping_slope(linear: CondensedStiffness, omega: float, q: ComplexArray) -> ComplexArray:
-    """Return the derivative of ``Z q``, (H+1, n), by the rate (1/s) of a damping in proportion to the mass."""
+    """Return the derivative of ``Z q``, (H+1, n), by the rate (1/s) of a damping proportional to the mass."""
     s = _frequencies(omega, q)
     own = _own(linear, s)
     moved = -_forward(linear.nl, s, q) / own

@@ -24,7 +24,7 @@ MIN_KEPT_WAVES = 8  # frequencies times harmonics that are kept at least
 
 
 def by_sectors(wheel: MistunedWheel, retained: IntArray) -> bool:
-    """Whether retained coordinates are the same in all sectors, and nothing else of the wheel is held by springs."""
+    """Whether retained coordinates are the same in all sectors, and springs to the ground act on no other coordinates."""
     count, size = wheel.sectors, wheel.n // wheel.sectors
     if retained.size % count:
         return False
@@ -55,7 +55,7 @@ class MistunedStiffness:
 
     @cached_property
     def far(self) -> IntArray:
-        """The others of a sector."""
+        """Condensed coordinates of a sector."""
         return np.setdiff1d(np.arange(self.wheel.n // self.wheel.sectors), self.near)
 
     @cached_property
@@ -65,7 +65,7 @@ class MistunedStiffness:
 
     @cached_property
     def nn(self) -> Blocks:
-        """Stiffness, damping and mass on the retained coordinates; for scales."""
+        """Stiffness, damping and mass on the retained coordinates, for scaling."""
         s, own = self.wheel.structure, np.ix_(self.retained, self.retained)
         return s.stiffness[own], s.damping[own], s.mass[own]
 
@@ -74,7 +74,7 @@ class MistunedStiffness:
         """Highest harmonic for which there are matrices: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N: the same at all."""
+        """Return the load, N, which is the same at all frequencies."""
         return self.load
 
     def with_load(self, load: HarmonicLoad) -> "MistunedStiffness":
@@ -82,11 +82,11 @@ class MistunedStiffness:
         return replace(self, load=load)
 
     def with_mass_damping(self, rate: float) -> "MistunedStiffness":
-        """Return the same wheel with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        """Return the same wheel with `rate` (1/s) times its mass added to its damping; the rate may be negative."""
         return replace(self, rate=self.rate + rate, known={})
 
     def at(self, s: float) -> "At":
-        """Return the wheel at ``s = hω`` in rad/s; the last ones are kept."""
+        """Return the wheel at ``s = hω`` in rad/s; the last results are cached."""
         if s not in self.known:
             most = max(MIN_KEPT_WAVES, int(KEPT_BYTES / (6 * self.wheel.waves[0].nbytes)))
             for old in [one for one in self.known if one][: max(len(self.known) - most, 0)]:
@@ -109,7 +109,7 @@ class MistunedStiffness:
         return np.array([load for load, _ in found]), np.array([slope for _, slope in found])
 
     def products(self, omega: float, harmonics: Harmonics) -> "CondensedSectors":
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         return CondensedSectors(self, omega, harmonics)
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
@@ -121,7 +121,7 @@ class MistunedStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], self.wheel.n), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         spread = np.zeros((self.wheel.n, self.n), dtype=complex)
         spread[self.retained] = eye = np.eye(self.n, dtype=complex)
         none = np.zeros((self.interior.size, self.n), dtype=complex)
@@ -235,7 +235,7 @@ class At:
 
     @property
     def stiffness(self) -> ComplexArray:
-        """(n, n), N/m, made when it is asked for: it is large."""
+        """(n, n), N/m; assembled at first use, because it is large."""
         out = circulant(np.fft.ifft(self._tuned, axis=0))
         if self.linear.wheel.active[0].size:
             out += self._deviation()
@@ -338,7 +338,7 @@ class CondensedSectors:
 
     @cached_property
     def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
+        """(m, n) derivative of the load by ω."""
         return to_real(np.array(self.harmonics)[:, None] * self._loads[1])
 
     def same(self, other: object) -> bool:
@@ -357,7 +357,7 @@ class CondensedSectors:
         return to_real(np.array([one.times(q) for one, q in pairs]))
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
+        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
         pairs = zip(self._at, to_complex(rows), strict=True)
         return to_real(np.array([one.adjoint_times(q) for one, q in pairs]))
 
@@ -367,7 +367,7 @@ class CondensedSectors:
         return self.product(rows), to_real(np.array(self.harmonics)[:, None] * np.array(slope))
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        """Return a copy of ``Z_h``, (n, n) complex in Fortran order."""
         return np.array(self.linear.at(harmonic * self.omega).stiffness, order="F")
 
 

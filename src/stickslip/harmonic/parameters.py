@@ -28,7 +28,7 @@ KEPT = 8  # members of a family that are not built again
 
 @dataclass(frozen=True, eq=False)
 class ParameterLinearisation:
-    """Residual and derivatives at one state and one value of the parameter; `jac_p` is computed when it is asked for."""
+    """Residual and derivatives at one state and one value of the parameter; `jac_p` is computed at first use."""
 
     residual: FloatArray
     jac: Jacobian
@@ -43,12 +43,12 @@ class ParameterLinearisation:
 
 @dataclass(frozen=True, eq=False)
 class AtFrequency:
-    """The periodic problem at one frequency with another parameter; an equation that can be continued.
+    """The periodic problem at one frequency as an equation in another parameter, for continuation.
 
     Parameters
     ----------
     family
-        Harmonic balance of each value of the parameter.
+        Function from the parameter to the harmonic balance.
     omega
         Frequency, rad/s.
     """
@@ -70,7 +70,7 @@ def by_parameter(family: BalanceAt, x: FloatArray, omega: float, p: float) -> Fl
 
 
 def difference(function: Callable[[float], FloatArray], p: float) -> FloatArray:
-    """Return the derivative of `function` at `p`; from above where p = 0, because most parameters are not negative."""
+    """Return the derivative of `function` at `p`: a central difference, one-sided at p = 0, because most parameters are not negative."""
     step = DIFFERENCE * abs(p)
     if step == 0.0:
         return (function(DIFFERENCE) - function(0.0)) / DIFFERENCE
@@ -106,7 +106,7 @@ def law_field(balance: HarmonicBalance, name: str) -> BalanceAt:
     Parameters
     ----------
     balance
-        The problem; what is not varied stays as it is here.
+        The problem; other fields keep their values.
     name
         Field of the laws. A law without a field ``initial_gap`` that has a normal stiffness and a preload takes it as the preload
         ``-k_n initial_gap``.
@@ -136,12 +136,12 @@ def law_field(balance: HarmonicBalance, name: str) -> BalanceAt:
 
 
 def rebuilt(build: BalanceAt, first: float) -> BalanceAt:
-    """Return a family of balances that `build` makes anew for every value, all with the scales of the `first` one.
+    """Return a family of balances that `build` makes for each value, all with the scales of the `first` one.
 
     Raises
     ------
     InputError
-        If a member has other unknowns than the first one.
+        If the unknowns of a member differ from those of the first one.
     """
     reference = build(first)
 

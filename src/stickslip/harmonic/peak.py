@@ -36,21 +36,21 @@ ALONG_SAMPLES = 8.0
 
 @dataclass(frozen=True)
 class Driven:
-    """One coordinate in the harmonics that the load drives.
+    """One coordinate in the harmonics that the load excites.
 
     Parameters
     ----------
     position
         Position of the coordinate among the retained ones.
     harmonics
-        The harmonics, that of the largest force first.
+        The harmonics, the one of the largest force first.
     """
 
     position: int
     harmonics: tuple[int, ...]
 
     def places(self, balance: HarmonicBalance) -> IntArray:
-        """Return the (2 k,) places of the cosine and sine parts among the unknowns, a pair for each harmonic."""
+        """Return the (2 k,) positions of the cosine and sine parts among the unknowns, a pair for each harmonic."""
         rows = np.array([balance.harmonics.index(h) for h in self.harmonics])
         pairs = np.stack([2 * rows - 1, 2 * rows], axis=1)
         return np.asarray(pairs.reshape(-1) * balance.linear.n + self.position)
@@ -61,7 +61,7 @@ class Driven:
         return np.asarray(balance.displacement_scale * (own[::2] - 1j * own[1::2]))
 
     def gradient(self, balance: HarmonicBalance, x: FloatArray) -> FloatArray:
-        """Return (size,) the derivative of ``ln|a|``, |a| the norm over the harmonics."""
+        """Return the (size,) derivative of ``ln|a|``, |a| being the norm over the harmonics."""
         places = self.places(balance)
         out = np.zeros(x.size)
         out[places] = x[places] / (x[places] @ x[places])
@@ -69,12 +69,12 @@ class Driven:
 
 
 def driven_by(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
-    """Return the harmonics that a load drives, that of the largest force first, and the phase of this force, rad.
+    """Return the harmonics of a load, the one of the largest force first, and the phase of this force, rad.
 
     Raises
     ------
     InputError
-        If it drives none.
+        If the load has no harmonics.
     """
     largest = {h: f[np.argmax(np.abs(f))] for h, f in load.harmonics.items() if np.any(f)}
     if not largest:
@@ -85,25 +85,25 @@ def driven_by(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
 
 @dataclass(frozen=True)
 class HorizontalTangent:
-    """The amplitude changes neither way along the response, whose frequency is the first extra unknown: what changes stands across what is there.
+    """Condition of a stationary amplitude along the response: its change is orthogonal to the amplitudes. The frequency is the first extra unknown.
 
     Parameters
     ----------
     driven
-        What peaks.
+        Coordinate and harmonics of the amplitude.
     """
 
     driven: Driven
 
     def value(self, state: State) -> float:
-        """Return the cosine of the angle between the amplitudes and their change along the response; infinite where that is unknown."""
+        """Return the cosine of the angle between the amplitudes and their change along the response; infinite if the tangent is unknown."""
         if state.along is None:
             return np.inf
         own, change, cosine = self._three(state, state.along)
         return cosine if np.any(own) and np.any(change) else np.inf
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its (size + m,) derivative; zeros where it is unknown."""
+        """Return the (size + m,) derivative of the value; zeros if unknown."""
         if state.along is None:
             return np.zeros(state.y.size)
         own, change, cosine = self._three(state, state.along)
@@ -170,7 +170,7 @@ class PhaseQuadrature:
     Parameters
     ----------
     driven
-        What lags.
+        Coordinate and harmonics of the response.
     phase
         Phase of the force, rad.
     """
@@ -184,7 +184,7 @@ class PhaseQuadrature:
         return float(self._direction @ own / np.linalg.norm(own))
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its (size + m,) derivative."""
+        """Return the (size + m,) derivative of the value."""
         places = self._places(state)
         own = state.x[places]
         size = float(np.linalg.norm(own))
@@ -202,29 +202,29 @@ class PhaseQuadrature:
 
 @dataclass(frozen=True, eq=False)
 class PeakProblem:
-    """The periodic problem with the frequency at which one amplitude peaks as a further unknown; an equation in a design parameter.
+    """The periodic problem with the frequency of an amplitude peak as an additional unknown; an equation in a design parameter.
 
     Unknowns are those of the balance and ``ln(ω / omega_scale)``.
 
     Parameters
     ----------
     family
-        Harmonic balance of each value of the design parameter.
+        Function from the design parameter to the harmonic balance.
     by
-        What makes a peak.
+        Condition of a peak.
     driven
-        What peaks.
+        Coordinate and harmonics of the amplitude.
     phase
-        What the coordinate lags by 90° where a phase is asked for, rad, in the first harmonic of `driven`: the phase of the force; by variable
-        phase 90° more than the coordinate had at the last known maximum, see `of_the_top`.
+        Phase that the coordinate lags by 90°, rad, in the first harmonic of `driven`, for conditions on the phase: the phase of the force, or, with
+        variable phase, 90° more than that of the coordinate at the last known maximum, see `of_the_top`.
     omega_scale
         Frequency at which the last unknown is zero, rad/s.
     invert
-        How systems with the Jacobian of the balance are solved, as exactly as the peak is to be found.
+        Function from a Jacobian of the balance to a solver; it limits the accuracy of the peak.
     sharpness
-        Typical ``|da / d ln ω| / |a|``: what is long in ``ln ω``.
+        Typical ``|da / d ln ω| / |a|``, the scale of changes of ``ln ω``.
     row
-        What closes the equations of the tangent; see `aligned`.
+        Last row of the equations of the tangent; see `aligned`.
     """
 
     family: BalanceAt
@@ -246,7 +246,7 @@ class PeakProblem:
         return PeriodicProblem(settings, (condition,), self.invert, self.row)
 
     def sharpened(self, state: State) -> "PeakProblem":
-        """Return the problem with the sharpness that a `state` near the peak has."""
+        """Return the problem with the sharpness of a `state` near the peak."""
         if state.along is None:
             return self
         places = self.driven.places(state.setting.balance)
@@ -256,8 +256,8 @@ class PeakProblem:
     def aligned(self, state: State) -> "PeakProblem":
         """Return the problem with a row along the response at a `state` near the peak, so that it is regular at folds beside it.
 
-        Length is measured in changes of the motion relative to its size and in those of ``ln ω`` over the width of the peak: neither units nor
-        the damping change what the tolerance means.
+        Length is measured in changes of the motion relative to its size and in changes of ``ln ω`` relative to the width of the peak, so that the
+        meaning of the tolerance depends neither on units nor on damping.
         """
         if state.along is None:
             return self
@@ -267,7 +267,7 @@ class PeakProblem:
         return replace(self, row=row / np.sqrt(row @ state.along))
 
     def of_the_top(self, state: State) -> "PeakProblem":
-        """Return the problem by variable phase, with the phase that the coordinate has at the maximum beside a `state`, as far as `top` sees it; else at the state."""
+        """Return the problem with variable phase: the coordinate's phase at the maximum near a `state`, if `top` finds one, else at the state."""
         if state.along is None:
             return self
         away, _ = self.top(state)
@@ -307,9 +307,9 @@ class PeakProblem:
         return float(_gradient(self.driven, state, state.along, by_own, own / square) @ state.along)
 
     def top(self, state: State) -> tuple[float, float]:
-        """Return how far in ln ω the maximum beside a `state` is, and how much higher, relatively; NaN where none can be seen.
+        """Return the distance in ln ω from a `state` to the nearest maximum, and its relative excess in amplitude; NaN if none is visible.
 
-        ``1/|a|²`` is taken for a parabola, as it is for a linear mode.
+        ``1/|a|²`` is approximated by a parabola, which is exact for a linear mode.
         """
         slope, curvature = self.rate(state), self.curvature(state)
         bends = 2.0 * slope**2 - curvature
@@ -318,7 +318,7 @@ class PeakProblem:
         return slope / bends, 1.0 / np.sqrt(1.0 - slope**2 / bends) - 1.0
 
     def amplitude_slope(self, state: State) -> float:
-        """Return ``d ln|a| / dp`` along the curve of peaks; NaN where the problem is singular.
+        """Return ``d ln|a| / dp`` along the curve of peaks; NaN if the problem is singular.
 
         By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem): the slope is that at fixed frequency.
         """

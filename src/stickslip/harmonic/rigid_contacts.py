@@ -21,12 +21,12 @@ class RigidContacts:
     Attributes
     ----------
     index
-        (n_rigid,) their positions in the interface.
+        (n_rigid,) positions of the rigid contacts in the interface.
     mu, constant
         (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
     contact, direction, column, factor, offset
-        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, and the gap at zero
-        displacement, scaled.
+        (n_gaps,) for each gap: its rigid contact, its direction (0, 1, 2 for t, w, n), its retained coordinate, the ratio of gap to coordinate, and the
+        scaled gap at zero displacement.
     """
 
     index: IntArray
@@ -47,14 +47,14 @@ def rigid_contacts(interface: Interface, rigid: IntArray, balance: HarmonicBalan
     interface
         All contacts, on the retained coordinates.
     rigid
-        (n_rigid,) which of them are rigid.
+        (n_rigid,) positions of the rigid ones.
     balance
         The periodic problem without them.
 
     Raises
     ------
     InputError
-        If a gap is no coordinate, or two gaps are the same one.
+        If a gap is no coordinate, or two gaps are the same coordinate.
     """
     length, force = balance.displacement_scale, balance.force_scale
     entries: list[tuple[int, int, int, float]] = []

@@ -30,17 +30,17 @@ class GapLaws:
     Attributes
     ----------
     column, factor
-        (n_gaps,) retained coordinate of a gap, and the gap over it.
+        (n_gaps,) retained coordinate of a gap, and ratio of gap to coordinate.
     own
-        (n_gaps, m, m) derivatives of the forces by the predicted ones of the same gap.
+        (n_gaps, m, m) derivatives of the forces by the predicted forces of the same gap.
     tangent, normal
         (k,) gaps whose force depends on the normal prediction of their contact, and the gaps along that normal.
     by_normal
-        (k, m, m) the derivatives.
+        (k, m, m) derivatives by the normal prediction.
     penalty
-        (n_gaps,) of the coordinate.
+        (n_gaps,) penalty of the coordinate.
     slides
-        (n_gaps,) whether the penalty is on the velocity, by τ = ωt.
+        (n_gaps,) whether the penalty acts on the velocity by τ = ωt.
     """
 
     column: IntArray
@@ -58,13 +58,13 @@ class GapLaws:
         return int(self.own.shape[1] - 1) // 2
 
     def forces(self, predicted: FloatArray) -> FloatArray:
-        """Return the forces on the coordinates that a change of the predicted ones makes; (n_gaps, m, k) both."""
+        """Return the change of the forces on the coordinates by a change of the predicted forces, both (n_gaps, m, k)."""
         out = self.own @ predicted
         out[self.tangent] += self.by_normal @ predicted[self.normal]
         return self.factor[:, None, None] * out
 
     def predictions(self, forces: FloatArray) -> FloatArray:
-        """Return the transposed product, (n_gaps, m) both."""
+        """Return the transposed product of `forces`, both (n_gaps, m)."""
         given = (self.factor[:, None] * forces)[:, :, None]
         out = self.own.transpose(0, 2, 1) @ given
         back = self.by_normal.transpose(0, 2, 1) @ given[self.tangent]
@@ -82,7 +82,7 @@ class GapLaws:
         return np.where(self.slides[:, None], scaled @ derivative(self.order), scaled)
 
     def correct(self, jac: FloatArray) -> None:
-        """Make of a Jacobian without rigid contacts, (size, size), that with them, in place."""
+        """Add the rigid contacts to a Jacobian without them, (size, size), in place."""
         m = self.own.shape[1]
         rows = self.column[:, None] + jac.shape[0] // m * np.arange(m)
         predicted = -jac[rows] / self.factor[:, None, None]
@@ -100,16 +100,16 @@ class GapLaws:
 
 @dataclass(frozen=True, eq=False)
 class RigidFactors:
-    """What of the preconditioner is worth keeping.
+    """The costly part of the preconditioner.
 
     Attributes
     ----------
     factors
-        Of each harmonic.
+        Factors of each harmonic.
     rows
         (H+1, n_gaps, n) rows at the gaps of the harmonics without rigid contacts.
     inverses
-        (H+1, n, n) of the same matrices, where they are small.
+        (H+1, n, n) inverses of the same matrices, if they are small.
     """
 
     factors: tuple[AnyFactors, ...]
@@ -130,9 +130,9 @@ class RigidJacobian:
     Parameters
     ----------
     soft
-        That without them.
+        The Jacobian without rigid contacts.
     laws
-        What the rigid contacts make of it.
+        Derivatives of the forces of rigid contacts.
     """
 
     soft: StructuredJacobian
@@ -140,7 +140,7 @@ class RigidJacobian:
 
     @property
     def problem(self) -> object:
-        """What Jacobians have in common that can share a preconditioner."""
+        """Key of Jacobians that can share a preconditioner."""
         return self.soft.problem
 
     @property
@@ -150,7 +150,7 @@ class RigidJacobian:
 
     @property
     def transposed(self) -> Transposed:
-        """Its transpose."""
+        """Transpose of the Jacobian."""
         return Transposed(self)
 
     def matvec(self, v: FloatArray) -> FloatArray:
@@ -174,7 +174,7 @@ class RigidJacobian:
 
     @property
     def costs(self) -> Costs:
-        """What its linear systems cost: the harmonics of a product are solved one by one."""
+        """Estimated cost of its linear systems; the harmonics of a product are solved one by one."""
         harmonics = self.laws.order + 1
         derivatives = self.soft.blocks.size + self.laws.own.size + self.laws.by_normal.size
         own = linear_costs(self.soft.linear.n, harmonics, derivatives)
@@ -187,7 +187,7 @@ class RigidJacobian:
         return jac
 
     def preconditioner(self) -> RigidFactors | None:
-        """Return the factors of what each harmonic does to itself; None where one of the matrices is singular."""
+        """Return the factors of the diagonal block of each harmonic; None if one of them is singular."""
         laws, factors, rows = self.laws, [], []
         (own, other), factor = laws.means, laws.factor[:, None]
         for h, (_, matrix) in enumerate(self.soft.own_blocks()):
@@ -208,11 +208,11 @@ class RigidJacobian:
         return RigidFactors(tuple(factors), np.array(rows), inverses)
 
     def preconditioned_by(self, kept: RigidFactors) -> tuple[Solve, Product]:
-        """Return how to solve ``P x = y``, and ``J v`` as a function of v and ``P v``."""
+        """Return the solver of ``P x = y``, and ``J v`` as a function of v and ``P v``."""
         return lambda right: self._sweep(kept, right), lambda v, _: self.matvec(v)
 
     def transposed_solve(self, kept: RigidFactors) -> Solve:
-        """Return how to solve with the transpose of what each harmonic does to itself."""
+        """Return the solver with the transposed diagonal blocks of the harmonics."""
 
         def solve(right: FloatArray) -> FloatArray:
             rows = self._by_row(right).copy()
@@ -263,7 +263,7 @@ class RigidJacobian:
 
 @dataclass(frozen=True, eq=False)
 class RigidLinearisation:
-    """Residual and derivatives at one state, all scaled, and the time the contacts took; as `Linearisation`."""
+    """Scaled residual and derivatives at one state, and the time of the contact evaluation; see `Linearisation`."""
 
     residual: FloatArray  # (size,)
     jac: FloatArray | RigidJacobian  # (size, size)

@@ -38,17 +38,17 @@ class SharedFactor:
     Attributes
     ----------
     linear
-        The dynamic stiffness whose static part is in it.
+        The dynamic stiffness with the static part of A.
     factor
-        Of A, in the scale of the Jacobian.
+        Factor of A, in the scale of the Jacobian.
     modes
         (n, k) V, of unit mass.
     weighted
         (n, k) M V.
     gaps
-        (n_contacts, 3, k) what the modes do at the contacts.
+        (n_contacts, 3, k) gaps of the modes at the contacts.
     projected
-        The dynamic stiffness seen from the modes.
+        The dynamic stiffness projected on the modes.
     """
 
     linear: Shareable
@@ -106,7 +106,7 @@ def _in_its_precision(factor: AnyFactors, solve: Solve, right: FloatArray) -> Fl
 
 
 def shared_factor(linear: Shareable, means: ComplexArray, rows: SparseRows, scale: float) -> SharedFactor | None:
-    """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are wanted.
+    """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are needed.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class SparseMatrices:
 
     @cached_property
     def transposed(self) -> "SparseMatrices":
-        """The same with the transposed damping; itself where that is symmetric."""
+        """The matrices with transposed damping; the same object if the damping is symmetric."""
         if not self.coriolis:
             return self
         return SparseMatrices(self.stiffness, self.damping.T.tocsr(), self.mass, self.loss)
@@ -77,7 +77,7 @@ class SparseMatrices:
 
 @dataclass(frozen=True, eq=False)
 class SparseProduct:
-    """A sparse structure and its load at one frequency; rows as those of `CondensedProduct`."""
+    """A sparse structure and its load at one frequency; rows as in `CondensedProduct`."""
 
     matrices: SparseMatrices
     omega: float
@@ -144,7 +144,7 @@ class SparseProduct:
         return np.asarray(self.matrices.mass @ vectors)
 
     def projected(self, vectors: FloatArray) -> CondensedProduct:
-        """Return the same seen from the columns of `vectors` (n, k) alone, without a load."""
+        """Return the products projected on the columns of `vectors` (n, k), without a load."""
         own, k = self.matrices, vectors.shape[1]
 
         def seen(matrix: Matrix) -> FloatArray:
@@ -178,12 +178,12 @@ LEAST_SPARSE = 150  # dofs below which arrays are as fast
 
 @dataclass(frozen=True, eq=False)
 class Unreduced:
-    """A structure none of whose dofs are condensed: what `System` takes in place of a `Structure` with thousands of contacts.
+    """A structure without condensation of dofs, for `System` with thousands of contacts.
 
     Parameters
     ----------
     structure
-        Its matrices are real, and kept sparse; mass, stiffness and loss symmetric.
+        Structure with real matrices, which stay sparse; mass, stiffness and loss are symmetric.
     """
 
     structure: Structure
@@ -231,10 +231,10 @@ class Unreduced:
         return self.structure.of_harmonic(harmonic)
 
     def feedback_of(self, harmonic: int) -> None:
-        """No force of its own depends on the frequency."""
+        """No aerodynamic force."""
 
     def grounded(self, springs: Matrix) -> "Unreduced":
-        """Return the same with springs, a sparse matrix (n, n) in N/m, to the ground."""
+        """Return the structure with springs, a sparse matrix (n, n) in N/m, to the ground."""
         return Unreduced(self.structure.grounded(springs))
 
 
@@ -262,7 +262,7 @@ class SparseStiffness:
 
     @property
     def nn(self) -> tuple[Matrix, Matrix, Matrix]:
-        """Stiffness, damping and mass; for scales."""
+        """Stiffness, damping and mass, for scaling."""
         return self.matrices.stiffness, self.matrices.damping, self.matrices.mass
 
     @property
@@ -270,7 +270,7 @@ class SparseStiffness:
         """Highest harmonic for which there are matrices: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N: the same at all."""
+        """Return the load, N, which is the same at all frequencies."""
         return self.load
 
     def with_load(self, load: HarmonicLoad) -> "SparseStiffness":
@@ -278,7 +278,7 @@ class SparseStiffness:
         return replace(self, load=load)
 
     def with_mass_damping(self, rate: float) -> "SparseStiffness":
-        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; the rate may be negative."""
         own = self.matrices
         return replace(self, matrices=replace(own, damping=own.damping + rate * own.mass))
 
@@ -300,20 +300,20 @@ class SparseStiffness:
         return Condensed(stiffness, slope, load, np.zeros_like(load))
 
     def products(self, omega: float, harmonics: Harmonics) -> SparseProduct:
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the dynamic stiffness as products, at `omega` (rad/s) and for `harmonics`."""
         load = real_rows(self.load.coefficients(harmonics[-1]), harmonics)
         return SparseProduct(self.matrices, omega, harmonics, load)
 
     def recover(self, _omega: float, q: ComplexArray) -> ComplexArray:
-        """Return the (H+1, n) coefficients of every dof: those given."""
+        """Return the (H+1, n) coefficients of every dof, which is `q`."""
         return q
 
     def recover_change(self, _omega: float, dq: ComplexArray) -> ComplexArray:
-        """Return the change of every dof (H+1, n): that given."""
+        """Return the change of every dof (H+1, n), which is `dq`."""
         return dq
 
     def output_rows(self, _omega: float, _harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that takes the motion of `dofs` (k,) out of that of all."""
+        """Return the (k, n) matrix that selects the motion of `dofs` (k,)."""
         rows = scipy.sparse.csr_array(
             (np.ones(dofs.size, dtype=complex), (np.arange(dofs.size), dofs)), shape=(dofs.size, self.n)
         )
@@ -326,7 +326,7 @@ class SparseStiffness:
 
 
 def keep_all(structure: Structure, load: HarmonicLoad) -> SparseStiffness:
-    """Take a structure as it is, all of its dofs unknown.
+    """Return the dynamic stiffness of a structure with all of its dofs retained.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def keep_all(structure: Structure, load: HarmonicLoad) -> SparseStiffness:
     Raises
     ------
     InputError
-        If a matrix is not real, not finite, or one but the damping not symmetric.
+        If a matrix is not real or not finite, or a matrix other than the damping is not symmetric.
     """
     if load.static.size != structure.n:
         raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")

@@ -84,7 +84,7 @@ class ModeTerms:
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """Sum over poles, the same with complex matrices and ``w = p^2a / (1 - p ν)``."""
+    """Sum over poles: as `ModeTerms`, with complex matrices and ``w = p^2a / (1 - p ν)``."""
 
     left: ComplexArray
     right: ComplexArray
@@ -128,7 +128,7 @@ class Poles:
         return np.concatenate([polynomial, -own, -2.0 * paired.real, 2.0 * turned.real])
 
     def on_table(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return what the `weights` are for the rows of `table` beyond the polynomial, and those of the load.
+        """Return the `weights` of the rows of `table` beyond the polynomial, and those of the load.
 
         A pair of poles adds up to ``g (2 Re R - 2 p Re(ν* R))`` with ``g = p^2a / (1 - 2 p Re ν + p² |ν|²)``.
         """
@@ -171,7 +171,7 @@ Terms = ModeTerms | Poles
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """The condensed coordinates in modes of unit stiffness; their decompositions are made when first asked for, and kept."""
+    """The condensed coordinates in modes of unit stiffness; their decompositions are computed at first use and cached."""
 
     nn: Blocks
     nl: Blocks
@@ -187,12 +187,12 @@ class Interior:
 
     @cached_property
     def rayleigh(self) -> tuple[float, float] | None:
-        """The shares of stiffness and mass that make up the damping of the retained coordinates; None where it is made of more."""
+        """Rayleigh coefficients (of stiffness and mass) of the damping on the retained coordinates; None if it is no Rayleigh damping."""
         return None if self.ln is not None else shares_of_two(*self.nn)
 
     @cached_property
     def rayleigh_across(self) -> tuple[float, float] | None:
-        """The same shares, if they make up the damping between the retained coordinates and the interior, too."""
+        """The same coefficients, if they also hold for the damping between retained coordinates and interior."""
         own = self.rayleigh
         return own if own is not None and are_shares(*own, self.nl, IN_MODES) else None
 
@@ -204,7 +204,7 @@ class Interior:
 
     @cached_property
     def states(self) -> StateSpace | None:
-        """State-space eigenvectors, or None where damping is diagonal or structural, the interior too large or its eigenvectors ill-conditioned."""
+        """State-space eigenvectors; None if the damping is diagonal or structural, the interior too large, or its eigenvectors ill-conditioned."""
         _, damping, mass = self.ll
         if self.diagonal or self.loss is not None or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE:
             return None
@@ -212,7 +212,7 @@ class Interior:
 
     @cached_property
     def terms(self) -> Terms | None:
-        """Terms of the condensed stiffness, or None where there is no such sum."""
+        """Terms of the condensed stiffness; None if there is no such sum."""
         if self.loss is not None:
             return None
         if self.diagonal:
@@ -286,9 +286,9 @@ def summed(
     Parameters
     ----------
     terms
-        From `Interior.terms`.
+        The terms, from `Interior.terms`.
     omega
-        Frequency.
+        Frequency, rad/s.
     order
         Highest harmonic.
     source, direct
@@ -300,7 +300,7 @@ def summed(
     matrices
         (2, order + 1, n, n) condensed stiffness and its derivative by ω.
     loads
-        (2, order + 1, n) what the load of the interior adds, and its derivative.
+        (2, order + 1, n) contribution of the interior's load, and its derivative by ω.
     """
     n = terms.left.shape[0]
     matrices = np.empty((2, order + 1, n, n), dtype=complex)

@@ -45,7 +45,7 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
     Returns
     -------
     StateSpace or None
-        None if eigenvectors are so nearly parallel that the sum over them would lose the digits that a factorisation keeps.
+        None if eigenvectors are so nearly parallel that the sum over them would be less accurate than a factorisation.
     """
     n = mass.size
     root = np.diag(np.sqrt(np.maximum(mass, 0.0)))

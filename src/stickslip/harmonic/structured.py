@@ -43,18 +43,18 @@ Product = Callable[[FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFactors:
-    """LU factors of ``Z_h + K̂ʰʰ`` for each harmonic: what of the preconditioner is worth keeping.
+    """LU factors of ``Z_h + K̂ʰʰ`` for each harmonic, the costly part of the preconditioner.
 
     Attributes
     ----------
     linear
-        The dynamic stiffness they were made of.
+        The dynamic stiffness in the factors.
     means
-        (len(harmonics), n_contacts, 3, 3) the contact stiffness they were made of, N/m.
+        (len(harmonics), n_contacts, 3, 3) the contact stiffness in the factors, N/m.
     factors
-        Of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
+        Factors of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
     inverses
-        The inverses, where the matrices are small.
+        The inverses, if the matrices are small.
     """
 
     linear: StiffnessProducts
@@ -104,7 +104,7 @@ class StructuredJacobian:
 
     @property
     def problem(self) -> object:
-        """What Jacobians have in common that can share a preconditioner: contacts at the same places, and the same harmonics."""
+        """Key of Jacobians that can share a preconditioner: contacts at the same coordinates, and the same harmonics."""
         return self.rows
 
     @property
@@ -133,7 +133,7 @@ class StructuredJacobian:
 
     @cached_property
     def coupling(self) -> Coupling:
-        """Which contact forces couple harmonics."""
+        """Contact forces that couple harmonics."""
         return coupling(self.blocks, self.rows, self.linear.n)
 
     @cached_property
@@ -153,7 +153,7 @@ class StructuredJacobian:
         return reduced_cost(self.linear.n, self.coupling.counts, known=rested)
 
     def eliminated(self) -> Resting | None:
-        """Return what is left without the unknowns that contacts at rest do not couple; None where that costs as much as the whole array."""
+        """Return the elimination of the unknowns that stuck or open contacts do not couple; None if it costs as much as the whole array."""
         if isinstance(self.linear, SparseProduct) or self.costs.array < self._reduced_cost:
             return None
         return known(self.linear, self.rows).without_resting(self.coupling, self.rows, self.scale)
@@ -170,7 +170,7 @@ class StructuredJacobian:
         return jac
 
     def own_blocks(self) -> Iterator[tuple[ComplexArray, Matrix]]:
-        """Yield of each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and ``scale (Z_h + K̂ʰʰ)`` (n, n), to be changed at will."""
+        """Yield for each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and a copy of ``scale (Z_h + K̂ʰʰ)`` (n, n)."""
         means = harmonic_means(self.blocks)
         for mean, h in zip(means, self.linear.harmonics, strict=True):
             block = with_contacts(self.linear.block(h), mean, self.rows)
@@ -178,7 +178,7 @@ class StructuredJacobian:
             yield mean, block
 
     def preconditioner(self) -> Kept | None:
-        """Return one factor for all harmonics where the structure allows it, else those of ``Z_h + K̂ʰʰ``; None where a matrix is singular."""
+        """Return one factor for all harmonics if the structure allows it, else the factors of ``Z_h + K̂ʰʰ``; None if a matrix is singular."""
         if isinstance(self.linear, Shareable) and self.linear.n >= SHARED:
             shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
             if shared is not None:
@@ -186,7 +186,7 @@ class StructuredJacobian:
         return self._harmonic_factors()
 
     def better_preconditioner(self, kept: Kept) -> HarmonicFactors | None:
-        """Return the factors of ``Z_h + K̂ʰʰ`` where one factor for all of them did not do; None where they are what was kept, or singular."""
+        """Return the factors of ``Z_h + K̂ʰʰ`` if `kept` is one factor for all harmonics; None if `kept` has them already, or a matrix is singular."""
         return self._harmonic_factors() if isinstance(kept, SharedFactor) else None
 
     def _harmonic_factors(self) -> HarmonicFactors | None:
@@ -204,7 +204,7 @@ class StructuredJacobian:
         return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)
 
     def preconditioned_by(self, kept: Kept) -> tuple[Solve, Product]:
-        """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        """Return the solver of ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
         own = self._inverses(kept)
         if isinstance(own, HarmonicFactors) and own.inverses is not None:
             return self._by_triangles(own, own.inverses)
@@ -248,7 +248,7 @@ class StructuredJacobian:
         return solve, product
 
     def transposed_solve(self, kept: Kept) -> Solve:
-        """Return how to solve ``Pᵀ x = y``: harmonic by harmonic, from the highest one down."""
+        """Return the solver of ``Pᵀ x = y``: harmonic by harmonic, from the highest one down."""
         own = self._inverses(kept)
 
         def solve(right: FloatArray) -> FloatArray:
@@ -289,7 +289,7 @@ class StructuredJacobian:
         return rows.reshape(-1)
 
     def subtract_below(self, span: tuple[int, int, int], gap: FloatArray, rows: FloatArray) -> None:
-        """Subtract from a harmonic of the right side `rows` what the solved harmonics below it do at the contacts; see `subtract_lower`."""
+        """Subtract the contact forces of the solved lower harmonics from a harmonic of the right side `rows`; see `subtract_lower`."""
         subtract_lower(self.blocks, self.rows.columns, self.rows.values, rows, *span, self.scale, gap, rows)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
@@ -304,7 +304,7 @@ class StructuredJacobian:
 
 
 class Transposable(JacobianOperator, Protocol):
-    """A Jacobian that makes a preconditioner, for its transpose too."""
+    """A Jacobian that makes a preconditioner for itself and its transpose."""
 
     @property
     def problem(self) -> object: ...  # noqa: D102
@@ -327,7 +327,7 @@ class Transposed:
 
     @property
     def problem(self) -> object:
-        """That of the Jacobian."""
+        """Key of the Jacobian; see `StructuredJacobian.problem`."""
         return self.transposed.problem
 
     @property
@@ -341,14 +341,14 @@ class Transposed:
         return self.transposed.costs
 
     def eliminated(self) -> TransposedElimination | None:
-        """Return what is left without the unknowns that contacts at rest do not couple."""
+        """Return the transpose of the Jacobian's elimination."""
         if not isinstance(self.transposed, StructuredJacobian):
             return None
         own = self.transposed.eliminated()
         return None if own is None else TransposedElimination(own)
 
     def dense(self) -> FloatArray:
-        """Return it as an array."""
+        """Return the transpose as an array."""
         return self.transposed.dense().T
 
     def matvec(self, v: FloatArray) -> FloatArray:
@@ -360,11 +360,11 @@ class Transposed:
         return self.transposed.matvec(v)
 
     def preconditioner(self) -> Any:
-        """Return the factors that the Jacobian makes."""
+        """Return the preconditioner of the Jacobian."""
         return self.transposed.preconditioner()
 
     def preconditioned_by(self, kept: Any) -> tuple[Solve, Product]:
-        """Return how to solve ``Pᵀ x = y``, and ``Jᵀ v``."""
+        """Return the solver of ``Pᵀ x = y``, and ``Jᵀ v`` as a function of v and ``Pᵀ v``."""
         return self.transposed.transposed_solve(kept), lambda v, _: self.matvec(v)
 
 
@@ -383,5 +383,5 @@ def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def real_form(linear: MatrixProducts) -> FloatArray:
-    """Return the real form of the dynamic stiffness at one frequency, N/m; kept, because a Newton iteration at fixed frequency asks for it at every step."""
+    """Return the real form of the dynamic stiffness at one frequency, N/m; cached, because a Newton iteration at fixed frequency needs it at every step."""
     return real_matrix(linear.condensed.stiffness)

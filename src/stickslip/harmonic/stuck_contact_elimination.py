@@ -31,18 +31,18 @@ GROWTH = 1e6  # ... nor where kept unknowns move eliminated ones, or entries gro
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Which contact forces depend on other harmonics, and how; build it with `coupling`.
+    """Contact forces that depend on other harmonics (coupled forces), and the others; build it with `coupling`.
 
     Attributes
     ----------
     means
-        (H+1, n_contacts, 3, 3) stiffness of those that do not, N/m.
+        (H+1, n_contacts, 3, 3) stiffness of uncoupled forces, N/m.
     left
-        (n_contacts, P, m, m) derivatives of those that do, N/m.
+        (n_contacts, P, m, m) derivatives of coupled forces, N/m.
     coupled
-        (n_contacts, 3, H+1) which do.
+        (n_contacts, 3, H+1) whether a force is coupled.
     kept
-        (H+1, n) which coordinates have such a force in their equation.
+        (H+1, n) whether the equation of a coordinate contains a coupled force.
     """
 
     means: ComplexArray
@@ -56,7 +56,7 @@ class Coupling:
         return np.asarray(self.kept.sum(axis=1))
 
     def same_rest(self, other: "Coupling") -> bool:
-        """Whether the same forces rest, and are the same functions of their gaps."""
+        """Whether the same forces are uncoupled, with the same stiffness."""
         if not np.array_equal(self.coupled, other.coupled):
             return False
         each = np.abs(self.means).max(axis=(0, 2, 3), initial=0.0)
@@ -65,7 +65,7 @@ class Coupling:
 
 
 def coupling(blocks: FloatArray, rows: SparseRows, n: int) -> Coupling:
-    """Tell what couples harmonics.
+    """Find the contact forces that couple harmonics.
 
     Parameters
     ----------
@@ -150,14 +150,14 @@ def _split(matrix: Entries, rest: IntArray, own: IntArray) -> _Harmonic | None:
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """A Jacobian without the unknowns at rest; build it with `Known.without_resting`.
+    """A Jacobian after elimination of the unknowns that contacts do not couple; build it with `Known.without_resting`.
 
     Attributes
     ----------
     harmonics
-        What each harmonic is eliminated by.
+        Elimination of each harmonic.
     contacts
-        What couples them.
+        Contact forces that couple harmonics.
     rows
         Gap operator by contact.
     scale
@@ -171,12 +171,12 @@ class Resting:
 
     @property
     def n(self) -> int:
-        """Coordinates."""
+        """Number of coordinates."""
         return int(self.contacts.kept.shape[1])
 
     @cached_property
     def kept(self) -> IntArray:
-        """Where the unknowns that are kept stand among all, harmonic-major."""
+        """Positions of the kept unknowns among all, harmonic-major."""
         rows = [self.harmonics[0].kept]
         for h, own in enumerate(self.harmonics[1:], start=1):
             rows += [(2 * h - 1) * self.n + own.kept, 2 * h * self.n + own.kept]
@@ -184,7 +184,7 @@ class Resting:
 
     @property
     def size(self) -> int:
-        """Unknowns that are kept."""
+        """Number of kept unknowns."""
         return int(self.kept.size)
 
     @property
@@ -224,7 +224,7 @@ class Resting:
         return np.asfortranarray(out)
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the right side (size, j) that is left of `right` (N, j), and ``J_RR⁻¹ b_R`` (N, j), zero at what is kept; see `Elimination`."""
+        """Return the right side (size, j) of S from `right` (N, j), and ``J_RR⁻¹ b_R`` (N, j), zero for kept unknowns; see `Elimination`."""
         q = to_complex(right.reshape(-1, self.n, right.shape[1]))
         inner = np.zeros_like(q)
         for x, b, own in zip(inner, q, self.harmonics, strict=True):
@@ -240,7 +240,7 @@ class Resting:
         return left[self.kept], solved
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Return all unknowns (N, j) that kept ones (size, j) make, if nothing acts on the others."""
+        """Return all unknowns (N, j) from the kept ones (size, j), without load on the others."""
         out = np.zeros((self.n * (2 * len(self.harmonics) - 1), x.shape[1]))
         out[self.kept] = x
         q = to_complex(out.reshape(-1, self.n, x.shape[1]))
@@ -278,7 +278,7 @@ class Resting:
 
 @dataclass(eq=False)
 class Known:
-    """What is known of a dynamic stiffness at one frequency: its matrices, and the last elimination from them; build it with `known`."""
+    """Cache of a dynamic stiffness at one frequency: its matrices, and the last elimination; build it with `known`."""
 
     linear: StiffnessProducts
     _last: tuple[Coupling, float, tuple[_Harmonic, ...]] | None = None
@@ -289,16 +289,16 @@ class Known:
         return [as_array(self.linear.block(h)) for h in self.linear.harmonics]
 
     def knows(self, contacts: Coupling, scale: float) -> bool:
-        """Whether what rests is what rested last."""
+        """Whether the last elimination still holds for `contacts`."""
         return self._last is not None and self._last[1] == scale and contacts.same_rest(self._last[0])
 
     def without_resting(self, contacts: Coupling, rows: SparseRows, scale: float) -> Resting:
-        """Eliminate what rests.
+        """Eliminate the unknowns that contacts do not couple.
 
         Parameters
         ----------
         contacts
-            What couples harmonics.
+            Contact forces that couple harmonics.
         rows
             Gap operator by contact, the same at each call.
         scale
@@ -319,7 +319,7 @@ class Known:
 
 @lru_cache(maxsize=2)
 def known(linear: StiffnessProducts, _rows: SparseRows) -> Known:
-    """Return what is known of a dynamic stiffness at one frequency, with the contacts at some places."""
+    """Return the cache of a dynamic stiffness at one frequency, for contacts with the gap operator `_rows`."""
     return Known(linear)
 
 
@@ -331,7 +331,7 @@ class TransposedElimination:
 
     @property
     def size(self) -> int:
-        """Unknowns that are left."""
+        """Number of remaining unknowns."""
         return self.inside.size
 
     @property
@@ -340,13 +340,13 @@ class TransposedElimination:
         return self.inside.sign
 
     def array(self) -> FloatArray:
-        """Return what is left, (size, size)."""
+        """Return the Schur complement, (size, size)."""
         return np.asfortranarray(self.inside.array().T)
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return what is left of right sides, and what they make of the eliminated unknowns; see `Elimination`."""
+        """Return the right sides of the Schur complement, and their part of the eliminated unknowns; see `Elimination`."""
         return self.inside.reduced(right, transposed=not transposed)
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Return all unknowns that those that are left make."""
+        """Return all unknowns from the remaining ones; see `Elimination`."""
         return self.inside.spread(x, transposed=not transposed)

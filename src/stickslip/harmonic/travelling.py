@@ -36,9 +36,9 @@ _last: "WeakKeyDictionary[Structure, tuple[bytes, CondensedStiffness]]" = WeakKe
 
 
 def condensed_once(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:
-    """Prepare the exact condensation as `condense` does, from what the same structure's last one left.
+    """Prepare the exact condensation as `condense` does; the last one of the same structure is reused if matrices and retained dofs are the same.
 
-    Matrices changed in place are told by their contents.
+    A hash of the contents detects matrices that were changed in place.
     """
     if structure.n < LARGE or load.static.size != structure.n:
         return condense(structure, retained, load)
@@ -71,16 +71,16 @@ ANY = 100  # harmonics for which a wheel with every wave is there
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """The waves that the harmonics vibrate as, condensed each when it is first needed, and kept.
+    """The waves of the harmonics; each is condensed at first use and cached.
 
     Parameters
     ----------
     structures
-        Of harmonics 0, 1, ...
+        Structures of the harmonics 0, 1, ...
     near, far
         Retained dofs and interior.
     feedback
-        Aerodynamic force on each, of which the structures hold the frozen form; empty: none.
+        Aerodynamic force on each wave, whose frozen form is in the structures; empty: none.
     """
 
     structures: tuple[Structure, ...]
@@ -104,7 +104,7 @@ class Waves:
         return self.known[key]
 
     def force_on(self, h: int) -> Feedback | None:
-        """Return the aerodynamic force on a harmonic; None for none."""
+        """Return the aerodynamic force on a harmonic, or None."""
         return self.feedback[h] if self.feedback else None
 
     def at(self, omega: float, harmonics: Sequence[int]) -> list[WaveAt]:
@@ -112,7 +112,7 @@ class Waves:
         return [self._mean if h == 0 else self.of_harmonic(h).at(h * omega) for h in harmonics]
 
     def with_mass_damping(self, rate: float) -> "Waves":
-        """Return the same waves with `rate` (1/s) times their mass added to their damping; what is condensed already is kept."""
+        """Return the same waves with `rate` (1/s) times their mass added to their damping; condensed waves are reused."""
         return _Damped(self.structures, self.near, self.far, self.feedback, plain=self, rate=rate)
 
     @cached_property
@@ -161,7 +161,7 @@ class TravellingStiffness:
 
     @cached_property
     def nn(self) -> Blocks:
-        """Stiffness, damping and mass of the first harmonic on the retained coordinates; for scales."""
+        """Stiffness, damping and mass of the first harmonic on the retained coordinates, for scaling."""
         one = self.waves.structures[min(1, len(self.waves.structures) - 1)]
         own = np.ix_(self.retained, self.retained)
         k, c, m = (checked_matrix(one, name)[own] for name in ("stiffness", "damping", "mass"))
@@ -173,7 +173,7 @@ class TravellingStiffness:
         return len(self.waves.structures) - 1
 
     def load_at(self, _omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N: the same at all."""
+        """Return the load, N, which is the same at all frequencies."""
         return self.load
 
     def with_load(self, load: HarmonicLoad) -> "TravellingStiffness":
@@ -181,7 +181,7 @@ class TravellingStiffness:
         return replace(self, load=load)
 
     def with_mass_damping(self, rate: float) -> "TravellingStiffness":
-        """Return the same waves with `rate` (1/s) times their mass added to their damping; negative: taken away."""
+        """Return the same waves with `rate` (1/s) times their mass added to their damping; the rate may be negative."""
         return replace(self, waves=self.waves.with_mass_damping(rate))
 
     def condensed(self, omega: float, order: int) -> Condensed:
@@ -194,7 +194,7 @@ class TravellingStiffness:
         return Condensed(stiffness, h[:, None, None] * slopes, loads, h[:, None] * load_slopes)
 
     def products(self, omega: float, harmonics: Harmonics) -> "CondensedWaves":
-        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        """Return the condensed matrices as products, at `omega` (rad/s) and for `harmonics`."""
         return CondensedWaves(self, omega, harmonics)
 
     def at(self, omega: float, harmonics: Sequence[int]) -> list[WaveAt]:
@@ -217,7 +217,7 @@ class TravellingStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], all_dofs), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
         (wave,) = self.at(omega, [harmonic])
         spread = np.zeros((self.n + self.interior.size, self.n), dtype=complex)
         spread[self.retained] = np.eye(self.n)
@@ -225,7 +225,7 @@ class TravellingStiffness:
         return spread[dofs]
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
-        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J; none is in the fluid."""
+        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J; aerodynamic stiffness stores none."""
         twice = []
         for h, x in enumerate(self.recover(omega, q)):
             stiffness, force = self.waves.structures[h].stiffness, self.waves.force_on(h)
@@ -252,7 +252,7 @@ class CondensedWaves:
 
     @cached_property
     def waves(self) -> list[WaveAt]:
-        """Of each of the harmonics."""
+        """Condensed wave of each harmonic."""
         return self.linear.at(self.omega, self.harmonics)
 
     @property
@@ -271,7 +271,7 @@ class CondensedWaves:
 
     @cached_property
     def load_slope(self) -> FloatArray:
-        """(m, n) its derivative by ω."""
+        """(m, n) derivative of the load by ω."""
         return to_real(np.array(self.harmonics)[:, None] * self._loads[1])
 
     def same(self, other: object) -> bool:
@@ -288,7 +288,7 @@ class CondensedWaves:
         return self._each(rows, lambda wave, q: wave.stiffness @ q)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
+        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
         return self._each(rows, lambda wave, q: (q.conj() @ wave.stiffness).conj())
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -297,7 +297,7 @@ class CondensedWaves:
         return self.product(rows), to_real(np.array(self.harmonics)[:, None] * np.array(slope))
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        """Return a copy of ``Z_h``, (n, n) complex in Fortran order."""
         return np.array(self.waves[self.harmonics.index(harmonic)].stiffness, order="F")
 
     def _each(self, rows: FloatArray, times: Callable[[WaveAt, ComplexArray], Array]) -> FloatArray:
@@ -306,10 +306,10 @@ class CondensedWaves:
 
 
 def condense_side(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
-    """Prepare the exact condensation of what vibrates, for harmonics up to `order`.
+    """Prepare the exact condensation of a linear side, for harmonics up to `order`.
 
-    Not at all where it is unreduced (`keep_all`). By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
-    `condense_mistuned` where that is a wheel of sectors; by `condense_waves` otherwise.
+    An unreduced structure is not condensed (`keep_all`). If all harmonics vibrate as one real symmetric structure, `condense` condenses it, at the cost of
+    few products a frequency, or `condense_mistuned` a wheel of sectors; `condense_waves` condenses all others.
     """
     if isinstance(side, Unreduced) and side.n >= LEAST_SPARSE:
         return keep_all(side.structure, load)
@@ -342,7 +342,7 @@ def condense_waves(
     load
         Load on all dofs, each harmonic in the coordinates of its wave, N.
     feedback
-        Aerodynamic force on each harmonic, of which the structures hold the frozen form; empty: none.
+        Aerodynamic force on each harmonic, whose frozen form is in the structures; empty: none.
 
     Raises
     ------

@@ -29,12 +29,12 @@ MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
 
 @dataclass(frozen=True, eq=False)
 class CombinedProducts:
-    """One matrix for each combined frequency, by products; `StiffnessProducts` whose harmonics are the places of combined frequencies.
+    """Products with one matrix for each combined frequency: `StiffnessProducts` whose harmonics are the positions of combined frequencies.
 
     Parameters
     ----------
     stiffness
-        (k, n, n) of each, the static one first, N/m.
+        (k, n, n) dynamic stiffness of each combined frequency, the static one first, N/m.
     """
 
     stiffness: ComplexArray
@@ -46,7 +46,7 @@ class CombinedProducts:
 
     @property
     def harmonics(self) -> Harmonics:
-        """Their places."""
+        """Positions of the combined frequencies."""
         return tuple(range(len(self.stiffness)))
 
     def same(self, other: object) -> bool:
@@ -58,30 +58,30 @@ class CombinedProducts:
         return to_real((self.stiffness @ to_complex(rows)[:, :, None])[..., 0])
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
+        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
         return to_real((to_complex(rows).conj()[:, None, :] @ self.stiffness)[:, 0].conj())
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return the matrix at a place, (n, n) in Fortran order, to be changed at will."""
+        """Return a copy of the matrix at a position, (n, n) in Fortran order."""
         return np.array(self.stiffness[harmonic], order="F")
 
 
 @dataclass(frozen=True, eq=False)
 class TorusForces:
-    """Contacts over the torus.
+    """Contact forces over the torus.
 
     Parameters
     ----------
     coefficients
-        (m, 3 n_contacts) of the forces, N.
+        (m, 3 n_contacts) coefficients of the forces, N.
     blocks
-        (n_contacts, P, m, m) derivatives by those of the gaps.
+        (n_contacts, P, m, m) derivatives by the coefficients of the gaps, N/m.
     beyond
-        (m', 3 n_contacts) coefficients at the combined frequencies asked for besides.
+        (m', 3 n_contacts) coefficients at additional combined frequencies, N.
     rates
         Whether a force depends on velocity.
     unsettled
-        Contacts whose state did not repeat on a characteristic.
+        Number of contacts whose state did not repeat on a characteristic.
     """
 
     coefficients: FloatArray
@@ -154,7 +154,7 @@ class TorusBalance:
         return to_real(coefficients).reshape(-1) / self.displacement_scale
 
     def with_indices(self, indices: Indices) -> "TorusBalance":
-        """Return the same with other combined frequencies."""
+        """Return the same problem with other combined frequencies."""
         # rows of its own: they tell a solver which Jacobians can share a preconditioner
         return replace(self, indices=indices, rows=replace(self.rows))
 
@@ -167,7 +167,7 @@ class TorusBalance:
     def forces(
         self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices = ((0, 0),)
     ) -> TorusForces:
-        """Return what the contacts do on the torus, `more` names combined frequencies at which their forces are asked for, too."""
+        """Return the contact forces on the torus, also at the additional combined frequencies `more`."""
         gaps = self.rows.gaps(x.reshape(self.n_rows, self.side.n) * self.displacement_scale)
         frequencies = self.frequencies(omegas)
         n, m, pairs = self.compiled.n_contacts, self.n_rows, self.compiled.pairs
@@ -225,9 +225,9 @@ class TorusBalance:
         )
 
     def left_out(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices) -> ComplexArray:
-        """Return the (len(more), n) motion that the contact forces at combined frequencies left out would make, m; 0 at (0, 0).
+        """Return the (len(more), n) motion, m, that the contact forces at neglected combined frequencies would cause; 0 at (0, 0).
 
-        Contacts answer it with the stiffness that they have against the first frequency.
+        Contacts have the same stiffness for it as for the first frequency.
         """
         forces = self.forces(x, omegas, path, more)
         out = np.zeros((2 * len(more) - 1, self.side.n))
@@ -267,7 +267,7 @@ def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBal
     Parameters
     ----------
     side
-        What vibrates and its loads.
+        Condensed structure or wheel with its loads.
     interface
         Contacts on all dofs.
     order

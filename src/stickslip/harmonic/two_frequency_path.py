@@ -31,11 +31,11 @@ class TorusPath:
     Parameters
     ----------
     turns
-        Of the first and of the second phase after which a characteristic closes; they have no common divisor.
+        Turns of the first and second phase after which a characteristic closes; they have no common divisor.
     ways
-        Characteristics beside each other.
+        Number of parallel characteristics.
     samples
-        On each of them.
+        Number of samples on each characteristic.
     """
 
     turns: tuple[int, int]
@@ -44,7 +44,7 @@ class TorusPath:
 
     @property
     def ratio(self) -> float:
-        """What stands for ω2 / ω1 in the contacts."""
+        """Rational approximation of ω2 / ω1 in the contacts."""
         return self.turns[1] / self.turns[0]
 
     def phases(self, way: int) -> tuple[FloatArray, FloatArray]:
@@ -54,7 +54,7 @@ class TorusPath:
         return self.turns[0] * along, self.turns[1] * along + offset
 
     def slip(self, ratio: float) -> float:
-        """Return by how much the second phase is off after a turn of the first, rad."""
+        """Return the error of the second phase after a turn of the first, rad."""
         return 2.0 * np.pi * abs(ratio - self.ratio)
 
 
@@ -76,16 +76,16 @@ def half_plane(order: int) -> Indices:
 
 
 def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
-    """Return the shortest path whose ratio of whole numbers stands for `ratio`, ω2 / ω1.
+    """Return the shortest path with a rational approximation of `ratio`, ω2 / ω1.
 
     Parameters
     ----------
     ratio
-        Above zero.
+        ω2 / ω1, above zero.
     order
-        Highest sum of harmonics kept.
+        Largest sum of harmonics.
     refine
-        Times the usual number of turns and of samples a turn.
+        Factor on the usual number of turns and of samples a turn.
     """
     least = ceil(refine * max(TURNS_A_HARMONIC * order, LEAST_TURNS))
     choices = [(p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1]

@@ -13,16 +13,16 @@ from stickslip.harmonic.two_frequency_path import Indices
 
 @dataclass(frozen=True, eq=False)
 class TorusSide:
-    """What vibrates with two frequencies, condensed.
+    """A condensed structure or wheel with two excitation frequencies.
 
     Parameters
     ----------
     first, second
-        With the loads of either frequency; the static one is that of `first`.
+        Dynamic stiffness with the loads of either frequency; the static load is that of `first`.
     waves
-        Of a tuned wheel the wave numbers of both frequencies, and the number of sectors; None: one structure vibrates at all frequencies.
+        Wave numbers of both frequencies and number of sectors of a tuned wheel; None: one structure for all frequencies.
     still
-        Without a load, by wave number modulo the sectors; 0 for one structure.
+        Dynamic stiffness without a load, by wave number modulo the sectors; 0 for one structure.
     """
 
     first: DynamicStiffness
@@ -45,21 +45,21 @@ class TorusSide:
     def stiffness(
         self, indices: Indices, omegas: tuple[float, float], rate: float = 0.0
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Return (len, n, n) the dynamic stiffness of each combined frequency and its derivative by that frequency.
+        """Return the (len, n, n) dynamic stiffness at each combined frequency and its derivative by that frequency.
 
         Parameters
         ----------
         indices
-            Of the frequencies.
+            Indices of the combined frequencies.
         omegas
             ω1 and ω2, rad/s.
         rate
-            1/s: so many times the mass is taken away from the damping wherever the second frequency takes part.
+            Rate, 1/s, times which the mass is subtracted from the damping at all combined frequencies with the second one.
         """
         return _stiffness(self, indices, omegas, rate)
 
     def load(self, indices: Indices, omegas: tuple[float, float]) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return (len, n) the condensed load of each combined frequency and its derivatives by ω1 and ω2."""
+        """Return the (len, n) condensed load at each combined frequency and its derivatives by ω1 and ω2."""
         out = np.zeros((3, len(indices), self.n), dtype=complex)
         top = max(max(abs(j), abs(k)) for j, k in indices)
         one, two = self.first.condensed(omegas[0], top), self.second.condensed(omegas[1], top)
@@ -71,7 +71,7 @@ class TorusSide:
         return out[0], out[1], out[2]
 
     def recover(self, indices: Indices, omegas: tuple[float, float], q: ComplexArray) -> ComplexArray:
-        """Return the (len, n_all) motion of all dofs from that of the retained ones (len, n)."""
+        """Return the (len, n_all) motion of all dofs from that of the retained coordinates (len, n)."""
         top = max(max(abs(j), abs(k)) for j, k in indices)
         own: list[ComplexArray | None] = [None] * len(indices)
         for linear, omega, places in (

@@ -59,7 +59,7 @@ class SolvedWave:
     near, far
         Retained dofs and interior.
     feedback
-        Aerodynamic force that depends on the frequency, of which the matrices hold the frozen form; None for none.
+        Aerodynamic force that depends on the frequency, whose frozen form is in the matrices; None: no force.
     """
 
     matrices: Four
@@ -136,11 +136,11 @@ class ModalWave:
     nn
         Matrices on the retained coordinates, condensed with the static shapes of the interior.
     static
-        (n, l) those shapes: the interior follows by ``-modes @ staticᴴ q``.
+        (n, l) static shapes: the static response of the interior is ``-modes @ staticᴴ q``.
     across
-        (n, l) mass between the two.
+        (n, l) mass coupling of retained coordinates and interior.
     ratio, damping, mass, loss
-        (l,) κ, c, m and l.
+        (l,) κ, c, m and l of ``D_NL`` and ``D_LL``.
     modes
         (l, l) interior displacement = modes @ interior coordinates.
     """
@@ -156,11 +156,11 @@ class ModalWave:
 
     @cached_property
     def back(self) -> ComplexArray:
-        """(l, n) conjugate transpose of `across`; every frequency multiplies with it."""
+        """(l, n) conjugate transpose of `across`, used at every frequency."""
         return np.asarray(self.across.conj().T, dtype=complex, order="C")
 
     def with_mass_damping(self, rate: float) -> "ModalWave":
-        """Return the same wave with `rate` (1/s) times its mass added to its damping: its modes stay what they are."""
+        """Return the same wave with `rate` (1/s) times its mass added to its damping; its modes do not change."""
         k, c, m, loss = self.nn
         return replace(
             self, nn=(k, c + rate * m, m, loss), ratio=self.ratio + rate, damping=self.damping + rate * self.mass
@@ -230,11 +230,11 @@ def condense_wave(
     structure
         The wave.
     near, far
-        Dofs that are retained and those that are condensed.
+        Retained and condensed dofs.
     mean
-        Whether it is the mean of a real motion, which feels the real part of the matrices and has one frequency, zero.
+        Whether the wave is the mean of a real motion, which has the real part of the matrices and the frequency zero.
     feedback
-        Aerodynamic force on it, of which the structure holds the frozen form; None for none.
+        Aerodynamic force on the wave, whose frozen form is in the structure; None: no force.
     """
     names = ("stiffness", "damping", "mass", "loss")
     k, c, m, loss = (_matrix(structure, name, mean) for name in names)

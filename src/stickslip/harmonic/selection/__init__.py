@@ -9,16 +9,16 @@ from stickslip.harmonic.strategies import STRATEGIES
 
 
 def strategy_named(name: str, threshold: float | None = None, **options: bool) -> Strategy:
-    """Return a strategy with its own parameters, but for a threshold and options; its file is loaded when it is first asked for.
+    """Return a strategy with its default parameters, except for threshold and options; its module is imported at first use.
 
     Parameters
     ----------
     name
         One of `STRATEGIES`.
     threshold
-        Indicator above which more harmonics are asked for; None: that of the strategy's source.
+        Indicator above which more harmonics are needed; None: the value of the strategy's source.
     options
-        ``per_dof`` and ``repeats`` of those that have them (`strategies.options_of`).
+        ``per_dof`` and ``repeats``, for strategies that have them (`strategies.options_of`).
     """
     own = _class_of(name)
     strategy: Strategy = own(**options) if threshold is None else own(threshold=threshold, **options)

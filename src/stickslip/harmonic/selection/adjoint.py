@@ -39,9 +39,9 @@ class Outputs:
     Attributes
     ----------
     harmonics, dofs
-        (k,) what the outputs are.
+        (k,) harmonic and dof of each output.
     motion
-        (k,) what changes are relative to, m: the complex displacement, or with its phase the larger size that the measure has.
+        (k,) reference of relative changes, m: the complex displacement, or the larger reference of the measure with the same phase.
     goal
         ``motion``: relative changes are complex; ``amplitude``: only their real parts count.
     """
@@ -56,7 +56,7 @@ class Outputs:
         return self.counted(change[self.harmonics, self.dofs] / self.motion)
 
     def counted(self, change: ComplexArray) -> ComplexArray:
-        """Return what of the relative changes (k, ...) counts."""
+        """Return the relative changes (k, ...), or their real parts where the goal is ``amplitude``."""
         return change.real.astype(complex) if self.goal == "amplitude" else change
 
     def some(self, places: IntArray) -> "Outputs":
@@ -65,7 +65,7 @@ class Outputs:
 
 
 def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion") -> Outputs:
-    """Return the outputs of a measure that have a relative error, with what it is relative to.
+    """Return the outputs of a measure for which a relative error is defined, with their references.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
     before
         (H+1, n_all) displacement of all dofs, m.
     goal
-        What of their changes counts.
+        ``motion`` or ``amplitude``; see `Outputs`.
     """
     scales = measure.scales(before, len(before))
     motion = before[scales.harmonics[:, None], measure.dofs]
@@ -86,28 +86,28 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """A Jacobian and its LU factors, which serve the system and the transposed one; for one known by its products, a solver."""
+    """A Jacobian and its LU factors, for the system and the transposed one; for a Jacobian known by its products, a solver."""
 
     jac: FloatArray | StructuredJacobian
     factors: tuple[FloatArray, IntArray] | None
     other: Solve | None
 
     def solve(self, right: FloatArray) -> FloatArray | None:
-        """Solve with a right side (n,); None where there is no solution."""
+        """Solve with a right side (n,); None if there is no solution."""
         if self.other is not None:
             return self.other(self.jac, right)
         return None if self.factors is None else _by_factors(self.factors, right, transposed=False)
 
 
 def factored(jac: FloatArray | StructuredJacobian, solve: Solve | None) -> Factored:
-    """Factorise a Jacobian once for all that is solved with it.
+    """Factorise a Jacobian once for all its systems.
 
     Parameters
     ----------
     jac
-        An array, or a Jacobian by its products, for which `solve` is taken; without one it is made an array.
+        An array, or a Jacobian known by its products, which `solve` solves; without `solve` it becomes an array.
     solve
-        Solution of a system from its matrix and right side, None where there is none.
+        Function from matrix and right side to the solution, None if there is none.
     """
     if isinstance(jac, StructuredJacobian):
         if solve is not None:
@@ -138,7 +138,7 @@ def mean_jacobian(
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """How the missing harmonics change the outputs, relative to their amplitudes; infinite where a Jacobian is singular.
+    """Estimated changes of the outputs by the missing harmonics, relative to their amplitudes; infinite if a Jacobian is singular.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Estimate:
     residual
         Scaled residual r̃ of the padded solution.
     mean
-        The last mean Jacobian; None where nothing acts on the missing harmonics, or where it is singular.
+        The last mean Jacobian; None if nothing acts on the missing harmonics, or if it is singular.
     """
 
     changes: tuple[ComplexArray, ...]
@@ -164,17 +164,17 @@ class Estimate:
 
     @property
     def errors(self) -> FloatArray:
-        """(k,) largest relative error that is to be expected of each output: that of the last estimate or that of the alert."""
+        """(k,) largest relative error to be expected of each output: the larger of the last estimate and the alert."""
         return np.maximum(np.abs(self.changes[0]), np.abs(self.changes[-1]))
 
     @property
     def bound(self) -> float:
-        """Largest relative error that is to be expected; never below the prediction of the Jacobian Alert."""
+        """Largest relative error to be expected, at least the prediction of the Jacobian Alert."""
         return float(np.max(self.errors, initial=0.0))
 
     @property
     def doubt(self) -> float:
-        """Largest distance of two successive changes over the last change: far below 1 where all say the same."""
+        """Largest difference of two successive estimates over the last one: far below 1 if they agree."""
         if self.mean is None:
             return 0.0 if self.bound == 0.0 else np.inf
         return max(_away(one, other, self.changes[-1]) for one, other in pairwise(self.changes))
@@ -208,11 +208,11 @@ def estimate(
     omega
         Frequency, rad/s.
     outputs
-        What the error is taken of.
+        Outputs of the error.
     solve
-        For Jacobians known by their products: solution of a system from its matrix and right side; None: LU.
+        For Jacobians known by their products: function from matrix and right side to the solution; None: LU.
     events
-        Those of the contacts at the solution, where its evaluation left them (`Step.events`).
+        Events of the contacts at the solution, if its evaluation found them (`Step.events`).
     """
     padded = high.unknowns(low.coefficients(x))
     period = high.forces(padded, omega, events)
@@ -242,8 +242,8 @@ def contributions(
 ) -> ComplexArray:
     """Return the (k, n_missing) parts of the missing harmonics in the last changes of an estimate.
 
-    By two transposed solves an output (one for the static part) with the factors that the estimate has. A Jacobian
-    that is known by its products is solved for each missing harmonic's residual instead, which gives the same numbers.
+    Each output takes two transposed solves (one for the static part) with the factors of the estimate. A Jacobian
+    that is known by its products is solved for the residual of each missing harmonic instead, with the same result.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def contributions(
     omega
         Frequency, rad/s.
     outputs
-        Those of the estimate, or some of them.
+        Outputs of the estimate, or some of them.
     found
         An estimate whose mean Jacobian is regular.
     """

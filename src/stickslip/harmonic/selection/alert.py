@@ -20,16 +20,16 @@ SILENCE = 1e-12  # contact forces of the missing harmonics, as a share of the lo
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """What the alert says at one frequency.
+    """Result of the alert at one frequency.
 
     Attributes
     ----------
     error
-        Predicted relative change (eq. 22, 23, as a fraction); infinite where the enlarged Jacobian is singular.
+        Predicted relative change (eq. 22, 23, as a fraction); infinite if the enlarged Jacobian is singular.
     worst
-        Position, among the dofs asked for, of the dof with that error.
+        Position of the dof with this error among those of the measure.
     harmonic
-        The harmonic with that error.
+        The harmonic with this error.
     start
         Scaled unknowns ``q + Δq`` of the high-order problem.
     seconds_contact
@@ -70,17 +70,17 @@ def jacobian_alert(
     measure
         Dofs and harmonics over which the largest relative change is taken.
     solve
-        Solution of the enlarged system from its Jacobian and right side, None where there is none; by default by LU. The published method
-        partitions the system by harmonics; a Krylov method with factors of each harmonic does, too.
+        Function from the enlarged Jacobian and right side to the solution, None if there is none; by default LU. The published method
+        partitions the system by harmonics, as a Krylov method with factors of each harmonic does.
     form
         ``newton``, or ``published``: eq. 21 as it stands.
     events
-        Those of the contacts at the solution, where its evaluation left them (`Step.events`): then contacts are not evaluated again.
+        Events of the contacts at the solution, if its evaluation found them (`Step.events`): then contacts are not evaluated again.
 
     Raises
     ------
     InputError
-        If there is no such form.
+        If the form is unknown.
     """
     check_form(form)
     q = low.coefficients(x)
@@ -110,17 +110,17 @@ def asked_again(
     measure: ErrorMeasure,
     solve: Solve | None = None,
 ) -> Alert:
-    """Ask the contacts where a prediction leads, and go on from there by one more Newton step.
+    """Evaluate the contacts at the predicted solution, and take one more Newton step from there.
 
-    The first step keeps the contact states of the low-order solution. Where they change on the way it may say far too little; then the residual at
-    ``q + Δq`` is large, and with it the second step. Where they stay, the second step is of second order.
+    The first step keeps the contact states of the low-order solution. If they change on the way, its error may be far too small; then the residual at
+    ``q + Δq`` and the second step are large. If they stay, the second step is of second order.
 
     Parameters
     ----------
     low, high, x, omega, measure, solve
-        As of `jacobian_alert`.
+        See `jacobian_alert`.
     first
-        What that predicted.
+        Result of `jacobian_alert`.
     """
     q = low.coefficients(x)
     if np.array_equal(first.start, high.unknowns(q)):  # silent, or singular
@@ -138,7 +138,7 @@ def asked_again(
 def led_to(
     high: HarmonicBalance, q: ComplexArray, omega: float, start: FloatArray, measure: ErrorMeasure, seconds: float
 ) -> Alert:
-    """Return what the change from the low-order coefficients (H+1, n) to the scaled unknowns `start` says."""
+    """Return the alert for the change from the low-order coefficients (H+1, n) to the scaled unknowns `start`."""
     before = high.linear.recover(omega, q)
     rows = measure.rows(len(q), high.order + 1)
     change = high.coefficients(start - high.unknowns(q))[:rows]
@@ -155,7 +155,7 @@ def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> Floa
 
 
 def check_form(form: str) -> None:
-    """Refuse a form of the prediction that does not exist."""
+    """Refuse an unknown form of the prediction."""
     hint = "'newton' is right for every contact law."
     check_choice("JacobianAlert: form", form, get_args(Form), hint)
 

@@ -10,7 +10,7 @@ from stickslip.harmonic.selection.strategy import Kept, Step, Verdict
 
 @dataclass(frozen=True)
 class AlwaysLow:
-    """Keep the harmonics of the first passage; a frequency that is not found is not tried with more."""
+    """Keep the harmonics of the first passage; a frequency that does not converge is not repeated with more."""
 
     always: ClassVar[Kept] = "low"
     verifies: ClassVar[bool] = False
@@ -35,5 +35,5 @@ class AlwaysHigh:
 
 
 def accepted(step: Step) -> Verdict:
-    """Accept a solution without a look at it."""
+    """Accept a solution without a check."""
     return Verdict(np.nan, None, step.balance.harmonics)

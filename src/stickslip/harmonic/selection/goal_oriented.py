@@ -19,18 +19,18 @@ NOTHING = 1e-6  # relative change that is no reason to keep a harmonic
 
 @dataclass(frozen=True)
 class GoalOriented:
-    """Repeat with the harmonics that the outputs need where the bound of their error exceeds a threshold.
+    """Repeat with the harmonics that the outputs need if the bound of their error exceeds a threshold.
 
     Parameters
     ----------
     threshold
         Largest expected error that is accepted, as a fraction.
     left_out
-        Share of the threshold that the harmonics left out of a repeat may contribute, all taken together and without cancellation.
+        Share of the threshold that the harmonics left out of a repeat may contribute in total, without cancellation.
     goal
-        What is to be right of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
+        Accurate quantity of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
     guarded
-        Whether `GuardedAlert` is asked where the bound is below the threshold. What it alarms at is repeated with all harmonics.
+        Whether `GuardedAlert` checks solutions whose bound is below the threshold; at its alarm a frequency is repeated with all harmonics.
     """
 
     verifies: ClassVar[bool] = True
@@ -46,7 +46,7 @@ class GoalOriented:
         check_choice("GoalOriented.goal", self.goal, get_args(Goal), hint)
 
     def judge(self, step: Step) -> Verdict:
-        """Estimate the error of the outputs, and choose the harmonics that make it."""
+        """Estimate the error of the outputs, and choose the harmonics that cause it."""
         low, high = step.balance, step.reference
         if low.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)
@@ -78,7 +78,7 @@ class GoalOriented:
 
 
 def chosen_harmonics(parts: ComplexArray, missing: Harmonics, allowed: float) -> Harmonics:
-    """Return the missing harmonics with the largest parts, so many that those of the others stay below a limit together.
+    """Return the missing harmonics with the largest parts, so many that the sum of the other parts is below a limit.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def chosen_harmonics(parts: ComplexArray, missing: Harmonics, allowed: float) ->
     missing
         The harmonics.
     allowed
-        Largest sum of the sizes of the parts of one output that may be left out. One harmonic at least is chosen.
+        Limit of the sum of magnitudes of the neglected parts of one output. At least one harmonic is chosen.
     """
     size = np.abs(parts)
     order = np.argsort(-size.max(axis=0), kind="stable")

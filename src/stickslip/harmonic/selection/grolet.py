@@ -25,10 +25,10 @@ class Grolet:
         Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
         the amplitude.
     per_dof
-        Take the shares of each retained coordinate by itself, and let it keep harmonics of its own, as the source does (section
-        4.5.2.1); otherwise all coordinates get the same harmonics.
+        Evaluate the shares of each retained coordinate, which then keeps its own harmonics, as in the source (section
+        4.5.2.1); otherwise all coordinates keep the same harmonics.
     repeats
-        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
     """
 
     verifies: ClassVar[bool] = False
@@ -37,7 +37,7 @@ class Grolet:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Predict the next solution; this frequency is solved again with `repeats` alone. The indicator is the largest share left out."""
+        """Predict the next solution; this frequency is solved again only with `repeats`. The indicator is the largest share left out."""
         q = padded_solution(step)
         at = step.reference.linearise(q, step.omega)
         ahead = step.next_omega - step.omega

@@ -38,16 +38,16 @@ DOUBT = 2.0  # times the chord step that the true change may go beyond the predi
 
 @dataclass(frozen=True)
 class GuardedAlert:
-    """Repeat with all harmonics of the reference where the error may exceed a threshold: judged also in the contact states after the step.
+    """Repeat with all harmonics of the reference if the error may exceed a threshold, also judged with the contact states after the step.
 
     Parameters
     ----------
     threshold
         Largest error that is accepted, as a fraction.
     quick
-        Share of the threshold below which a prediction with its doubt is believed after the chord step.
+        Share of the threshold below which a prediction plus its uncertainty is accepted after the chord step.
     steps
-        Most Newton steps with twice the harmonics of the reference; what is not clear by then is an alarm.
+        Largest number of Newton steps with twice the harmonics of the reference; if the result is still unclear, the alarm is given.
     """
 
     verifies: ClassVar[bool] = True
@@ -62,7 +62,7 @@ class GuardedAlert:
             raise input_error("GuardedAlert.steps", f"must not be negative, got {self.steps}", "3 is usual.")
 
     def judge(self, step: Step) -> Verdict:
-        """Predict the change that all harmonics would make, and doubt it."""
+        """Predict the change by all harmonics of the reference, and verify the prediction."""
         high = step.reference
         if step.balance.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)
@@ -165,7 +165,7 @@ def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
 
 @lru_cache(maxsize=8)
 def doubled(reference: HarmonicBalance) -> HarmonicBalance:
-    """Return the same problem with harmonics up to twice the highest, or as many as there are waves of a tuned wheel: multiples of what divides all that are kept."""
+    """Return the same problem with harmonics up to twice the highest, or as many as a tuned wheel has waves: multiples of the common divisor of the kept ones."""
     order = 2 * reference.order
     most = reference.linear.most
     order = order if most is None else min(order, most)
@@ -176,7 +176,7 @@ def doubled(reference: HarmonicBalance) -> HarmonicBalance:
 def truncated(
     high: HarmonicBalance, beyond: HarmonicBalance, period: ContactPeriod, omega: float, solve: Solve | None = None
 ) -> FloatArray:
-    """Return what the harmonics that a reference leaves out would add to its scaled residual, each solved alone.
+    """Return the contribution to the reference's scaled residual of harmonics that it leaves out, each solved alone.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def truncated(
     omega
         Frequency, rad/s.
     solve
-        Solves systems that are known by their products; None: harmonic by harmonic.
+        Solver of systems known by their products; None: harmonic by harmonic.
     """
     rows, n = beyond.rows, beyond.linear.n
     force = np.zeros((beyond.n_rows, n))

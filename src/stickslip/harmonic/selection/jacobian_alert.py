@@ -16,7 +16,7 @@ class JacobianAlert:
     threshold
         Largest predicted error that is accepted, as a fraction.
     form
-        How the error is predicted: one ``newton`` step in the enlarged space, or eq. 21 as ``published``. They are the same where
+        Prediction of the error: one ``newton`` step in the enlarged space, or eq. 21 as ``published``. They are equal if
         contact forces are homogeneous of degree one.
 
     Raises
@@ -33,7 +33,7 @@ class JacobianAlert:
         check_form(self.form)
 
     def judge(self, step: Step) -> Verdict:
-        """Predict the change that all harmonics would make."""
+        """Predict the change by all harmonics of the reference."""
         high = step.reference
         if step.balance.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)

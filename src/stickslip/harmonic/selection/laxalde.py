@@ -15,15 +15,15 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 class Laxalde:
     """Keep enough harmonics at the next frequency to represent the contact forces of this one.
 
-    The error of ``nH`` harmonics is the mean over the period of what they leave of the contact forces in the time domain, absolute
-    and summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to what the static term leaves.
+    The error of ``nH`` harmonics is the mean over the period of the absolute residue of the contact forces in the time domain,
+    summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to the residue of the static term.
 
     Parameters
     ----------
     threshold
         Largest error of the forces that is accepted, a fraction; the review gives no number.
     repeats
-        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
     """
 
     verifies: ClassVar[bool] = False
@@ -31,7 +31,7 @@ class Laxalde:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Choose the lowest order whose error is small; this frequency is solved again with `repeats` alone."""
+        """Choose the lowest order whose error is small; this frequency is solved again only with `repeats`."""
         errors = left_out(step)
         orders = list(step.reference.harmonics)
         own = errors[orders.index(step.balance.order)]
@@ -41,7 +41,7 @@ class Laxalde:
 
 
 def left_out(step: Step) -> FloatArray:
-    """Return what the reference's harmonics up to each of them leave of the contact forces, relative to what the static term leaves."""
+    """Return the residue of the contact forces for each highest harmonic of the reference, relative to the residue of the static term."""
     period = contacts_of_reference(step)
     force = period.force.reshape(-1, period.force.shape[2])
     turn = np.exp(2j * np.pi * np.arange(force.shape[1]) / force.shape[1])

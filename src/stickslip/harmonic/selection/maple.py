@@ -14,7 +14,7 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 class Maple:
     """Solve a frequency with one harmonic more while the last one has too large a share of the spectral energy.
 
-    The share is that of Gastaldi & Berruti 2017, eq. 10. What was needed here is kept at the next frequency; nothing is ever
+    The share is that of Gastaldi & Berruti 2017, eq. 10. Harmonics that were needed are kept at the next frequency; none is ever
     dropped.
 
     Parameters
@@ -23,8 +23,8 @@ class Maple:
         Largest share of the last harmonic that is accepted, of the square of the motion; the review gives no number: 1e-4 is a
         hundredth of the amplitude.
     per_dof
-        Look at the last harmonic of each retained coordinate by itself, and raise those that need it, as the source does (section
-        4.5.2.1); otherwise all coordinates get the same harmonics.
+        Check the last harmonic of each retained coordinate, and raise only the coordinates that need it, as in the source (section
+        4.5.2.1); otherwise all coordinates keep the same harmonics.
     """
 
     verifies: ClassVar[bool] = False
@@ -32,7 +32,7 @@ class Maple:
     per_dof: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Compare the last harmonic with all."""
+        """Compare the energy of the last harmonic with that of all."""
         if self.per_dof:
             return self._judge_each(step)
         share = float(spectral_shares(step.balance, step.x)[-1])

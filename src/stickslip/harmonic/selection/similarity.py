@@ -18,22 +18,22 @@ NOTHING = 1e-3  # off-diagonal terms of Γ that count as zero, beside ones on th
 
 @dataclass(frozen=True, slots=True)
 class JacobianSimilarity:
-    """Similarity of the enlarged Jacobian J at a solution with few harmonics and J̃ at that with many.
+    """Similarity of the enlarged Jacobian J at a solution with few harmonics to J̃ at the solution with many.
 
     Attributes
     ----------
     change
         ``‖J - J̃‖ / ‖J̃‖`` in the Frobenius norm (eq. 30, as a fraction).
     size
-        Rows of the Jacobians.
+        Number of rows of the Jacobians.
     trace
-        Of ``Γ = J⁻¹ J̃`` (eq. 31); equal to `size` where both are the same.
+        Trace of ``Γ = J⁻¹ J̃`` (eq. 31); equal to `size` if both are equal.
     mean_diagonal
         Trace over size.
     zero_share
         Share of the off-diagonal terms of Γ of at most `tolerance`.
     tolerance
-        What counts as zero.
+        Largest size of an entry that counts as zero.
     """
 
     change: float
@@ -54,8 +54,8 @@ def jacobian_similarity(
 ) -> JacobianSimilarity:
     """Compare the Jacobians at a solution with few harmonics and at one with many.
 
-    Both are Jacobians of the same, large problem; they differ in the motion at which the contacts are evaluated, and so in nothing
-    else than the derivatives K̂ of the contact forces.
+    Both are Jacobians of the same, large problem; the contacts are evaluated at different motions, so they differ only in
+    the derivatives K̂ of the contact forces.
 
     Parameters
     ----------
@@ -70,15 +70,15 @@ def jacobian_similarity(
     tolerance
         Off-diagonal terms of Γ up to this size count as zero.
     scales
-        (n,) size of one unit of each retained coordinate, so that translations and rotations can be summed; None: that at which
-        the stuck contacts and the structure answer with a unit force (`natural_scales`). The diagonal of Γ does not depend on it.
+        (n,) size of one unit of each retained coordinate, so that translations and rotations can be summed; None: the displacement at which
+        stuck contacts and structure respond with a unit force (`natural_scales`). The diagonal of Γ does not depend on it.
 
     Raises
     ------
     SingularError
         If J is singular, so that there is no Γ.
     InputError
-        If a vector has another length, or `scales` are not positive.
+        If a vector has the wrong length, or `scales` are not positive.
     """
     for name, vector in (("x", x), ("reference", reference)):
         if np.shape(vector) != (balance.size,):
@@ -112,7 +112,7 @@ def harmonic_block_norms(
     kept: Harmonics | None = None,
     scales: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the norms of the blocks ``∂r^h/∂q^k`` between harmonics: how strongly motion in k acts on forces in h (fig. 1).
+    """Return the norms of the blocks ``∂r^h/∂q^k`` between harmonics: the effect of motion in k on forces in h (fig. 1).
 
     Parameters
     ----------
@@ -123,10 +123,10 @@ def harmonic_block_norms(
     omega
         Frequency, rad/s.
     part
-        ``jacobian``: of J; ``contact``: of K̂; ``missing``: of ΔJ (eq. 20), what a solution that keeps only the harmonics `kept`
-        neglects: the blocks between different harmonics of which at least one is not kept.
+        ``jacobian``: of J; ``contact``: of K̂; ``missing``: of ΔJ (eq. 20), the blocks that a solution with only the harmonics `kept`
+        neglects: those between different harmonics of which at least one is not kept.
     kept
-        Harmonics of the solution with few; for ``missing``.
+        Harmonics of the solution with few harmonics, for ``missing``.
     scales
         (n,) size of one unit of each coordinate; see `jacobian_similarity`.
 
@@ -138,7 +138,7 @@ def harmonic_block_norms(
     Raises
     ------
     InputError
-        If there is no such part, or ``missing`` is asked for without `kept`.
+        If the part is unknown, or is ``missing`` without `kept`.
     """
     if part not in get_args(Part) or (part == "missing" and kept is None):
         raise input_error(
@@ -153,9 +153,9 @@ def harmonic_block_norms(
 
 
 def natural_scales(balance: HarmonicBalance) -> FloatArray:
-    """Return the size of each retained coordinate at which structure and stuck contacts answer with a force of one, (n,).
+    """Return the (n,) displacement of each retained coordinate at which structure and stuck contacts respond with a unit force.
 
-    In such units every coordinate has the same static stiffness, whatever unit it came in; a coordinate that nothing holds keeps its own.
+    In such units every coordinate has the same static stiffness, whatever its original unit; a coordinate without stiffness keeps its unit.
     """
     contacts = balance.interface
     stuck = contacts.gap_operator.power(2).T @ contacts.stuck_stiffness()

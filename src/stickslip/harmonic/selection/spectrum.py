@@ -12,7 +12,7 @@ from stickslip.harmonic.selection.strategy import NOISE, Step, Verdict
 
 
 def padded_solution(step: Step) -> FloatArray:
-    """Return the scaled unknowns of a solution in the reference's space, zeros at the harmonics it lacks."""
+    """Return the scaled unknowns of a solution in the reference's space, zeros for missing harmonics."""
     return step.reference.unknowns(step.balance.coefficients(step.x))
 
 
@@ -37,7 +37,7 @@ def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        (len(harmonics),), the static term first; zeros where nothing moves.
+        (len(harmonics),), the static term first; zeros if nothing moves.
     """
     gaps = balance.rows.gaps(x.reshape(balance.n_rows, balance.linear.n))
     square = np.sum(gaps**2, axis=1)
@@ -47,7 +47,7 @@ def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
 
 
 def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
-    """Return the share of each harmonic in the spectral energy of each coordinate by itself (Gastaldi & Berruti 2017, eq. 10 for one dof).
+    """Return the share of each harmonic in the spectral energy of each coordinate (Gastaldi & Berruti 2017, eq. 10 for one dof).
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        (len(harmonics), n), the static term first; zeros where a coordinate moves less than a millionth of the largest, which is
-        what a solver leaves of zero.
+        (len(harmonics), n), the static term first; zeros for a coordinate that moves less than a millionth of the largest, which is
+        the residual of a solver.
     """
     square = x.reshape(balance.n_rows, balance.linear.n) ** 2
     each = np.concatenate([square[:1], square[1::2] + square[2::2]])
@@ -70,24 +70,24 @@ def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
 
 
 def above(step: Step, indicators: Iterable[float], threshold: float) -> Harmonics:
-    """Return the harmonics of the reference whose indicator exceeds a threshold, and those below which no strategy goes."""
+    """Return the harmonics of the reference whose indicator exceeds a threshold, and those of the first passage."""
     pairs = zip(step.reference.harmonics, indicators, strict=True)
     return tuple(sorted({*step.smallest, *(h for h, share in pairs if share > threshold)}))
 
 
 def up_to(step: Step, order: int) -> Harmonics:
-    """Return the harmonics of the reference up to `order`, and those below which no strategy goes."""
+    """Return the harmonics of the reference up to `order`, and those of the first passage."""
     return tuple(sorted({*step.smallest, *(h for h in step.reference.harmonics if h <= order)}))
 
 
 def next_up(step: Step, had: Harmonics) -> Harmonics:
-    """Return some harmonics and the reference's next one above them; the same where there is none."""
+    """Return some harmonics and the reference's next one above them; the same if there is none."""
     more = [h for h in step.reference.harmonics if h > had[-1]]
     return tuple(sorted({*had, *more[:1]}))
 
 
 def raised(step: Step) -> Harmonics | None:
-    """Return the harmonics of a solution and the reference's next one above them; None where there is none."""
+    """Return the harmonics of a solution and the reference's next one above them; None if there is none."""
     more = next_up(step, step.balance.harmonics)
     return None if more == step.balance.harmonics else more
 
@@ -95,10 +95,10 @@ def raised(step: Step) -> Harmonics | None:
 def foretold(
     step: Step, indicator: float, following: Harmonics, *, repeats: bool, by_dof: ByDof | None = None
 ) -> Verdict:
-    """Return the verdict of a rule that foretells the next frequency.
+    """Return the verdict of a rule that predicts the harmonics of the next frequency.
 
-    `by_dof` are the harmonics that are foretold for each coordinate, None: for all the same. With `repeats` this one is solved again, with what it has and what is foretold, until nothing is foretold that it lacks
-    (Gastaldi & Berruti 2017, section 4.5.3). Harmonics are only added on the way, so that it ends.
+    `by_dof` are the predicted harmonics of each coordinate; None: the same for all. With `repeats` this frequency is solved again with its own and the
+    predicted harmonics, until it has all predicted ones (Gastaldi & Berruti 2017, section 4.5.3). Harmonics are only added, so that repeats end.
     """
     if by_dof is None:
         lacks = set(following) - set(step.balance.harmonics)

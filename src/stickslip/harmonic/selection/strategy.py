@@ -33,19 +33,20 @@ NOISE = 1e-6
 class ErrorMeasure:
     """The largest relative change over some dofs.
 
-    Of the *answer*, where dofs have units: the change of each dof as a vector of its complex amplitudes, relative to that vector or to 1 % of the largest
-    of its unit, whichever is larger; a dof that stands still beside others is compared with these, and a unit in which nothing moves is left out. *As published*, without units (Gastaldi & Berruti 2017, eq. 22,
-    23 and 29): of each harmonic by itself, and dofs that move less than a thousandth of the largest are left out.
+    With `units`, the error of the *response*: the change of each dof as a vector of its complex amplitudes, relative to that vector or to 1 % of the
+    largest of the same unit, whichever is larger. A dof nearly at rest is thus compared with the others, and a unit in which nothing moves is left out.
+    Without units the error *as published* (Gastaldi & Berruti 2017, eq. 22, 23 and 29): each harmonic by itself; dofs that move less than a thousandth of
+    the largest are left out.
 
     Parameters
     ----------
     dofs
         Dofs of the structure: outputs, contact dofs, chosen directions.
     harmonics
-        Harmonics of which the change is taken: 1; 0 for the static part; those that the excitation drives. None: all but the static part, which
-        only an error of the answer has.
+        Harmonics of the change: 1; 0 for the static part; those of the excitation. None: all except the static part, which
+        is possible only for an error of the response.
     units
-        (k,) number of the unit of each dof: lengths apart from rotations. None: as published.
+        (k,) number of the unit of each dof, which separates lengths from rotations. None: error as published.
 
     Raises
     ------
@@ -67,11 +68,11 @@ class ErrorMeasure:
             )
 
     def rows(self, fewer: int, more: int) -> int:
-        """Return how many rows (harmonics from 0 on) of two motions of so many rows are compared: all that both have, or all where all harmonics count."""
+        """Return the number of compared rows (harmonics from 0 on) of two motions with `fewer` and `more` rows: the common ones, or all if all harmonics count."""
         return max(fewer, more) if self.harmonics is None else min(fewer, more)
 
     def change(self, before: ComplexArray, moved: ComplexArray) -> tuple[float, int, int]:
-        """Return the largest relative change and the position of its dof and its harmonic.
+        """Return the largest relative change, the position of its dof, and its harmonic.
 
         Parameters
         ----------
@@ -92,14 +93,14 @@ class ErrorMeasure:
         return float(error.reshape(-1)[place]), column, int(scales.harmonics[row])
 
     def scales(self, before: ComplexArray, rows: int) -> "Scales":
-        """Return what changes of each harmonic and dof are compared with.
+        """Return the reference of changes for each harmonic and dof.
 
         Parameters
         ----------
         before
             (H+1, n_all) displacement of all dofs, m.
         rows
-            Harmonics from 0 on that the change has.
+            Number of harmonics of the change, from 0 on.
         """
         if self.harmonics is None:
             own = np.arange(1, max(len(before), rows))
@@ -122,14 +123,14 @@ class ErrorMeasure:
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """What changes are compared with.
+    """References of relative changes.
 
     Attributes
     ----------
     harmonics
         (k,) harmonics that count.
     size
-        (k, n_dofs) m; 0 where a change does not count.
+        (k, n_dofs) reference, m; 0 where a change does not count.
     """
 
     harmonics: IntArray
@@ -148,7 +149,7 @@ def _rows(motion: ComplexArray, harmonics: IntArray) -> ComplexArray:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A converged solution at one frequency, as a strategy sees it.
+    """A converged solution at one frequency, the input of a strategy.
 
     Attributes
     ----------
@@ -161,17 +162,17 @@ class Step:
     x
         Scaled solution of `balance`.
     omega, next_omega
-        Frequency of the solution and of the next step, rad/s; equal where there is no next one or it is not known.
+        Frequency of the solution and of the next step, rad/s; equal if there is no next one or it is unknown.
     measure
-        What an error is taken of.
+        Measure of the error.
     solve
-        Solution of a linear system from its matrix and right side, None where there is none; None: LU factors.
+        Function from matrix and right side to the solution of a linear system, None if there is none; None: LU factors.
     before
-        Solution with fewer harmonics at the same frequency, where this one repeats it.
+        Solution with fewer harmonics at the same frequency, if this one is a repeat.
     left
-        Events that the accepted evaluation left, see `events`.
+        Events found by the accepted evaluation, see `events`.
     by_dof
-        Harmonics of each retained coordinate, where these differ: all others of `x` are zero; None: those of `balance` in all.
+        Harmonics of each retained coordinate, if these differ; the others are zero in `x`. None: those of `balance` for all.
     """
 
     balance: HarmonicBalance
@@ -193,9 +194,9 @@ class Step:
 
     @cached_property
     def events(self) -> Events | None:
-        """Where contacts change their states at the solution; None where that is not known: contacts that are marched or on samples.
+        """Events of the contacts at the solution; None if unknown, for contacts that are marched or on samples.
 
-        With them, ``reference.forces(padded, omega, events)`` is the forces of more harmonics and evaluates no contact.
+        With them, ``reference.forces(padded, omega, events)`` returns the forces in more harmonics without evaluating a contact.
         """
         if self.left is not None or not self.balance.compiled.keeps_events:
             return self.left
@@ -210,15 +211,15 @@ class Verdict:
     Attributes
     ----------
     indicator
-        The number that was compared with the strategy's threshold: a predicted error, a share of energy, ...
+        The number compared with the strategy's threshold: a predicted error, a share of energy, ...
     again
-        Harmonics with which this frequency is to be solved again; None: the solution is accepted.
+        Harmonics with which this frequency must be solved again; None: the solution is accepted.
     following
-        Harmonics with which the next frequency begins, in a single passage.
+        Harmonics of the next frequency in a single passage.
     start
         (H+1, n) coefficients from which the repeat starts, m; None: from the solution.
     again_by_dof, following_by_dof
-        The same for each retained coordinate, where these differ; `again` and `following` are those of all together.
+        The same for each retained coordinate, if these differ; `again` and `following` are then their unions.
     """
 
     indicator: float
@@ -230,42 +231,42 @@ class Verdict:
 
 
 class Strategy(Protocol):
-    """What a passage through the frequencies needs of a strategy; frozen dataclasses implement it."""
+    """Protocol of strategies of harmonic selection; frozen dataclasses implement it."""
 
     @property
     def threshold(self) -> float:
-        """Indicator above which more harmonics are asked for."""
+        """Indicator above which more harmonics are needed."""
         ...
 
     @property
     def verifies(self) -> bool:
-        """Whether a verdict says how good the solution itself is, so that a double passage can be made of it.
+        """Whether a verdict estimates the error of the solution itself, as a double passage needs.
 
-        Strategies that only foretell the next frequency, or raise the harmonics step by step, need a single passage.
+        Strategies that only predict the next frequency, or raise the harmonics step by step, need a single passage.
         """
         ...
 
     def judge(self, step: Step) -> Verdict:
-        """Say what a converged solution needs."""
+        """Return the verdict on a converged solution."""
         ...
 
 
 def always_kept(strategy: Strategy) -> Kept | None:
-    """Return the support that a strategy keeps at every frequency, which then decides nothing; None: it decides.
+    """Return the support of a strategy that keeps the same harmonics at every frequency; None for a strategy that decides.
 
-    It is told by an attribute `always`, which other strategies need not have.
+    Such a strategy has an attribute `always`.
     """
     kept: Kept | None = getattr(strategy, "always", None)
     return kept
 
 
 def check_strategy(strategy: object) -> None:
-    """Refuse what cannot be asked, before any long computation.
+    """Refuse an invalid strategy, before any long computation.
 
     Raises
     ------
     InputError
-        If it has no `judge`, no number as `threshold`, or does not say whether it `verifies`; or is a class.
+        If it has no `judge`, no number as `threshold`, or lacks `verifies`; or is a class.
     """
     name = strategy.__name__ if isinstance(strategy, type) else type(strategy).__name__
     if isinstance(strategy, type):
@@ -286,12 +287,12 @@ def check_strategy(strategy: object) -> None:
 
 
 def judged(strategy: Strategy, step: Step) -> Verdict:
-    """Return what a strategy says of a solution, if it can be done.
+    """Return the verdict of a strategy on a solution, after checking it.
 
     Raises
     ------
     InputError
-        If it returns something else than a verdict, or asks for harmonics that the reference does not have.
+        If the strategy returns no `Verdict`, or asks for harmonics that the reference does not have.
     """
     verdict: object = strategy.judge(step)
     place = f"{type(strategy).__name__}.judge"

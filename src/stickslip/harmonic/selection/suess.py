@@ -29,14 +29,14 @@ class SuessJacobian:
 
     The column of harmonic z in the Jacobian of the contact forces, ``‖K̂^{h≠z, z}‖`` over all other vibrating harmonics h of the
     reference and all contacts (Gastaldi & Berruti 2017, section 3), here relative to its own block ``‖K̂^{z, z}‖``: zero in full
-    stick. The row of the static term is left out: a slider that starts on its limit hands every harmonic on to it, stuck or not.
+    stick. The row of the static term is left out: a slider that starts on its limit couples every harmonic to it, stuck or not.
 
     Parameters
     ----------
     threshold
         Norm above which a harmonic is kept; the review gives no number.
     repeats
-        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
     """
 
     verifies: ClassVar[bool] = False
@@ -44,7 +44,7 @@ class SuessJacobian:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Measure the columns; this frequency is solved again with `repeats` alone. The indicator is the largest column left out."""
+        """Measure the columns; this frequency is solved again only with `repeats`. The indicator is the largest column left out."""
         columns = column_norms(step)
         had = step.balance.harmonics
         missed = [c for h, c in zip(step.reference.harmonics, columns, strict=True) if h not in had]
@@ -71,7 +71,7 @@ def column_norms(step: Step) -> FloatArray:
 class SuessSpectral:
     """Keep at the next frequency the harmonics that have a share in the energy of the solution with its missing harmonics added.
 
-    The missing harmonics alone are solved for, what they do to the present ones is left out (Gastaldi & Berruti 2017, eq. 26; in
+    Only the missing harmonics are solved for; their effect on the present ones is neglected (Gastaldi & Berruti 2017, eq. 26; in
     Newton's form, which holds with preloads and gaps, too).
 
     Parameters
@@ -80,7 +80,7 @@ class SuessSpectral:
         Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
         the amplitude.
     frozen
-        Leave the contact forces as they are while the missing harmonics grow (eq. 14): then their stiffness is that of the structure
+        Keep the contact forces constant while the missing harmonics grow (eq. 14): their stiffness is then that of the structure
         alone.
     repeats
         Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
@@ -92,7 +92,7 @@ class SuessSpectral:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Add the missing harmonics; this frequency is solved again with `repeats` alone. The indicator is their largest share."""
+        """Add the missing harmonics; this frequency is solved again only with `repeats`. The indicator is the largest share of a missing harmonic."""
         q = padded_solution(step)
         missing = np.array([h not in step.balance.harmonics for h in step.reference.harmonics])
         change = self._change(step, q, missing)
