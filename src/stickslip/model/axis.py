@@ -16,7 +16,7 @@ class Axis:
     Parameters
     ----------
     direction
-        Vector along the axis; its length does not matter.
+        Vector along the axis, of any length.
     origin
         A point of the axis in metres.
 

@@ -28,7 +28,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @cache
 def loaded() -> Counts:
-    """Return the functions that get and set the number of threads of each OpenBLAS in a wheel of NumPy or SciPy."""
+    """Return the functions that get and set the number of threads of each OpenBLAS that NumPy or SciPy brought along."""
     found: Counts = []
     for package in ("numpy", "scipy"):
         spec = find_spec(package)
@@ -76,14 +76,14 @@ _BLOCKS = _Blocks()
 
 @contextmanager
 def one_loaded_blas_thread(*, strict: bool = True) -> Iterator[None]:
-    """Give the loaded OpenBLAS of NumPy and SciPy one thread while the block runs, unless the user said how many.
+    """Limit the OpenBLAS of NumPy and SciPy to one thread within the block, unless the user set a number.
 
-    Other BLAS libraries are left alone.
+    Other BLAS libraries are not affected.
 
     Parameters
     ----------
     strict
-        Whether large matrices have one thread, too: the numbers of a study do not depend on how many there are.
+        Whether large matrices also have one thread: the results of a study then do not depend on the number of threads.
     """
     if SAID:
         yield
@@ -97,7 +97,7 @@ def one_loaded_blas_thread(*, strict: bool = True) -> Iterator[None]:
 
 @contextmanager
 def threads_for(rows: int) -> Iterator[None]:
-    """Give BLAS back the threads that `by_one_thread` took while a dense matrix of so many rows is factorised, if that is large."""
+    """Give BLAS all threads again, despite `by_one_thread`, while a large dense matrix with `rows` rows is factorised."""
     if rows < LARGE or not _BLOCKS.count or _BLOCKS.strict:
         yield
         return
@@ -109,7 +109,7 @@ def threads_for(rows: int) -> Iterator[None]:
 
 
 def by_one_thread(function: F) -> F:
-    """Let a function, or each step of a generator, give BLAS one thread; what happens between the steps has those that it had."""
+    """Return the function, or generator, with BLAS limited to one thread; code between the steps of a generator is not limited."""
     if isgeneratorfunction(function):
 
         @wraps(function)

@@ -11,48 +11,48 @@ LEFT = 8  # bytes of a mark that was cut off by which it is known; shorter ends 
 
 
 class Cut(ValueError):  # noqa: N818  it tells what has happened
-    """The end of the content is missing, within its checksum."""
+    """The content was cut off within its checksum."""
 
 
 def with_checksum(content: bytes) -> bytes:
-    """Return content with its SHA-256 behind it; readers of zip and HDF5 pass over what stands there."""
+    """Return content followed by its SHA-256; readers of zip and HDF5 ignore trailing bytes."""
     return content + MARK + sha256(content).hexdigest().encode()
 
 
 def add_checksum(path: Path) -> None:
-    """Write its checksum behind a file that is whole; as `with_checksum`."""
+    """Append the checksum to a complete file, as `with_checksum` does."""
     with path.open("rb+") as stream:
         stream.write(MARK + file_digest(stream, "sha256").hexdigest().encode())
 
 
 def checked(content: bytes, *, required: bool = True) -> bytes:
-    """Return what `with_checksum` was given.
+    """Return the content without its checksum, after checking it.
 
     Parameters
     ----------
     content
-        With its checksum.
+        Content followed by its checksum.
     required
-        Whether content without any checksum is refused; else it is returned as it is.
+        Whether content without a checksum is refused; otherwise it is returned unchanged.
 
     Raises
     ------
     ValueError
-        If it differs from what was written, or the checksum is not whole.
+        If the content does not match its checksum, or the checksum is incomplete.
     """
     length = _checked(BytesIO(content), len(content), required=required)
     return content[:length]
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that differs from what was written; one without any checksum is another program's.
+    """Refuse a file that does not match its checksum; a file without a checksum, from another program, is accepted.
 
     Raises
     ------
     ValueError
-        If it differs, or its checksum is not whole.
+        If the file does not match its checksum, or the checksum is incomplete.
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     """
     with path.open("rb") as stream:
         _checked(stream, path.stat().st_size, required=False)

@@ -18,16 +18,16 @@ LARGEST = 5000  # dofs of a full damping matrix: 0.2 GB
 
 @dataclass(frozen=True, kw_only=True)
 class Damping:
-    """How a part is damped; `loss_factor` may stand beside one of the others.
+    """Damping of a part; `loss_factor` may be combined with one of the others.
 
     Parameters
     ----------
     ratio, between_hz
         Damping ratio at two frequencies in Hz, proportional to mass and stiffness.
     alpha, beta
-        The same by its factors, ``C = α M + β K``, in 1/s and s.
+        Factors of proportional damping ``C = α M + β K``, in 1/s and s.
     modal
-        Damping ratios of the part's modes, lowest first, or one for all of them: modes of the part by itself, its contacts open.
+        Damping ratios of the modes of the part alone, contacts open, lowest first, or one for all modes.
     loss_factor
         η of the complex stiffness ``K (1 + i η)``.
 
@@ -71,11 +71,11 @@ class Damping:
 
     @property
     def is_modal(self) -> bool:
-        """Whether modes have to be known."""
+        """Whether modes are needed."""
         return self.modal is not None and self.modal != 0.0
 
     def of_matrices(self, structure: Structure, elastic: Matrix | None = None) -> Structure:
-        """Return a structure with what follows from its matrices; `elastic` as in `structural_damping`."""
+        """Return a structure with proportional and structural damping, which follow from its matrices; `elastic` as in `structural_damping`."""
         if self.ratio is not None and self.between_hz is not None:
             structure = rayleigh_damping(structure, self.ratio, self.between_hz)
         elif self.alpha or self.beta:
@@ -86,7 +86,7 @@ class Damping:
         return structure
 
     def of_modes(self, structure: Structure) -> Structure:
-        """Return a structure with the damping of its modes; more ratios than it has modes are of no meaning."""
+        """Return a structure with modal damping; ratios beyond its number of modes are ignored."""
         if self.modal is None or not self.is_modal:
             return structure
         if isinstance(self.modal, float):
@@ -109,7 +109,7 @@ def rayleigh_damping(structure: Structure, ratio: float, between_hz: tuple[float
     Parameters
     ----------
     structure
-        Its own damping matrix is replaced; Coriolis terms (the skew part) stay.
+        Structure whose damping matrix is replaced; Coriolis terms (the skew part) stay.
     ratio
         Damping ratio (fraction of critical) at both frequencies; it is lower between them.
     between_hz
@@ -129,15 +129,15 @@ def modal_damping(structure: Structure, ratios: float | Sequence[float] | FloatA
     Parameters
     ----------
     structure
-        Its own damping matrix is replaced; Coriolis terms (the skew part) stay. Modes are those of its mass and stiffness as they are:
-        join parts or tie contacts first if the ratios are those of the assembly.
+        Structure whose damping matrix is replaced; Coriolis terms (the skew part) stay. Modes are those of its present mass and stiffness:
+        for ratios of an assembly, join parts or tie contacts first.
     ratios
-        Fraction of critical of each mode, lowest first; modes beyond are undamped, rigid ones always. One number damps all modes alike.
+        Fraction of critical of each mode, lowest first; further modes and rigid ones are undamped. One number holds for all modes.
 
     Returns
     -------
     Structure
-        The damping matrix is full, whatever it was.
+        The structure; its damping matrix is full.
 
     Raises
     ------
@@ -175,11 +175,11 @@ def structural_damping(structure: Structure, loss_factor: float, *, elastic: Mat
     Parameters
     ----------
     structure
-        Loss it had is replaced, viscous damping stays.
+        Structure whose loss matrix is replaced; viscous damping stays.
     loss_factor
         η, twice the damping ratio of a resonance. Parts of different material: one call each, then `join`.
     elastic
-        (n, n) stiffness that dissipates, N/m; that of the structure if not given. At speed give the one at rest: neither tension nor spin
+        (n, n) stiffness that dissipates, N/m; that of the structure if not given. For a rotating structure give the stiffness at rest: neither centrifugal tension nor spin
         softening dissipates.
 
     Raises
@@ -202,7 +202,7 @@ def structural_damping(structure: Structure, loss_factor: float, *, elastic: Mat
 
 
 def dissipates(structure: Structure) -> bool:
-    """Tell whether a structure has damping of its own, Coriolis terms aside."""
+    """Whether a structure has damping, apart from Coriolis terms."""
     own = structure.damping
     symmetric = (own + own.conj().T) / 2
     return structure.loss is not None or bool(structure.n and abs(symmetric).max() > ROUNDING * abs(own).max())

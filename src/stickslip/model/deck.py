@@ -21,16 +21,16 @@ ON_A_LINE = 10  # numbers; CalculiX takes 16 at most
 
 @dataclass(frozen=True, kw_only=True)
 class CalculixRun:
-    """What a deck asks CalculiX for.
+    """Analyses that a deck requests from CalculiX.
 
     Parameters
     ----------
     n_modes
-        Natural frequencies, for each nodal diameter; 0 for the static step alone.
+        Number of natural frequencies, for each nodal diameter; 0: static step only.
     nodal_diameters
-        First and last one of a cyclic model; None for all.
+        First and last nodal diameter of a cyclic model; None: all.
     speed
-        Of the rotor in rad/s. With a speed, a linear static step under the centrifugal load comes first, its displacements
+        Rotor speed in rad/s. With a speed, a linear static step under the centrifugal load precedes; its displacements
         are printed, and the frequencies are those of the loaded structure.
     matrices
         Write stiffness and mass to files (``.sti``, ``.mas``, ``.dof``) instead of computing frequencies.
@@ -38,7 +38,7 @@ class CalculixRun:
     Raises
     ------
     InputError
-        If there is nothing to compute.
+        If no analysis is requested.
     """
 
     n_modes: int = 10
@@ -68,23 +68,23 @@ def write_deck(
     mesh
         Any mesh; a cyclic one has the node sets ``cyclic_low`` and ``cyclic_high``.
     material
-        Of all elements.
+        Material of all elements.
     path
         File to write.
     clamped
-        Node sets whose nodes are held. In a cyclic model those of ``cyclic_low`` follow their partners of ``cyclic_high``:
-        CalculiX refuses to hold a dependent node.
+        Node sets whose nodes are clamped. In a cyclic model, nodes of ``cyclic_low`` are clamped through their partners in ``cyclic_high``:
+        CalculiX refuses supports of dependent nodes.
     sectors
-        How many make the wheel; None for a structure that is not cyclic.
+        Number of sectors; None for a structure that is not cyclic.
     axis
-        Of rotation; z by default.
+        Axis of rotation; z by default.
     run
-        What to compute; ten modes at rest by default.
+        Analyses; ten modes at rest by default.
 
     Raises
     ------
     InputError
-        If a set is missing, or nodal diameters are asked of a structure that is not cyclic.
+        If a set is missing, or nodal diameters are requested for a structure that is not cyclic.
     """
     axis, run = axis or Axis(), run or CalculixRun()
     wanted = [*clamped, *(("cyclic_low", "cyclic_high") if sectors else ())]

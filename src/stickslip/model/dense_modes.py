@@ -16,18 +16,17 @@ def dense_modes(
 ) -> tuple[FloatArray, Matrix]:
     """Return the `n` lowest squares of circular frequencies and mass-normalised modes.
 
-    Motions without mass follow the others statically, ``K₀₀ x₀ + K₀₁ x₁ = 0``, and are no modes; nor are those that have no
-    stiffness either. Decks of bricks with reduced integration (C3D20R) have such masses, as have matrices that were reduced
-    statically.
+    Motions without mass follow the others statically, ``K₀₀ x₀ + K₀₁ x₁ = 0``, and are no modes; neither are motions without mass and
+    stiffness. Such mass matrices come from bricks with reduced integration (C3D20R) and from static reduction.
 
     Parameters
     ----------
     stiffness, mass
         (size, size), dense, real symmetric or complex Hermitian.
     n
-        At most the rank of the mass.
+        Number of modes, at most the rank of the mass.
     shift
-        In rad²/s², at most the lowest square.
+        Shift in rad²/s², at most the lowest square.
     dofs
         Of the coordinates, for messages.
 
@@ -58,7 +57,7 @@ def dense_modes(
 
 
 def mass_rank(mass: Matrix) -> int:
-    """Return how many motions of a (size, size) mass, dense or sparse, have one."""
+    """Return the rank of a (size, size) mass matrix, dense or sparse."""
     dense = mass.toarray() if scipy.sparse.issparse(mass) else mass
     return len(dense) if _definite(dense) else _by_mass(dense, None)[0].size
 

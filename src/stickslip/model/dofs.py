@@ -19,13 +19,13 @@ class Dofs:
     Parameters
     ----------
     node
-        (n,) node numbers; -1 for coordinates of no mesh node: modal ones and those of rigid bodies.
+        (n,) node numbers; -1 for coordinates without a mesh node: modal ones and those of rigid bodies.
     component
         n names: ``x y z rx ry rz`` or ``mode``.
     position
         (n, 3) coordinates in metres; NaN for modal coordinates.
     part
-        n names of the part each dof belongs to; empty strings before parts are joined.
+        n names of the part of each dof; empty strings before parts are joined.
     """
 
     node: IntArray
@@ -64,18 +64,18 @@ class Dofs:
 
 
 def numbered_dofs(n: int) -> Dofs:
-    """Return the table of `n` dofs of which nothing is known: ``dof1``, ``dof2`` and so on."""
+    """Return the table of `n` dofs without known nodes: ``dof1``, ``dof2`` and so on."""
     names = tuple(f"dof{i + 1}" for i in range(n))
     return Dofs(np.full(n, -1), names, np.full((n, 3), np.nan))
 
 
 def is_numbered(component: str) -> bool:
-    """Tell whether a component is one of `numbered_dofs`."""
+    """Whether a component is one of `numbered_dofs`."""
     return _NUMBERED.fullmatch(component) is not None
 
 
 def modal_dofs(n: int) -> Dofs:
-    """Return `n` modal coordinates."""
+    """Return the table of `n` modal coordinates."""
     return Dofs(np.full(n, -1), ("mode",) * n, np.full((n, 3), np.nan))
 
 
@@ -85,7 +85,7 @@ def nodal_dofs(points: FloatArray, nodes: IntArray) -> Dofs:
 
 
 def join_dofs(parts: dict[str, Dofs]) -> Dofs:
-    """Stack tables, naming the part each row comes from."""
+    """Stack tables; each row gets the name of its part."""
     return Dofs(
         np.concatenate([d.node for d in parts.values()]),
         tuple(c for d in parts.values() for c in d.component),

@@ -20,14 +20,14 @@ DEGREE = 4  # integrates volume and first moment of straight-edged cells of seco
 
 @dataclass(frozen=True)
 class Facts:
-    """What the model is, in numbers.
+    """Mass, size and counts of a model.
 
     Parameters
     ----------
     mass
-        Of the model (one sector) in kg; NaN where it cannot be told.
+        Mass of the model (one sector) in kg; NaN if unknown.
     centre
-        (3,) centre of mass in m; NaN where the positions are not known.
+        (3,) centre of mass in m; NaN if positions are unknown.
     low, high
         (3,) corners of the box around all nodes in m.
     dofs, nodes, elements
@@ -82,7 +82,7 @@ def facts_of_parts(parts: Iterable[Part]) -> Facts:
 
 
 def unlike_units(parts: Mapping[str, Part]) -> list[str]:
-    """Return a sentence on each pair of parts whose sizes or materials are so unlike that one has probably other units."""
+    """Return a sentence for each pair of parts whose sizes or materials differ so much that the units of one are probably wrong."""
     names = list(parts)
     found = []
     for i, one in enumerate(names):
@@ -97,7 +97,7 @@ def unlike_units(parts: Mapping[str, Part]) -> list[str]:
 
 
 def other_speeds(parts: Mapping[str, Part], speed: float) -> list[str]:
-    """Return a sentence on each part whose file turns at another speed than the model, rad/s."""
+    """Return a sentence for each part whose file has another speed than the model, rad/s."""
     return [
         f"part.{name}: its file turns at {part.own_speed / RPM:.6g} rpm, the model at {speed / RPM:.6g} rpm."
         for name, part in parts.items()
@@ -132,7 +132,7 @@ _MEASURES: tuple[tuple[str, str, Callable[[Part], float]], ...] = (
 
 
 def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
-    """Return the facts of a mesh, of which `dofs` are free; clamped nodes count."""
+    """Return the facts of a mesh with `dofs` free dofs; clamped nodes count."""
     shape = shape_functions(mesh.cells.shape[1], DEGREE)
     each = [material] * len(mesh.cells) if isinstance(material, Material) else material
     density = np.array([one.density for one in each])
@@ -155,7 +155,7 @@ def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
 
 
 def facts_of_matrices(structure: Structure) -> Facts:
-    """Return what matrices tell: the mass that moves with the free translations, and where the free nodes are."""
+    """Return the facts of matrices: the mass that moves with free translations, and the box of the free nodes."""
     components = np.array(structure.dofs.component)
     known = np.asarray(np.isfinite(structure.dofs.position).all(axis=1))
     position = structure.dofs.position[known]

@@ -28,12 +28,12 @@ class GyroscopicModes:
     Parameters
     ----------
     frequencies_hz
-        (n,) not negative, but for waves that rotation has overtaken: theirs go on through zero, as those of the same wave that runs the
-        other way.
+        (n,) natural frequencies. Negative only for waves that rotation has overtaken: their frequency passes through zero to that of the same
+        wave in the other direction.
     shapes
-        (N, n) complex, of unit mass: ``φᴴ M φ = 1``.
+        (N, n) complex mode shapes of unit mass: ``φᴴ M φ = 1``.
     growth
-        (n,) in 1/s, zero where the structure is stable; where a motion diverges, what grows comes before what decays.
+        (n,) growth rate in 1/s, zero if the structure is stable; of a diverging pair, the growing mode precedes the decaying one.
     """
 
     frequencies_hz: FloatArray
@@ -54,20 +54,20 @@ def gyroscopic_modes(
     Parameters
     ----------
     structure
-        Real and symmetric, or Hermitian at a wave number; of `damping` the skew part counts, dissipation is left out.
+        Real and symmetric, or Hermitian at a wave number; only the skew part of `damping` is used, dissipation is neglected.
     n_modes
-        Number of frequencies. At a wave number these are waves ``exp(+iωt)``; those of the opposite sense belong to the negative wave
-        number.
+        Number of frequencies. At a wave number these are waves ``exp(+iωt)``; waves in the opposite direction belong to the negative
+        wave number.
     n_basis
-        Modes at rest that span the basis, twice `n_modes` and ten more if not given. Modes alone converge slowly, so that the static
-        answers to their Coriolis forces are added. Structures of a few hundred dofs are solved whole.
+        Modes at rest that span the basis, by default twice `n_modes` plus ten. Modes alone converge slowly, so the static
+        responses to their Coriolis forces are added. Structures of a few hundred dofs are solved without a basis.
     shift, factors
         As in `normal_modes`.
 
     Raises
     ------
     InputError
-        If more modes are asked for than there are dofs, or in the basis.
+        If more modes are requested than there are dofs, or vectors in the basis.
     """
     movable = int(np.count_nonzero(structure.mass.diagonal()))
     n_basis = min(2 * n_modes + SPARE if n_basis is None else n_basis, movable)

@@ -58,18 +58,18 @@ def lumped(
 def lumped_sector(
     mass: Sequence[float], stiffness: FloatArray, damping: FloatArray, names: Sequence[str], behind: Sequence[str]
 ) -> Structure:
-    """Return one sector of a wheel of masses, with massless copies of masses of the next sector behind its own.
+    """Return one sector of a wheel of masses, with massless copies of masses of the next sector after its own masses.
 
     Parameters
     ----------
     mass
-        (n,) of the sector's own masses, kg.
+        (n,) masses of the sector, kg.
     stiffness, damping
-        (n + m, n + m) of springs and dashpots, those to the copies among them.
+        (n + m, n + m) matrices of springs and dashpots, including those to the copies, N/m and N s/m.
     names
-        Of the n masses; each becomes a set.
+        Names of the n masses; each becomes a set.
     behind
-        The m masses of which there are copies: the sets ``cyclic_low`` and ``cyclic_high`` hold them and the copies.
+        The m masses with a copy: the set ``cyclic_low`` contains them, ``cyclic_high`` the copies.
     """
     own = lumped(np.array(mass), np.zeros((len(mass), len(mass))), names=names)
     n, copies = own.n, len(behind)

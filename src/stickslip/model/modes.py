@@ -64,15 +64,15 @@ def normal_modes(
         Real symmetric or complex Hermitian, dense or sparse; it may be free to move, and dofs may
         have no mass.
     n
-        At least one, at most the number of dofs with mass.
+        Number of modes, from one to the number of dofs with mass.
     shift
-        In rad²/s², at most the lowest square; the matrix ``K − shift M`` is factorised. By default
-        slightly below zero, so that a free body gives no singular matrix. Squares far below
-        it (diverging motions) are looked for with a lower one.
+        Shift in rad²/s², at most the lowest square; the matrix ``K − shift M`` is factorised. By default
+        slightly below zero, so that the matrix of a free body is not singular. Squares far below
+        it (diverging motions) are found with a second, lower shift.
     say
         Called with a sentence before each long step.
     factors
-        Factorises ``K − shift M`` of the whole structure, as `WaveFamily` does with what waves share; None: `factorise`.
+        Function that factorises ``K − shift M`` of the whole structure, such as that of `WaveFamily`; None: `factorise`.
 
     Raises
     ------
@@ -85,8 +85,8 @@ def normal_modes(
     Notes
     -----
     The signs of the pivots of ``K − shift M`` count the squares below the shift, so that none is missed. SuperLU's factors
-    with more than `COUNTED` entries are not looked through: there, modes with negative squares are found where these are
-    nearer to the shift than the n-th; give one below them.
+    with more than `COUNTED` entries are not examined: then modes with negative squares are found only if they are
+    nearer to the shift than the n-th mode; give a shift below them.
     """
     _check_count("normal_modes", structure, n)
     refuse_bad_mass(structure, "normal_modes")
@@ -167,7 +167,7 @@ def _factorised(matrix: Matrix, dofs: Dofs, say: Say, *, below: bool = True) -> 
 def natural_frequencies(structure: Structure, n: int) -> FloatArray:
     """Return the `n` lowest undamped natural frequencies in Hz; rigid-body modes count as zeros.
 
-    So do diverging ones; `normal_modes` tells them apart.
+    Diverging modes count as zeros, too; `normal_modes` distinguishes them.
     """
     _check_count("natural_frequencies", structure, n)
     return np.maximum(normal_modes(structure, n).frequencies_hz, 0.0)
@@ -181,9 +181,9 @@ def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) 
     structure
         Dense or sparse.
     operator
-        (m, n) from coordinates to the springs' elongations.
+        (m, n) operator from coordinates to elongations of the springs.
     stiffness
-        (m,) in N/m.
+        (m,) stiffnesses in N/m.
     """
     sparse = scipy.sparse.csr_array(operator)
     added = sparse.conj().T @ scipy.sparse.diags_array(np.asarray(stiffness, dtype=float)) @ sparse
@@ -193,7 +193,7 @@ def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) 
 
 
 def connected_parts(*matrices: Matrix) -> list[IntArray]:
-    """Return the index sets that the matrices do not couple to each other.
+    """Return the index sets of bodies, between which the matrices have no coupling.
 
     Equal bodies have equal frequencies, of which a Krylov method may miss some; one by one it
     does not.
@@ -246,12 +246,12 @@ def lowest_modes(
 
 
 def refuse_bad_mass(structure: Structure, place: str) -> None:
-    """Refuse a mass matrix that is not positive, as far as that is seen without long work, and numbers that no model has.
+    """Refuse a mass matrix that is not positive, as far as a cheap check shows it, and implausible numbers.
 
     Raises
     ------
     InputError
-        Naming the matrix, and the dof where one is at fault.
+        If a check fails; the message names the matrix and, if possible, the dof.
     """
     for name in ("mass", "stiffness"):
         matrix = getattr(structure, name)
@@ -307,7 +307,7 @@ def _check_count(place: str, structure: Structure, n: int) -> None:
 
 
 def usual_shift(structure: Structure) -> float:
-    """Return the shift that `normal_modes` takes by default, in rad²/s²."""
+    """Return the default shift of `normal_modes`, in rad²/s²."""
     return -SHIFT * _mean_square(structure)
 
 

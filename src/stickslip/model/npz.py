@@ -33,12 +33,12 @@ BROKEN = "The file is damaged or was cut short: write or copy it again."
 
 
 def require_no_pipe(path: Path) -> None:
-    """Refuse named pipes, sockets and devices, from which a reader would wait for ever.
+    """Refuse named pipes, sockets and devices, on which a reader would wait for ever.
 
     Raises
     ------
     InputError
-        If something is there that is neither a file nor a folder.
+        If the path is neither a file nor a folder.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise input_error(
@@ -64,8 +64,8 @@ def read_npz(path: Path) -> Arrays:
     Raises
     ------
     InputError
-        If the file is missing, is no ``.npz``, is damaged, holds Python objects (which could run code), or claims
-        more than its size can hold.
+        If the file is missing, is no ``.npz``, is damaged, contains Python objects (which could run code), or claims
+        more data than its size allows.
     """
     require_no_pipe(path)
     try:
@@ -86,7 +86,7 @@ def read_npz(path: Path) -> Arrays:
 
 
 def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write arrays and their checksum under a temporary name and put the file in place, so that `path` is always whole.
+    """Write arrays and their checksum under a temporary name and rename the file, so that `path` is always complete.
 
     Raises
     ------

@@ -25,7 +25,7 @@ Z_AXIS = Axis()
 
 
 class Reducing(Protocol):
-    """What reduces a structure to some of its dofs and a few modes: `reduction.Reduction`."""
+    """Protocol of reductions to some dofs and a few modes: `reduction.Reduction`."""
 
     def of(self, structure: Structure, keep: IntArray) -> Structure:
         """Return a structure reduced to the dofs `keep` and its modes."""
@@ -33,7 +33,7 @@ class Reducing(Protocol):
 
     @property
     def in_words(self) -> str:
-        """What is kept, for a line about the part."""
+        """Method and number of modes, for a line about the part."""
         ...
 
 
@@ -44,13 +44,13 @@ class BodyPoints:
     Parameters
     ----------
     names
-        One a point, e.g. ``L1.1``.
+        Name of each point, e.g. ``L1.1``.
     position
-        (p, 3) in m, global axes.
+        (p, 3) positions in m, global axes.
     frame
         (p, 3, 3) columns t, w, n; n points out of the body.
     area
-        (p,) area in m² that each stands for, for laws per area; None where it is not known.
+        (p,) area of each point in m², for laws per area; None if unknown.
 
     Raises
     ------
@@ -81,14 +81,14 @@ class BodyPoints:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """How a part is put in its place: mirrored, turned, then moved: ``x = turn @ x0 + move``.
+    """Placement of a part, which is mirrored, rotated, then translated: ``x = turn @ x0 + move``.
 
     Parameters
     ----------
     turn
         (3, 3) orthogonal matrix; a mirror has determinant -1.
     move
-        (3,) in m.
+        (3,) translation in m.
 
     Raises
     ------
@@ -111,20 +111,20 @@ class Place:
         object.__setattr__(self, "move", move)
 
     def put(self, points: FloatArray) -> FloatArray:
-        """Return where points (n, 3) come to."""
+        """Return the points (n, 3) after the placement."""
         return np.asarray(points @ self.turn.T + self.move)
 
     def then(self, after: "Place") -> "Place":
-        """Return the place of what is put here first, and then as `after` says."""
+        """Return the combined placement: this one, then `after`."""
         return Place(after.turn @ self.turn, after.turn @ self.move + after.move)
 
     @property
     def mirrors(self) -> bool:
-        """Whether left becomes right."""
+        """Whether the placement is a mirror image."""
         return bool(np.linalg.det(self.turn) < 0)
 
     def keeps(self, axis: Axis) -> bool:
-        """Whether it is a turn about an axis, with a move along it: then the axis is to the copy what it was to the original."""
+        """Whether it is a rotation about `axis` with a translation along it, so that the axis has the same position relative to the copy."""
         origin = np.asarray(axis.origin, dtype=float)
         near = np.linalg.norm(axis.arm(self.put(origin[None]))) <= 1e-12 * (1 + np.linalg.norm(origin))
         return bool(near and not self.mirrors and np.allclose(self.turn @ axis.unit, axis.unit))
@@ -137,35 +137,35 @@ class Part:
     Parameters
     ----------
     structure
-        At rest, its cyclic faces free; sets hold x, y, z of each node in turn, or single dofs.
+        Structure at rest with free cyclic faces; sets contain x, y, z of each node in turn, or single dofs.
     mesh
-        For facets of surfaces and pictures; None for matrices, rigid bodies, lumped masses.
+        Mesh for facets of surfaces and pictures; None for matrices, rigid bodies, lumped masses.
     solid
-        What the structure was assembled from, for speeds; None where no speed changes it.
+        Rotating solid from which the structure was assembled; None if the structure does not depend on the speed.
     body
-        None unless the part is rigid.
+        Rigid body; None unless the part is rigid.
     surfaces
         Named points of a rigid body.
     sectors
-        Of the wheel that the part is one sector of; 1: it stands alone.
+        Number of sectors of the wheel of which the part is one sector; 1: no cyclic symmetry.
     faces
         Names of the sets of the low and the high cyclic face.
     cyclic
-        How these faces are tied: node to node, or in the mean where their meshes do not match; then the high face follows.
+        Tie of these faces: node to node, or in the mean if their meshes do not match; then the high face is dependent.
     axis
-        Of rotation.
+        Axis of rotation.
     reduction
-        How it is reduced; None: not at all.
+        Reduction of the part; None: no reduction.
     damping
-        How it is damped, instead of by the structure's own damping matrix; None: by that alone.
+        Damping that replaces the structure's damping matrix; None: that matrix.
     template, place
-        Of a copy: the part it copies, whose reduction it shares, and where it stands; `copy_of` makes one.
+        For a copy: the original part, whose reduction it shares, and its placement; `copy_of` makes one.
     warnings
-        What the user should know.
+        Warnings for the user.
     clamped_sets
-        Names of sets of which every node is held, so that nothing can act there.
+        Names of sets whose nodes are all clamped, so that nothing can act on them.
     own_speed
-        At which its file turns it, rad/s; 0: the file says nothing of it. A model has one speed of its own.
+        Speed in the part's file, rad/s; 0: the file has none. All parts of a model have the same speed.
     """
 
     structure: Structure
@@ -187,7 +187,7 @@ class Part:
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # its reductions
 
     def __repr__(self) -> str:
-        """Return what it is in a line."""
+        """Describe the part in a line."""
         kind = "rigid body" if self.body else "mesh" if self.mesh else "matrices"
         words = [kind, f"{self.structure.n} dofs"]
         if self.sectors > 1:
@@ -201,7 +201,7 @@ class Part:
         return f"<Part: {'; '.join(words)}; {', '.join(names[:8])}{more}>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave what can be computed again behind."""
+        """Drop cached values, which can be computed again."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
         return own | {"memo": {}}
 
@@ -236,7 +236,7 @@ def solid_part(
 
 
 def structure_part(structure: Structure, **others: Any) -> Part:
-    """Return a part of matrices: lumped masses, a beam, what a reader found; `others` as of `solid_part`, and ``mesh`` for pictures."""
+    """Return a part of matrices: lumped masses, a beam, matrices from a reader; `others` as in `solid_part`, and ``mesh`` for pictures."""
     return Part(structure=structure, **others)
 
 

@@ -20,18 +20,18 @@ class Structure:
     Parameters
     ----------
     mass, damping, stiffness
-        (n, n) matrices in kg, N s/m, N/m; dense or SciPy CSR. Symmetric, or Hermitian where they are those of a
-        travelling wave (`reduction.cyclic`); damping may hold the skew Coriolis matrix of a rotating structure.
+        (n, n) matrices in kg, N s/m, N/m; dense or SciPy CSR. Symmetric, or Hermitian for a
+        travelling wave (`reduction.cyclic`); damping may include the skew Coriolis matrix of a rotating structure.
     dofs
         Table of the n coordinates.
     sets
-        Name -> dof indices, in an order that has a meaning.
+        Name -> dof indices, in a meaningful order.
     basis
         (n_full, n) matrix with ``full = basis @ reduced``, dense or SciPy CSR, complex for a travelling wave;
-        None where nothing was reduced.
+        None if nothing was reduced.
     loss
         (n, n) structural (hysteretic) damping in N/m, the imaginary part of the stiffness in vibration: symmetric, or Hermitian
-        as the stiffness is; None for none. A static load does not feel it.
+        like the stiffness; None: no such damping. It does not act in statics.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Structure:
             raise ValueError(f"Structure.loss: shape {self.loss.shape} for {n} dofs")
 
     def __repr__(self) -> str:
-        """Return what it is in a line, without its matrices."""
+        """Describe the structure in a line, without its matrices."""
         matrices = [self.mass, self.damping, self.stiffness]
         kind = "sparse" if any(scipy.sparse.issparse(m) for m in matrices) else "dense"
         numbers = "complex" if self.is_complex else "real"
@@ -84,7 +84,7 @@ class Structure:
 
     @property
     def multipliers(self) -> IntArray:
-        """No coordinate is the force of a constraint (see `LinearSide`)."""
+        """Coordinates that are forces of constraints: none (see `LinearSide`)."""
         return np.zeros(0, dtype=np.int64)
 
     @property
@@ -94,7 +94,7 @@ class Structure:
 
     @property
     def speed_follows_frequency(self) -> bool:
-        """Whether the speed changes with the frequency (see `LinearSide`)."""
+        """Whether the speed changes with the frequency: no (see `LinearSide`)."""
         return False
 
     @property
@@ -115,7 +115,7 @@ class Structure:
         return self
 
     def feedback_of(self, harmonic: int) -> None:
-        """No force of its own depends on the frequency (see `LinearSide`)."""
+        """No aerodynamic force (see `LinearSide`)."""
 
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
@@ -128,7 +128,7 @@ class Structure:
         return vector if self.basis is None else self.basis @ vector
 
     def project(self, load: Matrix) -> Matrix:
-        """Return the load(s) on the reduced coordinates of full-model load(s) (n_full,) or (n_full, k)."""
+        """Return the load(s) on the reduced coordinates from full-model load(s) (n_full,) or (n_full, k)."""
         return load if self.basis is None else self.basis.conj().T @ load
 
     def grounded(self, springs: Matrix) -> "Structure":
@@ -142,10 +142,10 @@ class Structure:
 
 
 def join(**parts: Structure) -> Structure:
-    """Put structures side by side, uncoupled.
+    """Join structures into one, without coupling.
 
-    Sets are renamed ``part.set``; a set ``part`` holds all dofs of each part. The way back to full models is not kept:
-    ask the parts.
+    Sets are renamed ``part.set``; a set ``part`` holds all dofs of each part. The joined structure has no `basis`:
+    expand with the parts.
     """
     offsets = np.cumsum([0, *(s.n for s in parts.values())])
     sets: dict[str, IntArray] = {}

@@ -22,14 +22,14 @@ MATRICES = ("mass", "damping", "stiffness")
 
 
 def save_structure(structure: Structure, path: Path | str) -> None:
-    """Write a structure to an ``.npz`` file, everything it has, sparse matrices as such.
+    """Write a structure with all its fields to an ``.npz`` file; sparse matrices stay sparse.
 
     Parameters
     ----------
     structure
         Dense or sparse, real or complex, reduced or not.
     path
-        Ends in ``.npz``; a file that is there is replaced once the new one is whole.
+        Path that ends in ``.npz``; an existing file is replaced when the new one is complete.
 
     Raises
     ------
@@ -60,12 +60,12 @@ def save_structure(structure: Structure, path: Path | str) -> None:
 
 
 def load_structure(path: Path | str) -> Structure:
-    """Read a structure that `save_structure` wrote; nothing in the file is executed.
+    """Read a structure written by `save_structure`; nothing in the file is executed.
 
     Raises
     ------
     InputError
-        If the file is missing, damaged, of another program or of a later version, or its parts do not fit together.
+        If the file is missing, damaged, from another program or a later version, or its arrays are inconsistent.
     """
     path = Path(path)
     arrays = read_npz(path)
@@ -133,7 +133,7 @@ def _packed(name: str, matrix: Matrix) -> Arrays:
 
 
 def unpacked(name: str, arrays: Arrays) -> Matrix:
-    """Return the matrix `name` of a structure file's arrays; `ValueError` where its parts do not fit."""
+    """Return the matrix `name` of a structure file's arrays; `ValueError` if they are inconsistent."""
     if name in arrays:
         return _numbers(arrays[name])
     parts = tuple(arrays[f"{name}.{part}"] for part in ("data", "indices", "indptr"))

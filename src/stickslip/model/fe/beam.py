@@ -42,24 +42,24 @@ class Beam:
     Parameters
     ----------
     length
-        In m.
+        Length in m.
     area
-        Of the section, m².
+        Area of the section, m².
     second_moment
-        Of area, for the bending considered, m⁴.
+        Second moment of area for the bending considered, m⁴.
     second_moment_y
-        The same for deflections along y where the beam bends both ways; None: it is the same.
+        Second moment of area for deflections along y, if the beam bends both ways; None: equal to `second_moment`.
     material
         Linear elastic.
     shear_coefficient
-        κ of the shear stiffness ``κ G A``; it makes a Timoshenko beam, with rotary inertia. None: Euler-Bernoulli, without.
+        κ of the shear stiffness ``κ G A``; Timoshenko beam with rotary inertia. None: Euler-Bernoulli beam.
     ends
-        First and last: ``clamped``, ``pinned``, ``sliding`` or ``free``.
+        Supports of the first and last end: ``clamped``, ``pinned``, ``sliding`` or ``free``.
 
     Raises
     ------
     InputError
-        If a size is not positive or an end unknown.
+        If a size is not positive or an end is unknown.
     """
 
     length: float = length("length of the beam", usual=1e4)
@@ -95,18 +95,18 @@ def beam(shape: Beam, elements: int, *, bending: Bending = "z", axial: bool = Fa
     bending
         Direction of the deflection; the rotation is about the other one (``ry`` is minus the slope of z). ``both``: y and z.
     axial
-        Whether the beam stretches too.
+        Whether the beam also stretches.
 
     Returns
     -------
     Structure
-        Dense. Sets ``deflection``, ``rotation`` and ``axial`` hold the free dofs along the beam, ``tip`` the deflection of the last
-        node, if free; with both bendings, ``tip`` holds all its displacements, so that it is a point in space.
+        Dense. Sets ``deflection``, ``rotation`` and ``axial`` contain the free dofs along the beam, ``tip`` the deflection of the last
+        node, if free; with both bendings, ``tip`` contains all displacements of this node, as a point in space.
 
     Raises
     ------
     InputError
-        If there is no element.
+        If there are no elements.
     """
     return rotating_beam(shape, elements, 0.0, bending=bending, axial=axial)
 
@@ -121,10 +121,10 @@ def rotating_beam(
     axial: bool = False,
     coriolis: bool = False,
 ) -> Structure:
-    """Return the model of a beam that sticks out of a hub turning about z, in the rotating frame.
+    """Return the model of a beam on a hub that turns about z, in the rotating frame.
 
-    The centrifugal tension stiffens bending; spin softening ``- Ω² M`` takes off from what moves in the plane of rotation, deflections in
-    y (lag) and stretching, not from deflections in z (flap).
+    The centrifugal tension stiffens bending. Spin softening ``- Ω² M`` reduces the stiffness of motion in the plane of rotation, deflections in
+    y (lag) and stretching, but not of deflections in z (flap).
 
     Parameters
     ----------
@@ -133,20 +133,20 @@ def rotating_beam(
     elements
         Number of equal elements.
     speed
-        In rad/s.
+        Speed in rad/s.
     hub_radius
         Distance of the clamped end from the axis, m.
     bending
         ``z``: flap, along the axis of rotation; ``y``: lag, in the plane of rotation; ``both``.
     axial
-        Whether the beam stretches too.
+        Whether the beam also stretches.
     coriolis
-        Add Coriolis terms to the damping: they couple lag with stretching.
+        Whether Coriolis terms, which couple lag with stretching, are added to the damping.
 
     Raises
     ------
     InputError
-        If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are asked for without axial motion.
+        If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are requested without axial motion.
     """
     if elements < 1 or bending not in get_args(Bending):
         raise input_error("beam", f"got {elements} elements and bending {bending!r}", "One or more, y, z or both.")

@@ -19,16 +19,16 @@ UNEVEN = 4.0  # how many times its own share of the separator's size an uneven c
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Rows eliminated together; rows are counted in the order of elimination.
+    """A front: rows that are eliminated together, numbered in the order of elimination.
 
     Parameters
     ----------
     first, last
         Pivots: rows ``first`` to ``last - 1``.
     update
-        (u,) later rows that these touch, ascending.
+        (u,) later rows coupled to the pivots, ascending.
     children
-        Fronts whose `update` is added here.
+        Fronts whose `update` is assembled here.
     """
 
     first: int
@@ -49,9 +49,9 @@ class Dissection:
     Parameters
     ----------
     order
-        (n,) rows as they are eliminated; those that are not come last.
+        (n,) rows in the order of elimination; kept rows come last.
     fronts
-        Children before parents.
+        Fronts, children before parents.
     kept
         Number of rows that are not eliminated.
     """
@@ -62,13 +62,13 @@ class Dissection:
 
     @property
     def entries(self) -> int:
-        """Entries of the factors and of the rest."""
+        """Number of entries of the factors and of the Schur complement."""
         each = (f.pivots * (f.pivots + f.update.size) for f in self.fronts)
         return int(sum(each)) + self.kept**2
 
     @property
     def peak(self) -> int:
-        """Entries that are there at the same time at most, with what is being eliminated."""
+        """Largest number of entries stored at the same time, including the front being eliminated."""
         factors, waiting, most = self.kept**2, 0, 0
         for front in self.fronts:
             square = int(front.update.size) ** 2
@@ -85,7 +85,7 @@ def dissected(pattern: Matrix, kept: IntArray) -> Dissection:
     Parameters
     ----------
     pattern
-        (n, n) CSR, every row with its diagonal.
+        (n, n) CSR matrix with a complete diagonal.
     kept
         (k,) different rows that are not eliminated; they come last, in this order.
     """

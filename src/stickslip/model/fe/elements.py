@@ -31,9 +31,9 @@ class Quadrature:
     Parameters
     ----------
     stiffness
-        Of the stiffness and all that belongs to strain energy.
+        Degree for the stiffness and all other terms of strain energy.
     mass
-        Of the mass and all that belongs to inertia.
+        Degree for the mass and all other terms of inertia.
     """
 
     stiffness: int = 4
@@ -50,7 +50,7 @@ class Quadrature:
 
     @classmethod
     def calculix(cls) -> "Quadrature":
-        """Return the choice of CalculiX for C3D10 cells: its 4-point rule for stiffness and mass.
+        """Return the rules of CalculiX for C3D10 cells: its 4-point rule for stiffness and mass.
 
         Its mass is therefore not the exactly integrated consistent mass.
         """
@@ -67,11 +67,11 @@ class Shape:
     Parameters
     ----------
     values
-        (q, k).
+        (q, k) values.
     slopes
         (q, k, 3) derivatives by the reference coordinates.
     weights
-        (q,) which sum to the volume of the reference cell.
+        (q,) weights, whose sum is the volume of the reference cell.
     """
 
     values: FloatArray
@@ -80,7 +80,7 @@ class Shape:
 
 
 def reference_places(width: int) -> FloatArray:
-    """Return the (k, 3) places of the nodes of a cell with `width` nodes in VTK order."""
+    """Return the (k, 3) reference coordinates of the nodes of a cell with `width` nodes in VTK order."""
     places, edges = (TET_PLACES, TET_EDGES) if width in (4, 10) else (HEX_PLACES, HEX_EDGES)
     if width == len(places):
         return places
@@ -88,7 +88,7 @@ def reference_places(width: int) -> FloatArray:
 
 
 def library() -> Any:
-    """Return the module of scikit-fem; a `StickslipError` says how to install it."""
+    """Return the module scikit-fem; if it is missing, a `StickslipError` says how to install it."""
     try:
         import skfem
     except ModuleNotFoundError as error:
@@ -97,7 +97,7 @@ def library() -> Any:
 
 
 def library_element(width: int) -> tuple[Any, IntArray]:
-    """Return scikit-fem's element with `width` nodes, and the (k,) VTK node at each of its own places."""
+    """Return scikit-fem's element with `width` nodes, and the (k,) VTK node at each of its nodes."""
     skfem = library()
     element = {4: skfem.ElementTetP1, 10: skfem.ElementTetP2, 8: skfem.ElementHex1, 20: skfem.ElementHexS2}[width]()
     distance = np.abs(element.doflocs[:, None] - reference_places(width)).sum(axis=2)
@@ -105,7 +105,7 @@ def library_element(width: int) -> tuple[Any, IntArray]:
 
 
 def shape_functions(width: int, degree: int) -> Shape:
-    """Return the shape functions of cells with `width` nodes (VTK order) at a rule of `degree`."""
+    """Return the shape functions of cells with `width` nodes (VTK order) at the points of the rule of `degree`."""
     element, order = library_element(width)
     places, weights = library().quadrature.get_quadrature(element, degree)
     values = np.empty((len(weights), width))
@@ -117,7 +117,7 @@ def shape_functions(width: int, degree: int) -> Shape:
 
 
 def chunks(mesh: SolidMesh, shape: Shape) -> Iterator[slice]:
-    """Cut the cells into pieces whose arrays stay small."""
+    """Yield slices of the cells, short enough that arrays stay small."""
     step = max(1, CHUNK // shape.values.size)
     for start in range(0, len(mesh.cells), step):
         yield slice(start, min(start + step, len(mesh.cells)))
@@ -162,14 +162,14 @@ def check_jacobians(mesh: SolidMesh, shape: Shape) -> None:
 
 
 class NodeBlocks:
-    """Adds blocks of node pairs of cells up to sparse matrices over the nodes that are kept.
+    """Assembly of blocks for node pairs of cells into sparse matrices over the kept nodes.
 
     Parameters
     ----------
     mesh
-        Gives the pairs.
+        Mesh whose cells define the pairs.
     kept
-        (n,) whether a node's rows and columns are wanted.
+        (n,) whether a node's rows and columns are assembled.
     """
 
     def __init__(self, mesh: SolidMesh, kept: BoolArray) -> None:
@@ -186,18 +186,18 @@ class NodeBlocks:
         self._starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
 
     def zeros(self, entries: int) -> FloatArray:
-        """Return an empty store for `entries` numbers a pair."""
+        """Return a zero array for `entries` numbers of each pair."""
         return np.zeros((self._size + 1, entries))
 
     def add(self, store: FloatArray, piece: slice, values: FloatArray) -> None:
-        """Add the numbers (m, k, k, entries) of a piece of the cells to `store`."""
+        """Add the values (m, k, k, entries) of a slice of the cells to `store`."""
         place = self._place[piece].ravel()
         starts = np.arange(len(place) + 1, dtype=np.int32)
         gather = scipy.sparse.csc_array((np.ones(len(place)), place, starts), shape=(len(store), len(place)))
         store += gather @ values.reshape(len(place), -1)
 
     def matrix(self, store: FloatArray) -> Matrix:
-        """Return the (3n, 3n) CSR matrix of a store of 3 x 3 blocks; a single number stands on a block's diagonal."""
+        """Return the (3n, 3n) CSR matrix of 3 x 3 blocks in `store`; a single entry becomes the diagonal of its block."""
         numbers = store[: self._size]
         blocks = numbers[:, :, None] * np.eye(3) if store.shape[1] == 1 else numbers
         blocks = blocks.reshape(-1, 3, 3)

@@ -30,7 +30,7 @@ Say = Callable[[str], None]
 
 
 class _DistrustedError(Exception):
-    """Why factors of feral, a young package, are not used."""
+    """Factors of the package feral are unreliable; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class Factorisation:
     solve
         Takes (n,) or (n, k), real or complex, and returns the same shape.
     backend
-        What factorised it: ``dense``, ``multifrontal``, ``superlu`` or ``feral``.
+        Method of factorisation: ``dense``, ``multifrontal``, ``superlu`` or ``feral``.
     count
-        Returns the number of negative eigenvalues; None where the factors do not tell.
+        Function that returns the number of negative eigenvalues; None if unavailable from the factors.
     """
 
     solve: Solve
@@ -53,7 +53,7 @@ class Factorisation:
 
     @property
     def negative(self) -> int | None:
-        """Number of negative eigenvalues of a Hermitian matrix; None where the factors do not tell."""
+        """Number of negative eigenvalues of a Hermitian matrix; None if unavailable from the factors."""
         return self.count()
 
     def __call__(self, right: Matrix) -> Matrix:
@@ -62,7 +62,7 @@ class Factorisation:
 
 
 def silent(_: str) -> None:
-    """Say nothing: the default of functions that report their progress."""
+    """Ignore the sentence: default of functions that report their progress."""
 
 
 def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Factorisation:
@@ -74,8 +74,8 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         (n, n), dense or sparse, real or complex: symmetric, Hermitian or general.
     backend
         ``dense``; ``multifrontal`` (real symmetric and complex Hermitian, positive definite); ``superlu`` (SciPy's); ``feral``
-        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply,
-        and SuperLU, with a warning, where feral fails, finds a vanishing pivot, or solves with too large a residual.
+        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest applicable one that is installed,
+        and SuperLU, with a warning, if feral fails, finds a vanishing pivot, or solves with too large a residual.
     say
         Called with a sentence before a long factorisation.
 
@@ -84,7 +84,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
     SingularError
         If a pivot vanishes (``multifrontal``: is not positive), or if the condition number exceeds `SINGULAR`.
     InputError
-        If `backend` is unknown, or is ``feral`` or ``multifrontal`` and the matrix is neither symmetric nor Hermitian.
+        If `backend` is unknown, or is ``feral`` or ``multifrontal`` for a matrix that is neither symmetric nor Hermitian.
     StickslipError
         If `backend` is ``feral`` and the package is not installed, fails, or solves with too large a residual.
     """
@@ -155,7 +155,7 @@ def _dense(matrix: Matrix) -> Factorisation:
 
 
 def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
-    """Return how many eigenvalues of a Hermitian matrix are negative (Sylvester's law of inertia).
+    """Return the number of negative eigenvalues of a Hermitian matrix (Sylvester's law of inertia).
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
     Returns
     -------
     int or None
-        None where a pivot vanishes, or the factors are too large to be looked through.
+        None if a pivot vanishes, or the factors are too large to be examined.
     """
     chosen = _chosen(matrix, "auto")
     if chosen == "multifrontal":
@@ -328,9 +328,9 @@ def _of_complex(solve: Solve) -> Solve:
 
 
 def refuse_singular(matrix: Matrix, solve: Solve) -> None:
-    """Raise where two steps of inverse iteration find a condition number above `SINGULAR`.
+    """Raise a `SingularError` if two steps of inverse iteration find a condition number above `SINGULAR`.
 
-    Rows are scaled by their sums, so that units do not count.
+    Rows are scaled by their sums, so that units do not matter.
     """
     size = np.sqrt(np.asarray(abs(matrix).sum(axis=1)).ravel())
     vector = np.random.default_rng(0).standard_normal(len(size))

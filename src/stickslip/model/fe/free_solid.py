@@ -18,8 +18,8 @@ MISMATCH = 2e-4
 def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[FloatArray, FloatArray] | None:
     """Return the static displacement of a free solid under its centrifugal load, in balance with its own inertia.
 
-    The load less the inertia of the rigid motions that it would cause is in balance by itself, and deforms the solid; what is taken
-    off is carried by contacts, whose own share of the stress is left out.
+    The load minus the inertia of the rigid motions that it would cause is in equilibrium and deforms the solid. Contacts carry the
+    subtracted part; stresses from these contact forces are neglected.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
     Returns
     -------
     tuple[FloatArray, FloatArray] | None
-        (n,) displacement at 1 rad/s in m s², without rigid motion, and the (n,) load in N s² that contacts have to carry; None where
-        the solid is held.
+        (n,) displacement at 1 rad/s in m s², without rigid motion, and the (n,) load in N s² that contacts must carry; None if
+        supports prevent rigid motion.
 
     Raises
     ------
     SingularError
-        If it can move without strain in other ways than rigidly.
+        If it can move without strain in a way that is no rigid motion.
     """
     free = rigid_motions(solid, tie)
     if not free.shape[1]:
@@ -73,10 +73,10 @@ def _held(stiffness: Matrix) -> Solve:
 
 
 def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray:
-    """Return the (n, k) rigid motions that neither supports nor the tie hinder; k from 0 to 6.
+    """Return the (n, k) rigid motions that neither supports nor the tie prevent; k from 0 to 6.
 
-    Elements resist no rigid motion of their own nodes, however these were rounded. A tie between faces whose nodes were rounded
-    does, in proportion to their mismatch: each has its own threshold.
+    Elements do not resist rigid motions, whatever the rounding of their nodes. A tie between faces with rounded nodes
+    does, in proportion to their mismatch. Supports and tie therefore have different thresholds.
     """
     places = solid.mesh.points[solid.free]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))

@@ -28,13 +28,13 @@ def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tup
     Parameters
     ----------
     mass
-        (size, size), positive semidefinite.
+        (size, size) mass, positive semidefinite.
     n
-        At most the rank of the mass.
+        Number of eigenvalues, at most the rank of the mass.
     solve
-        Solves with ``K − shift M``.
+        Solver of systems with ``K − shift M``.
     shift
-        Between eigenvalues.
+        Shift, between eigenvalues.
     kind
         `float` or `complex`.
 
@@ -45,9 +45,9 @@ def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tup
 
     Notes
     -----
-    The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks; its image at the
-    start keeps out what has no mass. A Krylov space holds no more vectors of one eigenvalue than a block has. So new directions
-    have their say once all has converged, until they bring nothing new.
+    The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks. The start block is
+    multiplied by this operator, which removes motions without mass. A Krylov space contains at most as many vectors of one eigenvalue as a block has.
+    Therefore new random directions are added after convergence, until they give no new eigenvalue.
     """
     size = mass.shape[0]
     random = np.random.default_rng(0)  # the same in every run

@@ -19,18 +19,18 @@ BLOCK = 256  # columns added together
 
 @dataclass(frozen=True, eq=False)
 class Multifrontal:
-    """Factors of a Hermitian positive matrix but for the rows kept; `multifrontal` makes them.
+    """Factors of a Hermitian positive definite matrix, with a Schur complement on the kept rows; `multifrontal` makes them.
 
     Parameters
     ----------
     dissection
         The order of elimination.
     lower
-        Of each front the (p, p) Cholesky factor of its pivots, in Fortran order.
+        For each front the (p, p) Cholesky factor of its pivots, in Fortran order.
     below
-        Of each front the (u, p) rows under it.
+        For each front the (u, p) rows below this factor.
     rest
-        (k, k) Schur complement on the rows kept, in their order.
+        (k, k) Schur complement on the kept rows, in their order.
     """
 
     dissection: Dissection
@@ -39,7 +39,7 @@ class Multifrontal:
     rest: Matrix
 
     def forward(self, right: Matrix) -> Matrix:
-        """Return the eliminated right-hand sides (n, m), in the order of elimination: the last rows are those of the Schur complement.
+        """Return the right-hand sides (n, m) after elimination, in the order of elimination; the last rows belong to the Schur complement.
 
         Parameters
         ----------
@@ -56,7 +56,7 @@ class Multifrontal:
         return x
 
     def backward(self, forward: Matrix) -> Matrix:
-        """Return the solutions (n, m), in the matrix's own order, from what `forward` returned with the kept rows solved for."""
+        """Return the solutions (n, m), in the order of the matrix, from the result of `forward` with the solution in the kept rows."""
         x: Matrix = np.array(forward, order="C")
         flat = self._flat(x)
         for front, lower, below in reversed(self._each):
@@ -69,7 +69,7 @@ class Multifrontal:
         return out
 
     def solve(self, right: Matrix) -> Matrix:
-        """Return the solutions for right-hand sides (n,) or (n, m), where no row is kept."""
+        """Return the solutions for right-hand sides (n,) or (n, m), if no row is kept."""
         columns = right.reshape(len(right), -1)
         found: Matrix = np.empty(columns.shape, dtype=self._kind(columns))
         for first in range(0, columns.shape[1], COLUMNS):
@@ -95,11 +95,11 @@ def multifrontal(matrix: Matrix, kept: IntArray | None = None, dissection: Disse
     Parameters
     ----------
     matrix
-        (n, n) CSR with its diagonal.
+        (n, n) CSR matrix with a complete diagonal.
     kept
-        (k,) rows that are not eliminated; None: none.
+        (k,) rows that are not eliminated; None: no such rows.
     dissection
-        The order of elimination where it is known.
+        The order of elimination, if known.
 
     Raises
     ------

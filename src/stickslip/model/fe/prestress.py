@@ -24,7 +24,7 @@ class PrestressTerms:
     linear
         (n, n) initial-displacement terms linear in u.
     quadratic
-        (n, n) those quadratic in u.
+        (n, n) initial-displacement terms quadratic in u.
     geometric
         (n, n) stress stiffness: linear in u where the stress is that of linear elasticity.
     """
@@ -48,11 +48,11 @@ def prestress_terms(
     Parameters
     ----------
     mesh, material, shape, places
-        What is integrated, where, and where it goes.
+        Mesh, its material, shape functions at the quadrature points, and assembly.
     displacement
-        (nodes, 3) in metres.
+        (nodes, 3) displacement in metres.
     green
-        Take the stress of the Green strain; else that of the small strain, which is linear in the displacement.
+        True: stress of the Green strain; False: stress of the small strain, linear in the displacement.
     """
     lame = lame_constants(mesh, material)
     stores = [places.zeros(9), places.zeros(9), places.zeros(1)]
@@ -75,7 +75,7 @@ def prestress_terms(
 
 
 def internal_force(mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray) -> FloatArray:
-    """Return the (nodes, 3) forces in N that hold the solid at a finite displacement (nodes, 3)."""
+    """Return the (nodes, 3) forces in N that keep the solid in equilibrium at a finite displacement (nodes, 3)."""
     force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
@@ -95,7 +95,7 @@ def displacement_gradients(mesh: SolidMesh, slopes: FloatArray, piece: slice, di
 
 
 def second_stress(lame: FloatArray, turn: FloatArray, green: bool) -> FloatArray:
-    """Return the (m, q, 3, 3) stress in Pa of displacement gradients: of their Green or their small strain.
+    """Return the (m, q, 3, 3) stress in Pa of displacement gradients, from their Green or small strain.
 
     `lame` holds Lamé's constants (m, 2).
     """
@@ -131,14 +131,14 @@ def _blocks(matrix: FloatArray) -> FloatArray:
 
 
 def strain_and_rotation(mesh: SolidMesh, displacement: FloatArray) -> tuple[float, float]:
-    """Return the largest principal strain (a magnitude) and the largest rotation (rad) at the middles of the elements.
+    """Return the largest principal strain (a magnitude) and the largest rotation (rad) at the centres of the elements.
 
     Parameters
     ----------
     mesh
-        Of the solid.
+        Mesh of the solid.
     displacement
-        (nodes, 3) in m.
+        (nodes, 3) displacement in m.
     """
     shape = shape_functions(mesh.cells.shape[1], 1)
     strain = rotation = 0.0

@@ -36,7 +36,7 @@ class SpeedPolynomial:
     Parameters
     ----------
     rest, square, fourth
-        (n, n) CSR matrices in N/m, N s²/m, N s⁴/m; `fourth` is None where there is none.
+        (n, n) CSR matrices in N/m, N s²/m, N s⁴/m; `fourth` is None if zero.
     """
 
     rest: Matrix
@@ -64,9 +64,9 @@ class RotatingSolid:
     structure
         The solid at rest.
     mesh, material, axis, quadrature
-        What it was made of.
+        Arguments of `rotating_solid`.
     moving
-        (n,) place of each dof among the x, y, z of all nodes, node-major.
+        (n,) position of each dof among the x, y, z of all nodes, node-major.
     nodal_mass
         (nodes, nodes) ``∫ ρ N_i N_j`` in kg.
     centrifugal
@@ -86,7 +86,7 @@ class RotatingSolid:
 
     @cached_property
     def spin_softening(self) -> Matrix:
-        """(n, n) S in kg; rotation takes ``Ω² S`` off the stiffness."""
+        """(n, n) S in kg; rotation subtracts ``Ω² S`` from the stiffness."""
         perpendicular = -self.axis.cross @ self.axis.cross
         return self._of_mass(perpendicular)
 
@@ -101,13 +101,13 @@ class RotatingSolid:
 
     @property
     def free(self) -> BoolArray:
-        """(nodes,) which nodes can move."""
+        """(nodes,) whether a node can move."""
         free = np.zeros(len(self.mesh.points), dtype=bool)
         free[self.moving // 3] = True
         return free
 
     def at_nodes(self, vector: FloatArray) -> FloatArray:
-        """Return a vector (n,) as (nodes, 3), with zeros where nodes are held."""
+        """Return a vector (n,) as (nodes, 3), with zeros at supported components."""
         full = np.zeros(self.mesh.points.size, dtype=vector.dtype)
         full[self.moving] = vector
         return full.reshape(-1, 3)
@@ -130,22 +130,22 @@ class RotatingSolid:
         Parameters
         ----------
         speed
-            In rad/s.
+            Speed in rad/s.
         tie
             (n, m) sparse: displacements ``tie @ q`` are admissible (a cyclic sector's tie at wave number 0); None: all.
         nonlinear
-            Find the equilibrium at finite displacement (St. Venant-Kirchhoff, load on the deformed solid) by Newton's
-            method; else solve ``K u = f`` as linear elasticity and as the solvers' linear static step does.
+            True: equilibrium at finite displacement (St. Venant-Kirchhoff, load on the deformed solid) by Newton's
+            method. False: ``K u = f``, linear elasticity, as in the linear static step of FE programs.
 
         Returns
         -------
         FloatArray
-            (n,) in metres.
+            (n,) displacement in metres.
 
         Raises
         ------
         SingularError
-            If nothing holds the solid.
+            If the solid can move rigidly.
         StickslipError
             If Newton's method finds no equilibrium.
         """
@@ -156,12 +156,12 @@ class RotatingSolid:
     def polynomial(
         self, tie: Matrix | None = None, *, tangent: Tangent = "consistent", unit: FloatArray | None = None
     ) -> SpeedPolynomial:
-        """Return the stiffness as a polynomial of the speed, exact where the static displacement is linear.
+        """Return the stiffness as a polynomial of the speed, exact if the static displacement is linear.
 
         Parameters
         ----------
         tie
-            As in `displacement`. Nothing is computed twice for the same tie.
+            As in `displacement`. Results are cached for the same tie.
         tangent, unit
             As in `at_speed`; ``"nonlinear"`` has no polynomial.
         """
@@ -191,17 +191,17 @@ class RotatingSolid:
         Parameters
         ----------
         speed
-            In rad/s; its sign matters to the Coriolis matrix alone.
+            Speed in rad/s; its sign affects only the Coriolis matrix.
         tie
-            As in `displacement`: used for the static displacement; the structure itself stays untied.
+            As in `displacement`, for the static displacement only; the structure itself is not tied.
         tangent
             ``"consistent"``: the tangent ``K_L(u0) + K_G(σ) − Ω² S`` at the linear static displacement u0, with
             initial-displacement terms. ``"textbook"``: ``K + K_G(σ) − Ω² S`` without them, which is off by the order
             of the static strain. ``"nonlinear"``: the exact tangent at the equilibrium at finite displacement.
         coriolis
-            Add ``2 Ω G`` to the damping.
+            Whether ``2 Ω G`` is added to the damping.
         unit
-            (n,) linear static displacement at 1 rad/s in m s², where others bodies share in it; None: computed from `tie`.
+            (n,) linear static displacement at 1 rad/s in m s², if other bodies affect it; None: computed from `tie`.
         """
         _check_speed(speed)
         if tangent not in TANGENTS:
@@ -282,7 +282,7 @@ def rotating_solid(
     held: BoolArray | None = None,
     quadrature: Quadrature = EXACT,
 ) -> RotatingSolid:
-    """Assemble a solid that rotates about an axis, and its supports with it.
+    """Assemble a solid that rotates about an axis together with its supports.
 
     Parameters
     ----------
@@ -294,8 +294,8 @@ def rotating_solid(
     Returns
     -------
     RotatingSolid
-        Matrices at rest, load, Coriolis matrix and spin softening at once; what depends on the static displacement
-        when it is asked for.
+        The solid with matrices at rest, load, Coriolis matrix and spin softening; terms that depend on the static displacement
+        are computed at first use.
 
     Raises
     ------

@@ -28,11 +28,11 @@ class Material:
     Parameters
     ----------
     young_modulus
-        In Pa.
+        Young's modulus in Pa.
     poisson_ratio
-        Between 0 (included) and 1/2.
+        Poisson's ratio, from 0 to below 1/2.
     density
-        In kg/m³.
+        Density in kg/m³.
     """
 
     young_modulus: float = quantity("Young's modulus (steel: 2.1e11)", "pa", default=210e9, above=0)
@@ -65,27 +65,27 @@ def assemble_solid(
     Parameters
     ----------
     mesh
-        Any mesh; one without ``root`` stays free unless `clamped` names other sets.
+        Any mesh; without the set ``root`` it stays free unless `clamped` names other sets.
     material
         Its material, or a list of m materials, one for each cell.
     clamped
         Names of node sets whose nodes do not move.
     held
-        (nodes, 3) components x, y, z that are supported besides.
+        (nodes, 3) further supported components x, y, z.
     quadrature
-        The rules; the default integrates straight-edged cells exactly.
+        Quadrature rules; the default integrates straight-edged cells exactly.
 
     Returns
     -------
     Structure
         Sparse, undamped; `Dofs.node` holds the mesh's node numbers. Each other node set becomes a set of dofs,
-        node-major (x, y, z) without the components that are held; ``cyclic_low`` and ``cyclic_high`` lose their clamped nodes.
+        node-major (x, y, z) without supported components; ``cyclic_low`` and ``cyclic_high`` lose their clamped nodes.
 
     Raises
     ------
     InputError
         If the mesh has nodes without elements or cells inside out, neighbours that do not share their mid-side nodes,
-        `clamped` names an unknown set, or a set has clamped nodes.
+        `clamped` names an unknown set, or another set has clamped nodes.
     """
     mass, stiffness = integrate(mesh, material, quadrature)
     return support(mesh, mass, stiffness, clamped, held)[0]
@@ -107,12 +107,12 @@ def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
 def support(
     mesh: SolidMesh, mass: Matrix, stiffness: Matrix, clamped: tuple[str, ...], held: BoolArray | None
 ) -> tuple[Structure, IntArray]:
-    """Take supported components out of the matrices of a free body.
+    """Remove supported components from the matrices of a free body.
 
     Returns
     -------
     tuple[Structure, IntArray]
-        The structure, and the place (n,) of each of its dofs among those of the free body.
+        The structure, and the position (n,) of each of its dofs among those of the free body.
     """
     still = _clamped_nodes(mesh, clamped)
     fixed = np.repeat(still[:, None], 3, axis=1)

@@ -53,7 +53,7 @@ class BladePair:
     twist
         Rotation of the tip section against the hub section about z.
     force_span
-        Place of the force node on blade 1: on the airfoil, as a fraction of the span from hub to tip; below zero on the shank, as a
+        Position of the force node on blade 1: on the airfoil, as a fraction of the span from hub to tip; negative: on the shank, as a
         fraction of its height from the platform down to the foot.
     airfoil_size, platform_size, foot_size
         Element sizes.
@@ -177,7 +177,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     geometry
         The blades.
     contacts
-        Points of the damper; those on its flat side become nodes of blade 1, those on its curved
+        Contact points of the damper; points on its flat side become nodes of blade 1, points on its curved
         side nodes of blade 2.
 
     Returns
@@ -227,7 +227,7 @@ def check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
     Raises
     ------
     InputError
-        Naming each of them.
+        If there are such points; the message names them.
     """
     edge = geometry.platform_height - geometry.platform_edge
     misses = []

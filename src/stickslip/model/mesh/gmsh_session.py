@@ -22,7 +22,7 @@ GMSH_OPTIONS = {
 
 @contextmanager
 def gmsh_session() -> Iterator[Any]:
-    """Give a silent, single-threaded gmsh with an empty model, and clean up after it."""
+    """Yield a silent, single-threaded gmsh with an empty model; the model is removed afterwards."""
     try:
         import gmsh
     except (ModuleNotFoundError, OSError) as error:

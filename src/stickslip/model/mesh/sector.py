@@ -25,7 +25,7 @@ class DiskProfile:
     bore_radius
         Inner radius; the bore is clamped.
     hub_radius
-        Where the hub has narrowed to the web.
+        Radius at which the hub has narrowed to the web.
     rim_radius
         Outer radius.
     rim_height
@@ -77,7 +77,7 @@ class Platform:
     top_radius
         Distance of the plane top from the axis.
     thickness
-        Of the platform at its sides.
+        Thickness of the platform at its sides.
     neck_width
         Extent of the neck around the wheel.
     depth
@@ -85,7 +85,7 @@ class Platform:
     underside_angle
         Inclination of the undersides: they fall towards the neck.
     gap
-        Clearance to the neighbour's platform at the top; 0 lets them touch.
+        Clearance to the neighbour's platform at the top; 0: they touch.
 
     Raises
     ------
@@ -168,18 +168,18 @@ class Airfoil:
 
 @dataclass(frozen=True, kw_only=True)
 class Shroud:
-    """A ring segment on the blade whose faces meet, or almost meet, the neighbours'; metres and rad.
+    """A ring segment on the blade whose faces touch, or nearly touch, those of the neighbours; metres and rad.
 
     Parameters
     ----------
     span
-        Where its middle lies, as a fraction of the airfoil's length; 1 is the tip.
+        Position of its middle as a fraction of the airfoil's length; 1 is the tip.
     thickness
         Extent along the radius.
     depth
         Extent along the axis.
     gap
-        Clearance to the neighbour's face along the circumference; 0 lets them touch.
+        Clearance to the neighbour's face along the circumference; 0: they touch.
     face_angle
         Inclination of the contact faces from the axial plane, as in an interlocked (Z) shroud.
 
@@ -206,22 +206,22 @@ class BladedSector:
     Parameters
     ----------
     sectors
-        How many make the wheel, at least 3.
+        Number of sectors of the wheel, at least 3.
     disk
         Cross-section of the disk.
     platform
-        What carries the airfoil; None sets the airfoil on the rim.
+        Platform that carries the airfoil; None: the airfoil is on the rim.
     airfoil
         The blade.
     shroud
-        None for blades that do not touch each other.
+        Shroud; None: no shroud.
     disk_size, platform_size, airfoil_size
-        Element sizes in metres, outward; a shroud has that of the platform.
+        Element sizes in metres, from the bore outward; a shroud has the platform's size.
 
     Raises
     ------
     InputError
-        If the parts do not fit together, or reach into the neighbours.
+        If the parts do not fit together, or penetrate the neighbours.
     """
 
     sectors: int = quantity("number of sectors (blades) of the wheel", default=24, least=3, usual=500)

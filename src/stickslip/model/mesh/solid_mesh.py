@@ -16,7 +16,7 @@ HEX_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2
 
 @dataclass(frozen=True, eq=False)
 class SolidMesh:
-    """A mesh of tetrahedra or hexahedra of first or second order; one kind of cell a mesh.
+    """A mesh of tetrahedra or hexahedra of first or second order; all cells are of the same kind.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class SolidMesh:
     Raises
     ------
     InputError
-        If the cells have another number of nodes or name nodes that are not there, or there are not as many numbers
-        as nodes and cells.
+        If the cells have another number of nodes or refer to missing nodes, or the counts of numbers differ from those
+        of nodes and cells.
     """
 
     points: FloatArray
@@ -153,7 +153,7 @@ def _pattern(mesh: SolidMesh) -> IntArray:
 
 
 def mirrored_cells(cells: IntArray) -> IntArray:
-    """Return cells (m, k) whose nodes were mirrored, with their corners in an order that keeps volumes positive."""
+    """Return cells (m, k) after a mirror operation, with corners reordered so that volumes stay positive."""
     order = {
         4: [1, 0, 2, 3],
         10: [1, 0, 2, 3, 4, 6, 5, 8, 7, 9],

@@ -36,12 +36,12 @@ def read_abaqus_matrices(
         Files such as ``job_STIF2.mtx``, ``job_MASS2.mtx``, ``job_DMPV2.mtx`` of ``FORMAT=MATRIX INPUT``; upper triangle,
         lower, or both.
     nodes
-        Where the nodes lie, which the matrices do not say: the deck ``.inp``, a CSV file with the columns
+        Source of the node positions, which the matrix files lack: the deck ``.inp``, a CSV file with the columns
         ``node, x, y, z``, or a mesh in metres. Its node sets become sets of dofs.
     units
         Unit system of the model.
     plausible
-        False takes mass and size as they are, though they do not fit together.
+        False accepts implausible mass and size.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def read_abaqus_matrices(
 def read_coordinate_matrix(path: Path | str) -> Matrix:
     """Read a matrix of ``FORMAT=COORDINATE``: lines row, column, value, counted from 1, any triangle.
 
-    Such a file does not say which dof an equation is: give its matrices with a table of dofs to `read_matrix_files`.
+    Such a file does not contain the dofs of the equations: pass its matrices with a table of dofs to `read_matrix_files`.
 
     Returns
     -------
     csr_array
-        Symmetric, with the file's numbers.
+        Symmetric matrix in the units of the file.
     """
     path = Path(path)
     table = _table(path, 3)

@@ -34,23 +34,23 @@ def read_ansys_full(
         The file. In ANSYS: a modal analysis by Block Lanczos after ``LUMPM,OFF``, or ``WRFULL,1``.
     nodes
         The ``.cdb`` or ``.rst`` file of the same model: positions, node components as sets, and nodal coordinate
-        systems, out of which the matrices are then turned. Without it positions are NaN, there are no such sets, and
+        systems, from which the matrices are then rotated to the global axes. Without it positions are NaN, sets are missing, and
         ``x, y, z`` are the axes of each node's own system.
     units
-        Unit system of the model, SI by default: the file does not say.
+        Unit system of the model, SI by default; it is not in the file.
     plausible
-        Whether mass and size are checked against what solids have.
+        Whether mass and size are checked for plausibility.
 
     Returns
     -------
     Structure
-        Sparse, in SI, sorted by node number. The set ``massless`` holds the coordinates without mass, if any: the mass
+        Sparse, in SI, sorted by node number. The set ``massless`` contains the coordinates without mass, if any: the mass
         matrix is then singular.
 
     Raises
     ------
     InputError
-        If the file is damaged or of another kind, or holds what a structure cannot: a lumped or unsymmetric matrix,
+        If the file is damaged or of another kind, or has unsupported content: a lumped or unsymmetric matrix,
         constraint equations, other coordinates than displacements and rotations.
     """
     units = Units.si() if units is None else units

@@ -71,13 +71,13 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     -------
     SolidMesh
         In metres, with the numbers of nodes and elements; node components are node sets in lower case, and ``coupled_1`` and
-        ``coupled_2`` the first and the second nodes of coupled pairs (CP), as between the faces of a sector.
+        ``coupled_2`` contain the first and the second nodes of coupled pairs (CP), as between the faces of a sector.
 
     Raises
     ------
     InputError
         If the file is damaged; if elements are degenerate, lack mid-side nodes, are of different shapes, or of types
-        that carry stiffness but are no solids.
+        with stiffness that are no solids.
     """
     units = Units.si() if units is None else units
     path = Path(path)
@@ -114,17 +114,17 @@ def read_ansys_materials(
     units
         Unit system of the model, SI by default: the file does not say.
     plausible
-        Whether density and Young's modulus are checked against what solids have.
+        Whether density and Young's modulus are checked for plausibility.
 
     Returns
     -------
     dict
-        Material number -> material, in SI; those that lack modulus, Poisson's ratio or density are left out.
+        Material number -> material, in SI; materials without modulus, Poisson's ratio or density are left out.
 
     Raises
     ------
     InputError
-        If the file is damaged, or a material is orthotropic or no solid's.
+        If the file is damaged, or a material is orthotropic or implausible.
     """
     units = Units.si() if units is None else units
     materials = {}
@@ -148,12 +148,12 @@ def read_ansys_materials(
 
 
 def ansys_passed_over(path: Path | str) -> tuple[str, ...]:
-    """Return what of an archive is not read though a study needs it, or says it otherwise: supports, damping.
+    """Return the commands of an archive that are ignored and that a study must define itself: supports, damping.
 
     Raises
     ------
     InputError
-        If a table of a material (TB) gives it another stiffness, or damping of its own.
+        If a material table (TB) changes stiffness or damping.
     """
     found: dict[str, list[str]] = {}
     for place, (command, *words) in read_blocks(Path(path)).commands:
@@ -181,12 +181,12 @@ def _nonzero(word: str) -> bool:
 
 
 def ansys_speed(path: Path, units: Units) -> float:
-    """Return the speed in rad/s that an archive turns at (OMEGA); 0 where it says none.
+    """Return the speed of an archive (OMEGA) in rad/s; 0 if it has none.
 
     Raises
     ------
     InputError
-        If it turns otherwise than by OMEGA.
+        If the archive defines rotation by another command than OMEGA.
     """
     speed = 0.0
     for place, (command, *rest) in read_blocks(path).commands:

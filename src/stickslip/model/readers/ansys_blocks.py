@@ -33,7 +33,7 @@ KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS, *BEHAVIOUR, *SUPPORTS, *DAMPING)
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What an archive holds, in its own units and numbers.
+    """Content of an archive, in its own units and numbers.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Blocks:
     angles
         (n, 3) angles of the nodal coordinate systems in degrees.
     heads
-        (m, 11) numbers before the nodes of each element.
+        (m, 11) numbers that precede the nodes of each element.
     nodes
         m lists of node numbers.
     types
@@ -55,7 +55,7 @@ class Blocks:
         Material number -> property -> value.
     commands
         (place, words) of commands that change the model: rotation, coupled dofs, constraint equations, options of element
-        types, those of ``ET`` as ``KEYOPT`` of their own, tables of materials, supports, damping.
+        types (those of ``ET`` as separate ``KEYOPT``), tables of materials, supports, damping.
     """
 
     numbers: IntArray
@@ -126,7 +126,7 @@ def read_blocks(path: Path) -> Blocks:
 
 
 def integer(word: str) -> int:
-    """Return a whole number of digits alone; ValueError where it is none, or larger than any program's."""
+    """Return a whole number that consists of digits; `ValueError` if it does not, or is too large."""
     number = int(word)
     if not word.isascii() or abs(number) > LARGEST:
         raise ValueError(word)

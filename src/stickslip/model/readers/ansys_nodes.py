@@ -18,7 +18,7 @@ NODE_FIELDS = 7  # number, x, y, z, and three angles
 
 @dataclass(frozen=True, eq=False)
 class AnsysNodes:
-    """Nodes as ANSYS numbers them, in the model's units.
+    """Nodes with the numbers of ANSYS, in the model's units.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class AnsysNodes:
     def of_dofs(self, node: IntArray, place: str) -> tuple[FloatArray, dict[str, IntArray]]:
         """Return the positions of coordinates of the nodes `node`, and the sets as indices into them.
 
-        A component without any of these coordinates is no set.
+        A component without any of these coordinates is left out.
         """
         if not len(self.numbers):
             return np.full((len(node), 3), np.nan), {}
@@ -57,7 +57,7 @@ class AnsysNodes:
 
 
 def no_nodes() -> AnsysNodes:
-    """Return an empty table, for files read alone."""
+    """Return an empty table, for files without a file of nodes."""
     return AnsysNodes(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)), {})
 
 

@@ -28,7 +28,7 @@ class Records:
     Parameters
     ----------
     path
-        Its name.
+        Path of the file.
     words
         (n,) 32-bit words.
     """
@@ -44,9 +44,9 @@ class Records:
         pointer
             Word at which the record starts.
         most
-            Numbers that it may have at most; bounds what is allocated.
+            Largest count of numbers, which bounds the allocated memory.
         what
-            What it should hold, for messages.
+            Expected content, for messages.
 
         Raises
         ------
@@ -86,12 +86,12 @@ class Records:
         return np.asarray(numbers, dtype=float)
 
     def header(self, what: str) -> IntArray:
-        """Return the header record of the file's own kind, filled up with zeros."""
+        """Return the header record of this kind of file, filled up with zeros."""
         read = self.integers(HEADER, HEADER_WORDS, what)
         return np.concatenate([read, np.zeros(HEADER_WORDS - len(read), dtype=np.int64)])
 
     def damaged(self, what: str, problem: str) -> InputError:
-        """Build the error for a file that is not what it should be."""
+        """Build the error for a damaged file."""
         return input_error(f"{self.path}: {what}", problem, CUT_SHORT)
 
     def _unpacked(self, words: IntArray, flags: int, most: int, what: str) -> FloatArray:
@@ -146,7 +146,7 @@ class Records:
 
 
 def long_pointer(low: int, high: int) -> int:
-    """Return the number of 64 bits that is written as two of 32."""
+    """Return the 64-bit number that is stored as two 32-bit ones."""
     return (int(high) << 32) + (int(low) & 0xFFFFFFFF)
 
 
@@ -163,7 +163,7 @@ def open_records(path: Path | str, kind: int) -> Records:
     Raises
     ------
     InputError
-        If there is no such file, it is none of ANSYS's, of another kind or of another byte order.
+        If the file is missing, not from ANSYS, of another kind or of another byte order.
     """
     path = Path(path)
     if not path.is_file():

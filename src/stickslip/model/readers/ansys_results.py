@@ -28,14 +28,14 @@ class AnsysResults:
         (k,) natural frequencies.
     shapes
         (n, k) modes in the global axes, mass-normalised in SI where ANSYS normalised them to mass (``MODOPT``); zero
-        where it wrote none.
+        if the file has none.
     dofs
         Table of the n coordinates.
     harmonic_indices
         (k,) nodal diameters of a cyclic analysis, the second mode of a pair negative; all zero for other analyses.
     sectors
-        Sectors of a cyclic analysis, else 1. The shapes are then those of the modelled sector, real and as they
-        stand in the file: the two of a pair are the real and the imaginary part.
+        Sectors of a cyclic analysis, else 1. The shapes are then those of the modelled sector, real as
+        in the file: the two of a pair are the real and the imaginary part.
     """
 
     frequencies_hz: FloatArray
@@ -53,12 +53,12 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     path
         The file.
     units
-        Unit system of the model, SI by default: the file does not say.
+        Unit system of the model, SI by default; it is not in the file.
 
     Raises
     ------
     InputError
-        If the file is damaged, of another kind or analysis, one of several parts, or holds complex modes.
+        If the file is damaged, of another kind or analysis, one of several parts, or contains complex modes.
     """
     units = Units.si() if units is None else units
     file = open_records(path, RESULT)

@@ -36,23 +36,23 @@ def read_calculix_matrices(
     units
         Unit system of the model.
     mesh
-        Where the nodes lie, which the matrices do not say: the deck (``.inp``), the results (``.frd``), a CSV file with
+        Source of the node positions, which the matrix files lack: the deck (``.inp``), the results (``.frd``), a CSV file with
         the columns ``node, x, y, z`` or a mesh in metres; the job's deck by default. Its node sets become sets of dofs.
     mass
-        The ``.mas`` file where it is another job's: CalculiX stores the same mass at rest and preloaded.
+        The ``.mas`` file, if it belongs to another job: CalculiX stores the same mass at rest and preloaded.
     plausible
-        False takes mass and size as they are, though they do not fit together.
+        False accepts implausible mass and size.
 
     Returns
     -------
     Structure
         Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. The matrices of a cyclic job are complex
-        Hermitian: those of a travelling wave on the nodes that the cyclic tie left.
+        Hermitian: those of a travelling wave on the independent nodes of the cyclic tie.
 
     Raises
     ------
     InputError
-        If a file is missing, cut short or of another run, or the positions are unknown.
+        If a file is missing, cut short or of another run, or positions are unknown.
     """
     stem = _stem(Path(path))
     node, component = _read_dof(_find(stem, ".dof"))

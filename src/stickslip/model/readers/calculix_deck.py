@@ -32,32 +32,32 @@ ROUNDING = 1e-9  # squares of direction cosines below are zero
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """What an input deck holds, in SI.
+    """Content of an input deck, in SI.
 
     Parameters
     ----------
     mesh
-        Nodes that belong to cells, and the cells. Its sets: those of the deck without their clamped nodes; ``root``,
-        the clamped ones; with cyclic symmetry ``cyclic_low`` and ``cyclic_high``, of which the first, turned by one
-        pitch, is the second.
+        Cells and their nodes. Node sets: those of the deck without clamped nodes; ``root``,
+        the clamped nodes; with cyclic symmetry ``cyclic_low`` and ``cyclic_high``: the first, rotated by one
+        pitch, coincides with the second.
     element_type
-        As in the deck, e.g. ``C3D10``.
+        Element type of the deck, e.g. ``C3D10``.
     materials
         Name -> material.
     cell_material
         (m,) material name of each cell.
     held
-        (n, 3) which components of each node are supported; ``root`` has those with all three.
+        (n, 3) supported components of each node; ``root`` contains nodes with all three.
     speed
         Rotor speed in rad/s of the last ``CENTRIF`` load; None without one.
     axis
-        Of rotation; the z axis where the deck names none.
+        Axis of rotation; the z axis if the deck defines none.
     sectors
         Number of sectors; None without cyclic symmetry.
     ignored
-        Keywords and loads that were passed over, with their lines.
+        Ignored keywords and loads, with their lines.
     clamped_sets
-        Names of the deck's sets of which every node is clamped, so that they are not among those of the mesh.
+        Names of the deck's sets whose nodes are all clamped, which are therefore missing in the mesh.
     """
 
     mesh: SolidMesh
@@ -73,7 +73,7 @@ class Deck:
 
     @property
     def material(self) -> Material:
-        """The only material; an `InputError` where there are several."""
+        """The only material; an `InputError` if there are several."""
         used = sorted(set(self.cell_material))
         if len(used) != 1:
             raise input_error("Deck.material", f"there are {len(used)}: {', '.join(used)}", "Use assemble_deck.")
@@ -81,7 +81,7 @@ class Deck:
 
     @property
     def quadrature(self) -> Quadrature:
-        """The quadrature rules of CalculiX for the element type; exact ones for types that are more than a rule."""
+        """The quadrature rules of CalculiX for the element type; exact rules for element types that differ by more than a rule."""
         return QUADRATURES.get(self.element_type, Quadrature())
 
 
@@ -106,9 +106,9 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     units
         Unit system of the deck.
     ignore
-        Keywords to go on without, e.g. ``("MPC",)``, though they change the model; they are listed in `Deck.ignored`.
+        Keywords to ignore although they change the model, e.g. ``("MPC",)``; they are listed in `Deck.ignored`.
     plausible
-        False takes density and stiffness as they are, though no solid has such.
+        False accepts implausible density and stiffness.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     Raises
     ------
     InputError
-        If the deck is damaged or incomplete, or holds what changes the model and is not read (multi-point constraints,
+        If the deck is damaged or incomplete, or has unsupported keywords that change the model (multi-point constraints,
         shells, contact, orientations); the message names the line.
     """
     path = Path(path)
@@ -163,12 +163,12 @@ def assemble_deck(deck: Deck) -> Structure:
     Parameters
     ----------
     deck
-        With one material or several.
+        The deck, with one material or several.
 
     Returns
     -------
     Structure
-        Sparse, undamped. Each node set becomes a set of dofs, without those that are supported.
+        Sparse, undamped. Each node set becomes a set of dofs, without supported ones.
     """
     rules = deck.quadrature
     n = 3 * len(deck.mesh.points)

@@ -24,7 +24,7 @@ NODES_OF = {"C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10, "C3D8": 8, "C3D2
 
 @dataclass
 class DeckModel:
-    """Contents of a deck with its own numbers and units, as far as they were read.
+    """Content of a deck in its own numbers and units, as far as it is read.
 
     Cells are rows ``number, nodes…``; sections are pairs of material and element set; ``fixed`` holds nodes by
     component ``x``, ``y``, ``z``; speeds are squares of circular frequencies.
@@ -51,16 +51,16 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
     Parameters
     ----------
     blocks
-        Of the whole file.
+        Blocks of the whole file.
     nodes
-        Its nodes and node sets.
+        Nodes and node sets of the file.
     ignore
-        Keywords to pass over though the model is another one without them.
+        Keywords to ignore although they change the model.
 
     Raises
     ------
     InputError
-        If something is missing, wrong, or changes the matrices in a way that is not read.
+        If something is missing or wrong, or changes the matrices in an unsupported way.
     """
     model = DeckModel(nodes)
     passed = passed_over(ignore)
@@ -88,12 +88,12 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
 
 
 def passed_over(ignore: tuple[str, ...]) -> set[str]:
-    """Return keywords that a user asks to pass over, as blocks write them."""
+    """Return the keywords that a user asks to ignore, in the spelling of blocks."""
     return {" ".join(word.upper().strip("* ").split()) for word in ignore}
 
 
 def unread(block: Block, problem: str) -> InputError:
-    """Return the refusal of a keyword without which the model would be another one."""
+    """Return the error for an unsupported keyword that changes the model."""
     return input_error(
         block.place,
         problem,
@@ -227,7 +227,7 @@ def _section(model: DeckModel, block: Block) -> None:
 
 
 def unknown(place: str, what: str, name: str, known: list[str]) -> InputError:
-    """Return the refusal of a name that is not there."""
+    """Return the error for an unknown name."""
     return input_error(place, f"there is no {what} {name!r}", did_you_mean(name, known))
 
 

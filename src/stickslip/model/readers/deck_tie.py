@@ -14,21 +14,21 @@ HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3
 
 
 def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
-    """Take the faces of the cyclic tie into the model; refuse other ties, and several instances.
+    """Add the faces of the cyclic tie to the model; refuse other ties, and several instances.
 
     Parameters
     ----------
     model
-        What the other keywords say.
+        Model from the other keywords.
     blocks
-        Of the whole file.
+        Blocks of the whole file.
     ignore
-        Keywords to pass over though the model is another one without them.
+        Keywords to ignore although they change the model.
 
     Raises
     ------
     InputError
-        If a tie is another one, or its surfaces are not there.
+        If a tie is not cyclic, or its surfaces are missing.
     """
     passed = passed_over(ignore)
     instances = [b for b in blocks if b.keyword == "INSTANCE"]

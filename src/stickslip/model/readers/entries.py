@@ -10,7 +10,7 @@ SYMMETRY = 1e-9  # relative to the largest entry: the text formats carry 14 digi
 
 
 def check_range(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
-    """Refuse entries outside an (n, n) matrix, before anything of its size is made."""
+    """Refuse entries outside an (n, n) matrix, before memory of its size is allocated."""
     wrong = np.flatnonzero((rows < 0) | (rows >= n) | (columns < 0) | (columns >= n))
     if wrong.size:
         i = wrong[0]
@@ -35,7 +35,7 @@ def check_unique(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
 
 
 def from_triangle(rows: IntArray, columns: IntArray, values: FloatArray, n: int, place: str) -> Matrix:
-    """Return the symmetric (n, n) CSR matrix of which one triangle, or all of it, is given.
+    """Return the symmetric (n, n) CSR matrix from one triangle or from all entries.
 
     Parameters
     ----------
@@ -46,8 +46,7 @@ def from_triangle(rows: IntArray, columns: IntArray, values: FloatArray, n: int,
     n
         Size.
     place
-        For messages.
-
+        Place of the matrix, for messages.
     Raises
     ------
     InputError

@@ -31,21 +31,21 @@ class NodalField:
     Parameters
     ----------
     name
-        As in the file: ``DISP``, ``STRESS``, ...
+        Name in the file: ``DISP``, ``STRESS``, ...
     components
         Names of the columns, e.g. ``("D1", "D2", "D3")``.
     values
-        (n, k) in SI for ``DISP`` and ``DISPI`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes are those of
-        unit modal mass in SI; a response that stickslip wrote is in m.
+        (n, k) in SI for ``DISP`` and ``DISPI`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes have
+        unit modal mass in SI; a response written by stickslip is in m.
     nodes
         (n,) node numbers.
     step
-        Counted through the file.
+        Number of the step in the file.
     frequency_hz
-        Of a mode; None elsewhere.
+        Frequency of a mode, Hz; None for other fields.
     nodal_diameter
-        Of a mode of a cyclic analysis, whose fields ``DISP`` and ``DISPI`` are the real and the imaginary part; None
-        elsewhere.
+        Nodal diameter of a mode of a cyclic analysis, whose fields ``DISP`` and ``DISPI`` are the real and the imaginary part; None
+        for other fields.
     """
 
     name: str
@@ -59,14 +59,14 @@ class NodalField:
 
 @dataclass(frozen=True, eq=False)
 class FrdResults:
-    """What an ``.frd`` file holds, in SI.
+    """Content of an ``.frd`` file, in SI.
 
     Parameters
     ----------
     mesh
-        Nodes and cells; None where the cells are shells, beams, wedges or of several kinds.
+        Nodes and cells; None if the cells are shells, beams, wedges or of several kinds.
     nodes
-        Numbers and positions in metres.
+        Node numbers and positions in metres.
     fields
         In the file's order.
     """
@@ -76,7 +76,7 @@ class FrdResults:
     fields: tuple[NodalField, ...]
 
     def field(self, name: str, step: int | None = None) -> NodalField:
-        """Return the first field `name`, or that of `step`; an `InputError` lists what there is."""
+        """Return the first field `name`, or that of `step`; an `InputError` lists the available ones."""
         for candidate in self.fields:
             if candidate.name == name and step in (None, candidate.step):
                 return candidate
@@ -93,14 +93,14 @@ def read_frd(path: Path | str, *, units: Units = SI) -> FrdResults:
     Parameters
     ----------
     path
-        The file, or the same gzipped.
+        The file, plain or gzipped.
     units
         Unit system of the model.
 
     Raises
     ------
     InputError
-        If it is binary, cut short or damaged; the message names the line.
+        If the file is binary, cut short or damaged; the message names the line.
     """
     path = Path(path)
     reader = _Frd(path)

@@ -19,7 +19,7 @@ LARGEST = 2**53  # no program numbers further
 
 @dataclass(frozen=True)
 class Segment:
-    """Data lines that stand together in one file; comments in them are empty lines."""
+    """Consecutive data lines of one file; comments become empty lines."""
 
     path: Path
     first_line: int
@@ -48,18 +48,18 @@ class Block:
 
     @property
     def place(self) -> str:
-        """For messages."""
+        """File and line, for messages."""
         return f"{self.path}: line {self.line}, *{self.keyword}"
 
     def parameter(self, name: str) -> str:
-        """Return a parameter that must be there."""
+        """Return a required parameter."""
         value = self.parameters.get(name, "")
         if not value:
             raise input_error(self.place, f"lacks the parameter {name}", f"Write {name}=….")
         return value
 
     def check_parameters(self) -> None:
-        """Refuse a parameter that the keyword, one that is read, is not known to have."""
+        """Refuse an unknown parameter of a keyword that is read."""
         known = PARAMETERS[self.keyword]
         for name in self.parameters:
             if name not in known:
@@ -70,7 +70,7 @@ class Block:
                 )
 
     def rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Yield place and fields of each data line; a comma at its end counts for nothing."""
+        """Yield place and fields of each data line; a trailing comma is ignored."""
         for segment in self.segments:
             for number, line in enumerate(segment.text.splitlines(), segment.first_line):
                 if line.strip():
@@ -87,12 +87,12 @@ class Block:
 
 
 def keyword_blocks(path: Path) -> list[Block]:
-    """Return the blocks of a keyword file, in order, with included files put in their place.
+    """Return the blocks of a keyword file, in order, with included files inserted.
 
     Parameters
     ----------
     path
-        The file; ``*INCLUDE``, and ``INPUT=`` of a keyword that is read, may name files of its folder and of folders below it.
+        The file; ``*INCLUDE``, and ``INPUT=`` of a keyword that is read, may name files in its folder and in folders below.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def members(blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, 
     Parameters
     ----------
     blocks
-        Of the whole file.
+        Blocks of the whole file.
     kind
         ``NSET`` or ``ELSET``.
     numbers
@@ -145,12 +145,12 @@ def members(blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, 
     Returns
     -------
     dict
-        Upper case name -> numbers, each once; ``*NSET, ELSET=`` is left to who knows the elements.
+        Upper case name -> numbers, each once; ``*NSET, ELSET=`` is not evaluated, as it needs the elements.
 
     Raises
     ------
     InputError
-        If a set names what is not there.
+        If a set refers to missing nodes, elements or sets.
     """
     known = np.sort(numbers)
     parts = {name: [listed] for name, listed in named.items()}
@@ -165,7 +165,7 @@ def members(blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, 
 
 
 def unique_in_order(values: IntArray) -> IntArray:
-    """Return each value once, where it first stands."""
+    """Return each value once, in the order of first occurrence."""
     _, first = np.unique(values, return_index=True)
     return np.asarray(values[np.sort(first)], dtype=np.int64)
 

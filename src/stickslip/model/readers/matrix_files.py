@@ -32,14 +32,14 @@ def read_matrix_market(path: Path, n: int | None) -> Matrix:
     Parameters
     ----------
     path
-        The file, or the same gzipped.
+        The file, plain or gzipped.
     n
-        Its size, so that nothing is made before the file has said the same; None: the one that it says, if its entries fill it.
+        Expected size, checked before memory is allocated; None: the size in the file, if there are enough entries for it.
 
     Raises
     ------
     InputError
-        If the file is of another kind or size, is cut short, or holds an entry twice.
+        If the file is of another kind or size, is cut short, or contains an entry twice.
     """
     text = read_text(path)
     first, _, rest = text.partition("\n")
@@ -162,21 +162,21 @@ def read_matrix_files(
     Parameters
     ----------
     stiffness, mass, damping
-        Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or dense arrays in ``.npz``, or HDF5 (``.h5``), in
-        which the matrix is the group or dataset called ``stiffness``, ``mass`` or ``damping``.
+        Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or dense arrays in ``.npz``, or HDF5 (``.h5``), where
+        the matrix is the group or dataset ``stiffness``, ``mass`` or ``damping``.
     nodes
         CSV file, one line a dof in the order of the equations, with the columns ``node, component, x, y, z``; components
         are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks. None: the dofs are called
-        ``dof1``, ``dof2`` and so on, have no place, and count as translations.
+        ``dof1``, ``dof2`` and so on, have no position, and count as translations.
     units
         Unit system of matrices and positions.
     plausible
-        False takes mass and size as they are, though they do not fit together.
+        False accepts implausible mass and size.
 
     Returns
     -------
     Structure
-        In SI; sparse or dense as the files are.
+        In SI; sparse or dense as in the files.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def read_matrix_files(
 
 
 def names_in(path: Path) -> tuple[str, ...]:
-    """Return the names of stiffness, mass and damping that a file holds; none of a file of one matrix, or none at all."""
+    """Return those of the names stiffness, mass and damping that a file contains; none for a file with a single unnamed matrix."""
     suffix = path.suffix.lower()
     found: Collection[str] = ()
     if suffix == ".npz":
@@ -221,7 +221,7 @@ def names_in(path: Path) -> tuple[str, ...]:
 
 
 def refuse_other_names(path: Path) -> None:
-    """Refuse an ``.npz`` file of arrays that have other names than matrices have here."""
+    """Refuse an ``.npz`` file whose arrays do not have the names of matrices."""
     found = sorted(_names_in_npz(path))
     if found and "format" not in found:
         raise input_error(
@@ -250,7 +250,7 @@ def _names_in_hdf5(path: Path) -> Collection[str]:
 
 
 def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
-    """Return the dofs and sets of a CSV file ``node, component, x, y, z`` and, if it is there, ``set``."""
+    """Return the dofs and sets of a CSV file ``node, component, x, y, z`` and, if present, ``set``."""
     columns = csv_columns(path, ("node", "component", "x", "y", "z"))
     numbers = csv_numbers(path, "node", columns["node"])
     node = whole_numbers(path, numbers[:, None], ("node",))[:, 0]
@@ -275,12 +275,12 @@ def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
 
 
 def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
-    """Return one (n, n) matrix, of any size if that is None, sparse as CSR; `name` picks it from a file that holds several.
+    """Return one (n, n) matrix, of any size if n is None, sparse as CSR; `name` selects it from a file with several matrices.
 
     Raises
     ------
     InputError
-        If the file is damaged, of an unknown kind or of another size, asks for more than it can hold, or has entries
+        If the file is damaged, of an unknown kind or of another size, claims more data than it can contain, or has entries
         that are not finite.
     """
     suffixes = [s.lower() for s in path.suffixes]

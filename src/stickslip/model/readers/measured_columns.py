@@ -27,13 +27,13 @@ class MeasuredColumns:
     path
         The file.
     names
-        Of the columns, in small letters.
+        Names of the columns, in lower case.
     lines
-        Number of each row's line in the file.
+        Line number of each row in the file.
     rows
         Cells of each row.
     word
-        What a row is called in messages.
+        Name of a row in messages.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class MeasuredColumns:
     word: str = "line"
 
     def place(self, row: int, name: str = "") -> str:
-        """Return the place of a row, or of a cell of it, for messages."""
+        """Return the place of a row, or of one of its cells, for messages."""
         return f"{self.path}: {self.word} {self.lines[row]}" + (f": {name}" if name else "")
 
     def numbers(self, name: str, *, gaps: bool = False) -> FloatArray:
@@ -52,7 +52,7 @@ class MeasuredColumns:
         Raises
         ------
         InputError
-            Naming the line and the cell.
+            If a cell is no number; the message names line and cell.
         """
         at = self.names.index(name)
         return np.array(
@@ -60,12 +60,12 @@ class MeasuredColumns:
         )
 
     def named(self, stem: str, units: Mapping[str, float]) -> tuple[str, float]:
-        """Return the name of the column ``STEM_UNIT``, and what makes SI of its numbers; an empty name where there is none.
+        """Return the name of the column ``STEM_UNIT`` and its factor to SI; an empty name if there is none.
 
         Raises
         ------
         InputError
-            If there are two.
+            If there are two such columns.
         """
         found = [(f"{stem}_{unit}", factor) for unit, factor in units.items() if f"{stem}_{unit}" in self.names]
         if len(found) > 1:
@@ -80,7 +80,7 @@ class MeasuredColumns:
         Raises
         ------
         InputError
-            If there is none, or two.
+            If there is no such column, or two.
         """
         name, factor = self.named(stem, units)
         if not name:
@@ -91,14 +91,14 @@ class MeasuredColumns:
         return factor * self.numbers(name)
 
     def unknown(self, name: str, known: Sequence[str], columns: str) -> InputError:
-        """Return the complaint about a column that is none of the known ones, with the nearest, or with what `columns` says there are."""
+        """Return the error for an unknown column, with the nearest known name, or with the list in `columns`."""
         near = did_you_mean(name, [*known])
         remedy = near if near.startswith("Did") else f"The columns are {columns}. One of words is called note."
         place = f"{self.path}: {self.word} 1" if self.word == "line" else str(self.path)
         return input_error(place, f"has a column {name!r}, which is not known", remedy)
 
     def wrong(self, row: int, name: str, problem: str, remedy: str) -> InputError:
-        """Return the complaint about the cell of a row in the column `name`."""
+        """Return the error for the cell of a row in the column `name`."""
         got = self.rows[row][self.names.index(name)][:SHOWN]
         return input_error(self.place(row, name), f"{problem}, got {got!r}", remedy)
 
@@ -123,7 +123,7 @@ def read_columns(path: Path) -> MeasuredColumns:
     Raises
     ------
     InputError
-        If it cannot be read, names a column twice, or a line has another number of cells.
+        If the file cannot be read, names a column twice, or a line has another number of cells.
     """
     table: list[tuple[int, list[str]]] = []
     reader = csv.reader(read_text(path).splitlines())  # whatever ends the lines
@@ -145,7 +145,7 @@ def read_columns(path: Path) -> MeasuredColumns:
 
 
 def same(a: FloatArray | float, b: FloatArray | float) -> BoolArray:
-    """Whether two values of a varied key are one: files round them."""
+    """Whether two values of a varied key are equal up to the rounding of files."""
     return np.asarray(np.isclose(a, b, rtol=REPEATED_VALUE_RTOL, atol=0.0))
 
 
@@ -173,7 +173,7 @@ def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:
     """Read displacement and force of hysteresis loops, in SI.
 
     The columns are ``displacement_m`` (or ``_mm``, ``_um``) and ``force_n`` (or ``_kn``), in the order of time. A column ``loop``
-    tells recordings apart that do not follow on each other; other columns are passed over.
+    separates recordings that are not consecutive; other columns are ignored.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:
     Raises
     ------
     InputError
-        If the file cannot be read; it names the line and the cell.
+        If the file cannot be read; the message names line and cell.
     """
     if not Path(path).is_file():
         near = [p.name for p in Path(path).parent.glob("*.csv")]

@@ -36,10 +36,10 @@ class NastranResults:
     frequencies_hz
         (k,) natural frequencies.
     shapes
-        (n, k) modes along the basic axes, mass-normalised in SI where Nastran normalised them to mass; (0, k) where
+        (n, k) modes along the basic axes, mass-normalised in SI where Nastran normalised them to mass; (0, k) if
         the file has none.
     dofs
-        Table of the n coordinates; scalar points are modal ones.
+        Table of the n coordinates; scalar points appear as modal coordinates.
     """
 
     frequencies_hz: FloatArray
@@ -70,26 +70,26 @@ def read_nastran_op4(
         Names of the matrices, e.g. ``"maa"`` and ``"kaa"``; where several have the same name, ``"maa[0]"`` is the first
         and ``"maa[-1]"`` the last.
     geometry
-        The ``.op2`` file, the bulk data or the ``.asm`` file (``EXTSEOUT``) of the same model, for the degrees of
-        freedom and the positions.
+        Source of degrees of freedom and positions: the ``.op2`` file, the bulk data or the ``.asm`` file (``EXTSEOUT``) of the
+        same model.
     dof_set
-        Nastran's set that the matrices belong to: ``"g"``, ``"f"``, ``"a"`` ...; sets other than ``"g"`` need an ``.op2``
-        file with the table ``USET``, or an ``.asm`` file, which knows its a-set.
+        Nastran's set of the matrices: ``"g"``, ``"f"``, ``"a"`` ...; sets other than ``"g"`` need an ``.op2``
+        file with the table ``USET``, or an ``.asm`` file, which contains its a-set.
     units
-        Unit system of the model, SI by default: the files do not say.
+        Unit system of the model, SI by default; it is not in the files.
     plausible
-        Whether mass and size are checked against what solids have.
+        Whether mass and size are checked for plausibility.
 
     Returns
     -------
     Structure
-        Sparse, in SI, along the basic axes. Scalar points are coordinates of the kind ``mode``. The set ``massless`` holds
+        Sparse, in SI, along the basic axes. Scalar points are coordinates of the kind ``mode``. The set ``massless`` contains
         the coordinates without mass, if any.
 
     Raises
     ------
     InputError
-        If a file is damaged, a name unknown, or the size of the matrices is not that of the set.
+        If a file is damaged, a name unknown, or the matrices do not have the size of the set.
     StickslipError
         If pyYeti is not installed.
     """
@@ -138,16 +138,16 @@ def _check_size(path: Path, known: NastranDofs, dof_set: str, name: str, shape: 
 
 
 def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Structure:
-    """Put mass, stiffness and perhaps damping together, along the basic axes, in the file's units.
+    """Return the structure of mass, stiffness and perhaps damping, along the basic axes, in the file's units.
 
     Parameters
     ----------
     matrices
-        Two or three (n, n) sparse ones.
+        Two or three (n, n) sparse matrices.
     known
         All degrees of freedom.
     rows
-        (n,) those of the matrices.
+        (n,) degrees of freedom of the matrices.
     """
     turn = known.rotation(rows)
     if turn is not None:
@@ -165,16 +165,16 @@ def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Str
 
 
 def op4_matrices(path: Path, names: list[str], check: Callable[[str, tuple[int, int]], None]) -> dict[str, Matrix]:
-    """Return the named matrices, sparse, as they stand in the file.
+    """Return the named matrices of a file, sparse and unchanged.
 
     Parameters
     ----------
     path
-        Text or binary.
+        The file, text or binary.
     names
-        In lower case, with an index where several have the same name.
+        Names in lower case, with an index if several matrices have the same name.
     check
-        Called with the name and the shape that the file states, before anything is allocated.
+        Called with the name and the shape in the file, before memory is allocated.
     """
     op4 = nastran_library("op4")
     (check_records if is_binary(path) else check_lines)(path)
@@ -215,7 +215,7 @@ def _pick(path: Path, name: str, count: int) -> int:
 
 
 def real_symmetric(matrix: Matrix, place: str) -> Matrix:
-    """Return a real symmetric (n, n) CSR matrix with the symmetric part of `matrix`; refuse others.
+    """Return a real symmetric (n, n) CSR matrix with the symmetric part of `matrix`; refuse unsymmetric ones.
 
     Raises
     ------
@@ -251,12 +251,12 @@ def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> Nastran
     path
         The file.
     units
-        Unit system of the model, SI by default: the file does not say.
+        Unit system of the model, SI by default; it is not in the file.
 
     Raises
     ------
     InputError
-        If the file is damaged or holds no natural frequencies.
+        If the file is damaged or has no natural frequencies.
     StickslipError
         If pyYeti is not installed.
     """

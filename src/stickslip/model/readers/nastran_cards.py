@@ -22,9 +22,9 @@ class Card:
     Parameters
     ----------
     name
-        Upper case, without the star of large fields.
+        Name in upper case, without the star of large fields.
     fields
-        Data fields, filled up to lines of eight; none of a card whose fields nobody asked for.
+        Data fields, filled up to lines of eight; none if the card's fields are not read.
     place
         File and line, for messages.
     """
@@ -35,7 +35,7 @@ class Card:
 
 
 def bulk_cards(path: Path, read: Collection[str]) -> Iterator[Card]:
-    """Yield the cards of bulk data or a punch file, from ``BEGIN`` on if there is one, up to ``ENDDATA``.
+    """Yield the cards of bulk data or a punch file, from ``BEGIN``, if present, to ``ENDDATA``.
 
     Parameters
     ----------
@@ -167,5 +167,5 @@ def real(word: str, place: str) -> float:
 
 
 def refused(word: str, what: str, place: str) -> InputError:
-    """Return the error of a field that does not hold `what`."""
+    """Return the error for a field that is not `what`."""
     return input_error(place, f"{word[:40]!r} is no {what}", CUT_SHORT)

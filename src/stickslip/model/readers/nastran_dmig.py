@@ -62,11 +62,11 @@ class Cards:
     form
         1 square, 6 symmetric; others are rectangular.
     refused
-        Why the matrix cannot be read, if so.
+        Reason why the matrix cannot be read; empty if it can.
     rows, columns
         Coordinates, ten times the grid plus the component.
     values
-        Entries.
+        Entries of the matrix.
     """
 
     form: int
@@ -88,8 +88,8 @@ def read_nastran_dmig(
 ) -> Structure:
     """Read mass, stiffness and damping from ``DMIG`` cards: small, large or free fields.
 
-    Coordinates with neither mass nor stiffness are left out. A card that may change the model is refused: the file holds
-    the matrices, and beside them what says where grids lie and to which sets they belong.
+    Coordinates with neither mass nor stiffness are left out. A card that may change the model is refused: the file may contain
+    the matrices, positions of grids and sets only.
 
     Parameters
     ----------
@@ -101,14 +101,14 @@ def read_nastran_dmig(
         Bulk data with the ``GRID`` and ``CORD2`` cards of the model, or its ``.op2`` file; needs pyYeti. Without it
         positions are NaN, and ``x, y, z`` are the axes of each grid's own output system.
     units
-        Unit system of the model, SI by default: the files do not say.
+        Unit system of the model, SI by default; it is not in the files.
     plausible
-        Whether mass and size are checked against what solids have.
+        Whether mass and size are checked for plausibility.
 
     Returns
     -------
     Structure
-        Sparse, in SI, sorted by grid. Scalar points are coordinates of the kind ``mode``. The set ``massless`` holds the
+        Sparse, in SI, sorted by grid. Scalar points are coordinates of the kind ``mode``. The set ``massless`` contains the
         coordinates without mass, if any.
 
     Raises

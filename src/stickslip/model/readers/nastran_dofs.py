@@ -62,14 +62,14 @@ class NastranDofs:
     turned
         (k,) grids whose output system (field CD) is not parallel to the basic one, ascending.
     turns
-        (k, 3, 3) columns: their axes.
+        (k, 3, 3) axes of these grids, as columns.
     sets
-        Name of a set of Nastran, such as ``a`` -> its degrees of freedom; only ``g`` where the file does not tell.
+        Name of a set of Nastran, such as ``a`` -> its degrees of freedom; only ``g`` if the file has no sets.
     place
         The file, for messages.
     constraint
-        Place and name of the first card that holds degrees of freedom or ties them to others, where the file has such
-        cards and the sets do not show them.
+        Place and name of the first card that supports or ties degrees of freedom, if the file has such
+        cards and no sets.
     """
 
     ids: IntArray
@@ -82,7 +82,7 @@ class NastranDofs:
     constraint: str = ""
 
     def rows(self, dof_set: str) -> IntArray:
-        """Return the degrees of freedom of a set; an `InputError` names those that are known."""
+        """Return the degrees of freedom of a set; an `InputError` names the known sets."""
         if dof_set not in self.sets:
             raise input_error(
                 self.place,
@@ -98,7 +98,7 @@ class NastranDofs:
         return Dofs(np.where(self.components[rows] == 0, -1, self.ids[rows]), names, self.points[rows])
 
     def rotation(self, rows: IntArray) -> Matrix | None:
-        """Return the rotation of the degrees of freedom `rows` into the basic system; None where all are parallel to it."""
+        """Return the rotation of the degrees of freedom `rows` into the basic system; None if all are parallel to it."""
         if not np.isin(self.ids[rows], self.turned).any():
             return None
         return rotation_to_global(self.ids[rows], self.components[rows], self.turned, self.turns, self.place)
@@ -110,7 +110,7 @@ def read_nastran_dofs(path: Path | str) -> NastranDofs:
     Raises
     ------
     InputError
-        If the file is damaged, holds no grids, or has cards that change where grids lie and are not read (``INCLUDE``).
+        If the file is damaged, holds no grids, or has unsupported cards that may change the positions of grids (``INCLUDE``).
     """
     path = existing_file(path)
     binary = is_binary(path)

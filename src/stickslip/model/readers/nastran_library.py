@@ -32,7 +32,7 @@ def nastran_library(module: str) -> ModuleType:
 
 
 def existing_file(path: Path | str) -> Path:
-    """Return the path of a file that is there and not empty; an `InputError` names a near one."""
+    """Return the path of a file that exists and is not empty; an `InputError` suggests a similar name."""
     path = Path(path)
     if not path.is_file():
         beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
@@ -45,20 +45,20 @@ def existing_file(path: Path | str) -> Path:
 
 
 def is_binary(path: Path) -> bool:
-    """Return whether a file starts with the mark of a binary record instead of text."""
+    """Whether a file starts with the mark of a binary record instead of text."""
     with path.open("rb") as stream:
         return 0 in stream.read(4)
 
 
 def check_records(path: Path) -> None:
-    """Follow the chain of records of a binary file from end to end: each stands between two equal lengths.
+    """Check the chain of records of a binary file from end to end: each record is enclosed by two equal lengths.
 
-    Only then may a library follow it, which trusts these lengths.
+    The library trusts these lengths, so it is called after this check only.
 
     Raises
     ------
     InputError
-        If the chain breaks: the file was cut, damaged, or is of another kind.
+        If the chain is broken: the file was cut short, is damaged, or is of another kind.
     """
     size = path.stat().st_size
     content = np.memmap(path, dtype=np.uint8, mode="r")
@@ -80,14 +80,14 @@ def check_records(path: Path) -> None:
 
 
 def check_lines(path: Path) -> None:
-    """Follow the columns of an OP4 file of text from end to end: each has the lines that its head tells of.
+    """Check the columns of a text OP4 file from end to end: each has as many lines as its head states.
 
-    Only then may a library follow them, which would read on and on where a damaged count is large.
+    The library would read endlessly if a damaged count is large, so it is called after this check only.
 
     Raises
     ------
     InputError
-        If a head is none, or the lines end before the columns do.
+        If a head is invalid, or the lines end before the columns.
     """
     with path.open(encoding="ascii", errors="replace") as stream:
         number = 0
@@ -139,7 +139,7 @@ def _mark(four: bytes, order: str) -> int:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn what the library raises or warns of while it reads `path` into an `InputError`."""
+    """Convert exceptions and warnings of the library while it reads `path` into an `InputError`."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)

@@ -30,9 +30,9 @@ class NodeTable:
     points
         (n, 3) positions, in the unit of length of the file they come from.
     node_sets
-        Name -> node numbers, in an order that has a meaning.
+        Name -> node numbers, in a meaningful order.
     place
-        Where they come from, for messages.
+        Source of the nodes, for messages.
     """
 
     numbers: IntArray
@@ -41,7 +41,7 @@ class NodeTable:
     place: str = "nodes"
 
     def index(self, numbers: IntArray) -> IntArray:
-        """Return the rows of node `numbers`; an `InputError` names those that are not there."""
+        """Return the rows of node `numbers`; an `InputError` names the missing ones."""
         if not len(self.numbers):
             raise input_error(self.place, "holds no nodes", "Give the file with the nodes.")
         found = np.minimum(np.searchsorted(self.numbers, numbers), len(self.numbers) - 1)
@@ -63,7 +63,7 @@ class NodeTable:
     def dof_sets(self, dofs: Dofs) -> dict[str, IntArray]:
         """Return, for each node set, its dofs: node by node in the set's order, components in the table's order.
 
-        Nodes without dofs (clamped ones) are passed over, and sets of such nodes alone are left out.
+        Nodes without dofs (clamped ones) are skipped; sets of such nodes only are left out.
         """
         order = np.argsort(dofs.node, kind="stable")
         nodes = dofs.node[order]
@@ -80,7 +80,7 @@ class NodeTable:
 def node_table(
     numbers: IntArray, points: FloatArray, place: str, node_sets: Mapping[str, IntArray] | None = None
 ) -> NodeTable:
-    """Sort nodes by number; refuse numbers that stand twice with different positions."""
+    """Sort nodes by number; refuse a number with two different positions."""
     order = np.argsort(numbers, kind="stable")
     numbers, points = np.asarray(numbers[order], dtype=np.int64), points[order]
     twice = np.flatnonzero(np.diff(numbers) == 0)
@@ -102,7 +102,7 @@ def mesh_nodes(mesh: SolidMesh) -> NodeTable:
 
 
 def deck_nodes(path: Path) -> NodeTable:
-    """Return nodes and node sets of a CalculiX or Abaqus deck, whatever else it holds."""
+    """Return nodes and node sets of a CalculiX or Abaqus deck; all else is ignored."""
     return block_nodes(keyword_blocks(path), path)
 
 
@@ -133,7 +133,7 @@ def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
 
 
 def csv_columns(path: Path, required: tuple[str, ...]) -> dict[str, list[str]]:
-    """Return the columns of a CSV file with a header line; `required` ones must be there.
+    """Return the columns of a CSV file with a header line; `required` columns must be present.
 
     Raises
     ------
@@ -204,19 +204,19 @@ def rotation_to_global(node: IntArray, component: IntArray, turned: IntArray, tu
     Parameters
     ----------
     node, component
-        (n,) node number and component of each coordinate, 1 ... 6, any other number for none of these; the components
-        of a node stand together, ascending.
+        (n,) node number and component of each coordinate: 1 ... 6, or another number for other coordinates. The components
+        of a node are adjacent and ascending.
     turned
-        (k,) numbers of the nodes that have axes of their own, ascending.
+        (k,) numbers of the nodes with own axes, ascending.
     turns
-        (k, 3, 3) columns: their axes.
+        (k, 3, 3) axes of these nodes, as columns.
     place
-        For messages.
+        Name of the file, for messages.
 
     Raises
     ------
     InputError
-        If a turned node has only some components (the others are constrained): these cannot be turned alone.
+        If a rotated node has only some components, because the others are constrained.
     """
     at = np.arange(len(node))
     own = np.isin(node, turned) & (component >= 1) & (component <= 6)

@@ -61,12 +61,12 @@ def read_model(
     units
         Unit system of the file; a structure of `save_structure` is in SI.
     mesh, nodes
-        Where the nodes lie, beside matrices that do not say: see the reader of each format.
+        Source of node positions, for matrices without them: see the reader of each format.
     mass, damping
-        Beside matrices in several files. With CalculiX the mass of another job, with Abaqus the file whose name has
-        ``MASS`` for ``STIF`` by default.
+        Further files, for matrices in several files. With CalculiX the mass of another job; with Abaqus by default the file with
+        ``MASS`` for ``STIF`` in its name.
     plausible
-        False takes mass, size and materials as they are, though no solid has such.
+        False accepts implausible mass, size and materials.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def read_model(
     Raises
     ------
     InputError
-        If the kind of file is unknown, a file beside it is missing, or the reader finds it damaged.
+        If the kind of file is unknown, a further file is missing, or a file is damaged.
     """
     path = Path(path)
     files = _Files(path, units, _path(mesh), _path(mass), _path(damping), _path(nodes), plausible)
@@ -99,16 +99,16 @@ def _path(name: Path | str | None) -> Path | None:
 
 
 def model_summary(model: Model, *, n_modes: int = 10, units: Units = SI, say: Say = silent) -> ModelSummary:
-    """Say what is in a model that `read_model` returned.
+    """Return a summary of a model from `read_model`.
 
     Parameters
     ----------
     model
         The model; a deck is assembled.
     n_modes
-        Natural frequencies to compute; none for 0.
+        Number of natural frequencies to compute.
     units
-        The system it was read with, which a doubt about mass and size names.
+        Unit system of the reader, for remarks on mass and size.
     say
         Called with a sentence before each long step.
     """

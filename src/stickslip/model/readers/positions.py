@@ -28,7 +28,7 @@ def find_nodes(source: SolidMesh | Path | str, units: Units) -> NodeTable:
     source
         A mesh (in metres), or a deck ``.inp``, results ``.frd`` or a CSV file ``node, x, y, z`` in `units`.
     units
-        Of the model.
+        Unit system of the model.
 
     Raises
     ------
@@ -50,15 +50,15 @@ def find_nodes(source: SolidMesh | Path | str, units: Units) -> NodeTable:
 
 
 def doubt_about_positions(structure: Structure) -> str | None:
-    """Say why the positions are probably those of another mesh, or None where they fit the stiffness.
+    """Return why the positions probably belong to another mesh; None if they fit the stiffness.
 
-    A rigid rotation strains nothing. Away from supports and cyclic faces, which are known by their answer to rigid
-    translations, the stiffness times that rotation vanishes; with the positions of other nodes it does not.
+    A rigid rotation causes no strain. Therefore stiffness times rotation vanishes away from supports and cyclic faces, but not with the positions of
+    other nodes. Supports and faces are found by the forces of rigid translations.
 
     Parameters
     ----------
     structure
-        With any units; other coordinates than x, y and z are not judged.
+        Structure in any units; coordinates other than x, y and z are not checked.
     """
     dofs, position = structure.dofs, structure.dofs.position
     if set(dofs.component) != {"x", "y", "z"} or not np.isfinite(position).all():

@@ -22,12 +22,12 @@ ROUNDED = 1e-3  # of the largest eigenvalue: files of few digits make small ones
 
 
 def refuse_indefinite(structure: Structure, place: str) -> None:
-    """Refuse a mass that is not positive, and a stiffness by which a motion drives itself.
+    """Refuse a mass that is not positive, and a stiffness with a negative eigenvalue.
 
     Raises
     ------
     InputError
-        Naming the matrix and the dof.
+        If one is; the message names the matrix and the dof.
     """
     if structure.n and abs(structure.mass).max() > 0:
         refuse_bad_mass(structure, place)
@@ -42,7 +42,7 @@ def refuse_indefinite(structure: Structure, place: str) -> None:
 
 
 def negative_damping(structure: Structure, name: str) -> tuple[str, ...]:
-    """Return a warning where the damping in file `name` feeds a motion."""
+    """Return a warning if the damping in file `name` adds energy to a motion."""
     worst = _most_negative((structure.damping + structure.damping.conj().T) / 2)
     if worst is None:
         return ()
@@ -74,12 +74,12 @@ DIGITS = 6
 
 @dataclass(frozen=True, eq=False)
 class ModelSummary:
-    """What `stickslip inspect` prints; quantities that the file does not give are None.
+    """Content of the output of `stickslip inspect`; quantities that are not in the file are None.
 
     Parameters
     ----------
     kind
-        What the file holds, e.g. ``matrices``.
+        Kind of file, e.g. ``matrices``.
     nodes, cells, dofs
         Counts.
     components
@@ -87,23 +87,23 @@ class ModelSummary:
     sets
         Name -> number of members.
     members
-        What the sets hold: ``dofs`` of matrices, ``nodes`` of a mesh.
+        Kind of members of the sets: ``dofs`` of matrices, ``nodes`` of a mesh.
     mass
-        (3,) kg that move with a unit translation along x, y, z; without supported dofs.
+        (3,) mass in kg that moves with a unit translation along x, y, z, without supported dofs.
     whole_mass
-        kg, clamped nodes included; known where there are cells and materials.
+        Mass in kg with clamped nodes; known for cells with materials.
     centre
-        (3,) centre of the whole mass in m, else of that along the first direction.
+        (3,) centre of the whole mass in m, or else of the mass that moves along the first direction.
     box
         (2, 3) lowest and highest coordinates in m.
     symmetric
         Whether mass and stiffness are symmetric, or Hermitian.
     rigid_modes
-        Modes without strain among the first.
+        Number of modes without strain among the computed ones.
     frequencies_hz
         The first natural frequencies, or those the file stores.
     remarks
-        Sentences: what is doubtful, missing or was passed over.
+        Sentences on doubtful, missing and ignored content.
     """
 
     kind: str
@@ -123,7 +123,7 @@ class ModelSummary:
     remarks: tuple[str, ...] = ()
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return name and value of all that is known, as texts, for a table."""
+        """Return names and values of all known quantities, as texts, for a table."""
         counts = {"nodes": self.nodes, "cells": self.cells, "dofs": self.dofs}
         found = [("holds", self.kind)]
         found += [(name, str(count)) for name, count in counts.items() if count is not None]
@@ -155,11 +155,11 @@ def structure_summary(structure: Structure, *, n_modes: int = 10, units: Units =
     Parameters
     ----------
     structure
-        In SI.
+        Structure in SI.
     n_modes
-        Frequencies to compute; none for 0.
+        Number of natural frequencies to compute.
     units
-        The system it was converted from, which a doubt about mass and size names.
+        Unit system of the file, for remarks on mass and size.
     say
         Called with a sentence before each long step.
     """

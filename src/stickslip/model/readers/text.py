@@ -23,7 +23,7 @@ def read_text(path: Path) -> str:
     Raises
     ------
     InputError
-        If the file is missing, cannot be read, is a damaged gzip file or unpacks to far more than text does.
+        If the file is missing, cannot be read, is a damaged gzip file or unpacks to an implausible size.
     """
     require_no_pipe(path)
     try:
@@ -76,13 +76,13 @@ def number_table(
     Parameters
     ----------
     path
-        Where the text is from, for messages.
+        File of the text, for messages.
     text
         Lines of `columns` numbers; empty lines are skipped.
     columns
-        Numbers a line.
+        Count of numbers in a line.
     separator
-        Between numbers; None for blanks.
+        Separator of numbers; None: blanks.
     first_line
         Line number of the text's first line, for messages.
 
@@ -94,7 +94,7 @@ def number_table(
     Raises
     ------
     InputError
-        If a line holds something else; the message names the line and what stands there.
+        If a line contains anything else; the message quotes it.
     """
     tables = [np.empty((0, columns))]
     start = 0
@@ -143,7 +143,7 @@ def _is_finite(field: str) -> bool:
 
 
 def whole_numbers(path: Path, table: FloatArray, names: tuple[str, ...]) -> IntArray:
-    """Return the first columns as integers (rows, len(names)); refuse fractions and what no integer holds."""
+    """Return the first columns as integers (rows, len(names)); refuse fractions and numbers beyond the range of integers."""
     columns = table[:, : len(names)]
     wrong = (columns != np.rint(columns)) | (np.abs(columns) > 2**53)
     if wrong.any():

@@ -25,7 +25,7 @@ WRONG_UNITS = "Correct $units, or give $plausible where the numbers are right."
 
 @dataclass(frozen=True)
 class Units:
-    """A coherent unit system: one unit each of length, mass and time, in SI; the others follow from them.
+    """A coherent unit system: units of length, mass and time in SI; other units follow from them.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Units:
     time
         Unit of time in s.
     name
-        For messages.
+        Name of the system, for messages.
 
     Raises
     ------
@@ -106,7 +106,7 @@ class Units:
         return self.mass / self.length**3
 
     def lengths(self, dofs: Dofs) -> FloatArray:
-        """Return, for each dof, what one unit of it is: a length in m, or 1 where it is none (rotations, modes).
+        """Return the unit of each dof: a length in m, or 1 for dofs that are no lengths (rotations, modes).
 
         Dofs of matrices without a table count as translations: as pure numbers their stiffness would be an energy.
         """
@@ -124,15 +124,15 @@ def _known() -> tuple[Units, ...]:
 def in_si(structure: Structure, units: Units) -> Structure:
     """Convert a structure, positions included, from `units` to SI.
 
-    Energies are ``mass length² / time²`` whatever the coordinates are, so a matrix entry is that over the units of its
-    two coordinates: ``mass`` between translations, ``mass length²`` between rotations.
+    Energies are ``mass length² / time²`` in any coordinates, so the unit of a matrix entry is an energy divided by the units of its
+    two coordinates. For the mass matrix: ``mass`` between translations, ``mass length²`` between rotations.
 
     Parameters
     ----------
     structure
-        With the numbers of the file.
+        Structure in the numbers of the file.
     units
-        The file's unit system.
+        Unit system of the file.
     """
     energy = units.mass * units.length**2
     per_length = 1 / units.lengths(structure.dofs)
@@ -156,7 +156,7 @@ def in_si(structure: Structure, units: Units) -> Structure:
 
 
 def translational_mass(structure: Structure) -> FloatArray:
-    """Return ``uᵀ M u`` for the unit translations along x, y and z, (3,) in kg: what of the mass is free to move so."""
+    """Return ``uᵀ M u`` for the unit translations along x, y and z, (3,) in kg: the mass that can move in these directions."""
     components = np.array(structure.dofs.component)
     masses = []
     for axis in ("x", "y", "z"):
@@ -166,17 +166,17 @@ def translational_mass(structure: Structure) -> FloatArray:
 
 
 def doubt_about_units(structure: Structure, units: Units) -> str | None:
-    """Say why the unit system is probably another one, or None where mass and size fit together.
+    """Return why the unit system is probably wrong; None if mass and size are plausible.
 
-    Mass over the volume of the bounding box is the density of the part, diluted by the box. No part is denser than
+    The mass over the volume of the bounding box is at most the density of the material. No part is denser than
     osmium, and few fill less than a thousandth of their box.
 
     Parameters
     ----------
     structure
-        In SI, converted from `units`.
+        Structure in SI, converted from `units`.
     units
-        The system that was assumed.
+        Assumed unit system.
     """
     mass, extent = float(translational_mass(structure).max()), _extent(structure)
     if extent.min() <= 1e-3 * extent.max():
@@ -203,12 +203,12 @@ def doubt_about_units(structure: Structure, units: Units) -> str | None:
 
 
 def check_units(structure: Structure, units: Units, place: str) -> None:
-    """Refuse a structure whose mass and size do not fit together; the message names the likely unit system.
+    """Refuse a structure with implausible mass and size; the message names the likely unit system.
 
     Raises
     ------
     InputError
-        If `doubt_about_units` has a reason.
+        If `doubt_about_units` returns a reason.
     """
     doubt = doubt_about_units(structure, units)
     if doubt:
@@ -216,12 +216,12 @@ def check_units(structure: Structure, units: Units, place: str) -> None:
 
 
 def check_material(density: float, young_modulus: float, units: Units, place: str) -> None:
-    """Refuse a density (kg/m³) or a Young's modulus (Pa) that no solid has; name the unit systems that would do.
+    """Refuse an implausible density (kg/m³) or Young's modulus (Pa); the message names unit systems that would be plausible.
 
     Raises
     ------
     InputError
-        If one is outside what solids have.
+        If one is outside the range of solids.
     """
 
     def fits(factors: Units) -> bool:

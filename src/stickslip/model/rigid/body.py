@@ -35,7 +35,7 @@ class RigidBody:
     Raises
     ------
     InputError
-        If mass or inertia are not positive, no body can have these moments of inertia, or the axes are not square to each other.
+        If mass or inertia are not positive, no body can have these moments of inertia, or the axes are not orthogonal.
     """
 
     mass: float = quantity("mass of the body", "kg", above=0)
@@ -68,21 +68,21 @@ class RigidBody:
         return np.asarray(axes.T * self.inertia @ axes)
 
     def moved(self, turn: FloatArray, move: FloatArray) -> "RigidBody":
-        """Return the body at ``turn @ x + move``; `turn` is orthogonal (3, 3), `move` in metres."""
+        """Return the body after ``turn @ x + move``; `turn` is orthogonal (3, 3), `move` (3,) in metres."""
         axes = np.array(self.axes, dtype=float) @ turn.T
         first, second, third = (_triple(axis) for axis in axes)
         centre = _triple(turn @ np.array(self.centre) + move)
         return replace(self, centre=centre, axes=(first, second, third))
 
     def structure(self) -> Structure:
-        """Return six dofs ``x y z rx ry rz`` at the centre of mass: no stiffness, no damping."""
+        """Return the structure with six dofs ``x y z rx ry rz`` at the centre of mass, without stiffness and damping."""
         dofs = Dofs(np.full(6, -1), COMPONENTS, np.tile(self.centre, (6, 1)))
         mass = np.diag([self.mass] * 3 + [0.0] * 3).astype(float)
         mass[3:, 3:] = self.tensor
         return Structure(mass, np.zeros((6, 6)), np.zeros((6, 6)), dofs)
 
     def at_speed(self, speed: float, axis: Axis, *, coriolis: bool = False) -> Structure:
-        r"""Return the body in axes that turn at a speed: spin softening, and with `coriolis` the gyroscopic matrix.
+        r"""Return the structure of the body in rotating axes: with spin softening, and with `coriolis` the gyroscopic matrix.
 
         With the tensor J and the angular velocity Ω, the potential of the centrifugal forces is
         ``-(m |Ω x r|² + Ω·J(θ)Ω) / 2``; its second derivatives are the stiffness. The gyroscopic matrix is ``2 m Ω̂`` for
@@ -91,9 +91,9 @@ class RigidBody:
         Parameters
         ----------
         speed
-            In rad/s.
+            Speed in rad/s.
         axis
-            Of rotation.
+            Axis of rotation.
         coriolis
             Whether the gyroscopic matrix is added to the damping.
         """

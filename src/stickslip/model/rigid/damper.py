@@ -50,24 +50,24 @@ class FlatCurvedDamper:
         Inclination in rad of the contact plane on either side, measured from the circumferential
         direction x: the underside angle of the platform it touches.
     flat_distances
-        Distances in metres of the lines L1, L2 and further ones from the apex along the flat side.
+        Distances in metres from the apex of the lines L1, L2 and further ones, along the flat side.
     curved_distance
         Distance in metres of R from the apex along the right platform's underside.
     curved_radius
         Radius in metres of the curved side.
     sections
-        Axial positions y in metres of the sections that hold one point of each line, increasing.
+        Axial positions y in metres of the sections, increasing; each section has one point of each line.
     length
         Extent in metres along y over which the sides touch, half of it on either side of y = 0.
     flat_between
         Distances in metres from the apex between which the flat side touches.
     curved_width
-        Width in metres of the strip in which the curved side touches. These three give each point its area, for laws per area;
-        None: nobody told.
+        Width in metres of the strip in which the curved side touches. `length`, `flat_between` and `curved_width` give each point its area, for laws per area;
+        None: unknown.
     mass
-        In kg.
+        Mass in kg.
     inertia
-        About x, y, z through the centre of mass, in kg m².
+        Moments of inertia about x, y, z through the centre of mass, in kg m².
     centre
         Centre of mass in metres: offset (x, y, z) from the apex at y = 0.
     """
@@ -185,8 +185,8 @@ class FlatCurvedDamper:
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
 
-        Cut off level at L1, then the arc that touches the right platform at R, the base level with
-        the last line of the flat side, and the flat side from there to L1. It is for pictures and for estimating mass: contact
+        The polygon consists of a horizontal cut at L1, the arc that touches the right platform at R, the base at the height of
+        the last line of the flat side, and the flat side from there to L1. It serves pictures and estimates of the mass; contact
         uses the points only.
         """
         corner = self.contact_points()
@@ -206,7 +206,7 @@ def gap_operator(
 ) -> FloatArray:
     """Return the (3 p, n) operator to the gaps ``frameᵀ (u_blade − u_damper)``.
 
-    Rows t, w, n of each point in turn; a positive third row opens the contact.
+    Rows t, w, n of each point in turn; a positive normal gap is open.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def gap_operator(
     n
         Number of dofs of the whole structure.
     body
-        The damper's rigid body: it moves the points of the damper.
+        The damper's rigid body, which moves its points.
     """
     motion = body.displacement_operator(points.position)
     operator = np.zeros((len(points), 3, n))

@@ -15,21 +15,21 @@ NAMES = tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about
 
 
 def refuse_unheld(stiffness: Matrix, dofs: Dofs, place: str) -> None:
-    """Raise where a body can move rigidly without strain.
+    """Raise a `SingularError` if a body can move rigidly without strain.
 
     Parameters
     ----------
     stiffness
         (n, n), real symmetric or complex Hermitian, dense or sparse.
     dofs
-        Its n dofs.
+        Table of the n dofs.
     place
         Beginning of the message.
 
     Raises
     ------
     SingularError
-        Naming how many bodies are free, the nodes of the first, and its motions.
+        If a body is free; the message names the number of free bodies, the nodes of the first one, and its motions.
     """
     free = [(part, found) for part in _bodies(stiffness) if (found := _free(stiffness, dofs, part))]
     if not free:
@@ -63,14 +63,14 @@ def _name(dofs: Dofs) -> str:
 
 
 def loose_motions(stiffness: Matrix, dofs: Dofs) -> list[tuple[IntArray, FloatArray]]:
-    """Return the bodies that can move without strain: their dofs, and their free motions (m, f), the largest entry of each one.
+    """Return the bodies that can move without strain: their dofs, and their free motions (m, f), each with largest entry one.
 
     Parameters
     ----------
     stiffness
         (n, n), real symmetric, dense or sparse.
     dofs
-        Its n dofs; of those that are no displacements or rotations of places, small bodies alone are judged.
+        Table of the n dofs. If some are no displacements or rotations of nodes, only small bodies are checked.
     """
     found = []
     for part in _bodies(stiffness):

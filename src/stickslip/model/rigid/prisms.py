@@ -50,13 +50,13 @@ class WedgeDamper:
     Parameters
     ----------
     left_angle, right_angle
-        Inclination in rad of either side from x: the underside angle of the platform it touches. Right None: as the left one.
+        Inclination in rad of either side from x: the underside angle of the platform it touches. Right None: equal to the left one.
     top_width, height
-        Of the section, in metres: width of its outer end (0: it is sharp) and extent along z.
+        Width of the section's outer end (0: sharp) and its extent along z, in metres.
     length
         Extent along y in metres.
     mass, density
-        In kg or kg/m³: one of them.
+        Mass in kg or density in kg/m³; give one of them.
     left_distances, right_distances
         Distances in metres of the lines of contact points from the apex along the side; None: three, each in the middle of a third
         of the side.
@@ -66,7 +66,7 @@ class WedgeDamper:
     Raises
     ------
     InputError
-        If the sides do not meet, lines or sections lie off the body, or mass and density are both given or both missing.
+        If the sides do not meet, lines or sections lie outside of the body, or mass and density are both given or both missing.
     """
 
     left_angle: float = quantity("inclination of the left side from x", "deg", above=0, most=90)
@@ -127,7 +127,7 @@ class WedgeDamper:
         return np.array([[top * right, -top], [base * right, -base], [-base * left, -base], [-top * left, -top]])
 
     def body(self) -> RigidBody:
-        """Return the wedge as a rigid body, its centre and inertia those of a homogeneous prism."""
+        """Return the wedge as a rigid body, with centre and inertia of a homogeneous prism."""
         area, centre, second = section_moments(self.outline())
         mass = self.mass if self.mass is not None else (self.density or 0.0) * area * self.length
         xx, zz, xz = mass * second
@@ -155,18 +155,18 @@ class CylinderDamper:
     Parameters
     ----------
     radius, length
-        In metres.
+        Radius and length in metres.
     left_angle, right_angle
-        Inclination in rad from x of the underside that it touches on either side. Right None: as the left one.
+        Inclination in rad from x of the platform's underside on either side. Right None: equal to the left one.
     mass, density, sections
-        As of a `WedgeDamper`.
+        See `WedgeDamper`.
     contact_width
-        Width in metres of the strip in which it touches either underside, for laws per area; None: nobody knows.
+        Width in metres of the contact strip on either underside, for laws per area; None: unknown.
 
     Raises
     ------
     InputError
-        As of a `WedgeDamper`.
+        As for a `WedgeDamper`.
     """
 
     radius: float = metres("radius")
@@ -195,12 +195,12 @@ class CylinderDamper:
 
     @property
     def axis(self) -> FloatArray:
-        """(x, z) in metres of its axis: one radius from both undersides."""
+        """(x, z) in metres of the cylinder's axis, one radius from both undersides."""
         normals = [side_frame(angle, left=i == 0)[[0, 2], 2] for i, angle in enumerate(self.angles)]
         return np.asarray(np.linalg.solve(np.array(normals), -self.radius * np.ones(2)))
 
     def outline(self) -> FloatArray:
-        """Return its section as a polygon (k, 2) in x and z, metres."""
+        """Return the section as a polygon (k, 2) in x and z, metres."""
         angle = np.linspace(0.0, 2 * math.pi, 48, endpoint=False)
         return np.asarray(self.axis - self.radius * np.column_stack([-np.cos(angle), np.sin(angle)]))
 

@@ -29,14 +29,14 @@ class ContactPoints:
     names
         n names such as ``L1.1`` (line and section).
     side
-        n words: the surface that each point is of, ``flat`` and ``curved``, or ``left`` and ``right``.
+        n words: the surface of each point, ``flat`` or ``curved``, or ``left`` or ``right``.
     position
         (n, 3) positions in metres.
     frame
         (n, 3, 3) frames; columns t, w, n: two tangents and the outward normal of the damper,
         which points into the blade.
     area
-        (n,) area in m² that each stands for, NaN where the shape does not tell.
+        (n,) area of each point in m²; NaN if unknown.
     """
 
     names: tuple[str, ...]
@@ -53,7 +53,7 @@ class ContactPoints:
         return np.array([i for i, name in enumerate(self.names) if name.split(".")[0] == line])
 
     def on_sides(self, sides: Collection[str]) -> "ContactPoints":
-        """Return the points of some surfaces."""
+        """Return the points on the surfaces `sides`."""
         own = [i for i, side in enumerate(self.side) if side in sides]
         names, words = (tuple(given[i] for i in own) for given in (self.names, self.side))
         return ContactPoints(names, words, self.position[own], self.frame[own], self.area[own])
@@ -66,15 +66,15 @@ class Line:
     Parameters
     ----------
     name, side
-        ``L1``, and the surface that it is of.
+        Name such as ``L1``, and surface of the line.
     angle
         Inclination in rad of the side from x.
     left
-        Whether it is the left one.
+        Whether the line is on the left side.
     distance
-        From the apex along the side, in metres.
+        Distance from the apex along the side, in metres.
     width
-        Of the strip along y that it stands for, in metres; NaN where the shape does not tell.
+        Width of the contact strip of the line, in metres; NaN if unknown.
     """
 
     name: str
@@ -104,7 +104,7 @@ def points_of_lines(
 ) -> ContactPoints:
     """Return the points of `lines` at the `sections` (y in metres), line by line; the `apex` is at (x, z).
 
-    The side reaches over the `extent` along y, half of it on either side of y = 0; None: nobody told.
+    The side reaches over the `extent` along y, half of it on either side of y = 0; None: unknown.
     """
     names, sides, positions, frames = [], [], [], []
     for line in lines:
@@ -120,19 +120,19 @@ def points_of_lines(
 
 
 def nearest(places: Sequence[float], low: float, high: float) -> FloatArray:
-    """Return how much of a stretch from `low` to `high` lies nearest to each of the growing `places` on it; the parts add up to it."""
+    """Return the lengths of the parts of an interval from `low` to `high` that are nearest to each of the ascending `places`; their sum is its length."""
     between = np.asarray(places, dtype=float)
     return np.diff([low, *(between[:-1] + between[1:]) / 2, high])
 
 
 def grow_within(places: Sequence[float], low: float, high: float) -> bool:
-    """Whether places grow and lie between two others, but for rounding."""
+    """Whether places ascend and lie between `low` and `high`, up to rounding."""
     slack = 1e-9 * (high - low)
     rising = bool(np.all(np.diff(places) > 0))
     return rising and low - slack <= places[0] and places[-1] <= high + slack
 
 
 def middles(low: float, high: float, count: int = 3) -> tuple[float, ...]:
-    """Return the middles of `count` equal stretches between two places."""
+    """Return the midpoints of `count` equal intervals between `low` and `high`."""
     edges = np.linspace(low, high, count + 1)
     return tuple(float(v) for v in (edges[:-1] + edges[1:]) / 2)
