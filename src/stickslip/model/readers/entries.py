@@ -47,6 +47,7 @@ def from_triangle(rows: IntArray, columns: IntArray, values: FloatArray, n: int,
         Size.
     place
         Place of the matrix, for messages.
+
     Raises
     ------
     InputError
