@@ -297,12 +297,12 @@ def add_upper(above, upper, columns, values, scale, vector, gap, force, out):  #
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, force, out):  # type: ignore[no-untyped-def]
-    """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts.
+    """Solve harmonic by harmonic, from the static one up, each with the contact forces of the harmonics below it.
 
     Parameters
     ----------
     real, imaginary
-        The inverses, as `stickslip.harmonic.matrix_products` has them.
+        Inverses of the harmonics' matrices, in the form of `harmonic.matrix_products.SmallBlocks`.
     below, lower
         Of `Triangles`.
     columns, values, scale
