@@ -16,16 +16,16 @@ RIGID = 1e-4  # of the highest frequency: below, rounding
 
 @dataclass(frozen=True, eq=False)
 class ContactTable:
-    """What results say about each contact point.
+    """Table of the contact points, as results report them.
 
     Parameters
     ----------
     names
-        Of the points: ``contact.point``, or the point's own name where the surface has names.
+        Names of the points: ``contact.point``, or the point's own name where the surface has names.
     groups
-        Name of the model's contact that each belongs to.
+        Name of the contact of each point.
     laws
-        Names of their laws.
+        Name of the law of each point.
     position
         (p, 3) in m; NaN for contacts of single dofs.
     frame
@@ -63,9 +63,9 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class Frequencies:
-    """Natural frequencies in Hz of the full and the reduced model, contacts open (free rigid bodies left out) and stuck.
+    """Natural frequencies in Hz of the full and the reduced model, contacts open (without free rigid bodies) and stuck.
 
-    Of a wheel: those of the wave that the lowest driven harmonic travels as.
+    On a wheel they belong to the wave in which the lowest driven harmonic travels.
     """
 
     free_full: FloatArray
@@ -82,7 +82,7 @@ class Frequencies:
         ]
 
     def warnings(self, up_to_hz: float = np.inf) -> list[str]:
-        """Return a sentence for each set of modes that the reduction does not reproduce, of those up to a frequency in Hz."""
+        """Return a warning for each set of modes, up to a frequency in Hz, that the reduction does not reproduce."""
         found = []
         for what, full, reduced in self._pairs():
             error = np.abs(_errors(full, reduced))[:CHECKED][full[:CHECKED] <= up_to_hz]
@@ -109,18 +109,18 @@ FIRST = np.zeros(1, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Blades:
-    """The outputs of a wheel with all its sectors.
+    """Outputs of a wheel with all its sectors.
 
     Parameters
     ----------
     sectors
-        Number of sectors; outputs and contact points go sector by sector.
+        Number of sectors. Outputs and contact points are ordered sector by sector.
     labels
-        Outputs of each sector.
+        Labels of the outputs of one sector.
     tuned
-        The same wheel with all sectors alike, of which one answers for all.
+        The tuned wheel: all sectors are alike, and one sector is solved.
     deviations
-        (n_s,) what each sector deviates by, relative, of gaps in m; by name.
+        Name -> (n_s,) deviation of each sector, relative; of gaps in m.
     """
 
     sectors: int
@@ -136,40 +136,40 @@ class Blades:
 
 @dataclass(frozen=True, eq=False)
 class Assembled:
-    """A model reduced, its contacts paired and placed under the static load: arrays only, picklable.
+    """Reduced model with paired contacts under its static load. It holds arrays only and can be pickled.
 
     Parameters
     ----------
     system, bare
-        With and without the retention.
+        Systems with and without the retention springs.
     load
-        On the system's coordinates, N.
+        Forces on the coordinates of the system, N.
     contacts
-        Tables of the contact points, in the order of the interface.
+        Table of the contact points, in the order of the interface.
     output_labels
-        Of `System.outputs`.
+        Labels of `System.outputs`.
     peak_output
-        Position of the output whose peak counts.
+        Position of the output whose peak is resolved.
     error_labels
-        Of `System.alert_dofs`.
+        Labels of `System.alert_dofs`.
     retention
-        N/m.
+        Stiffness of the retention springs, N/m.
     excitation
         Amplitude by which responses are divided: the largest harmonic force, N; NaN for none.
     static_gap, static_force
         (p, 3) gaps (m) and contact forces (N) under the static loads alone.
     frequencies
-        How well the reduced model stands for the full one.
+        Natural frequencies of the full and the reduced model.
     skin
-        None where no part has a mesh.
+        Outer surface for pictures; None where no part has a mesh.
     sectors, engine_order
-        Of the wheel; 1 and None for a single structure. Of several engine orders their base m_0.
+        Number of sectors and engine order of the wheel; 1 and None for a single structure. For several engine orders their base m_0.
     counts
-        ``nodes``, ``dofs``, ``reduced``, ``retained``.
+        Numbers of ``nodes``, ``dofs``, ``reduced`` and ``retained`` coordinates.
     warnings
-        What the user should know.
+        Warnings for the user.
     blades
-        Of a wheel whose sectors differ; None where one sector answers for all.
+        Outputs of all sectors of a mistuned wheel; None where one sector stands for all.
     orders
         Engine order of each harmonic that loads drive; none for a single structure.
     """
@@ -196,6 +196,6 @@ class Assembled:
 
     @property
     def peak_of(self) -> IntArray:
-        """Positions of the outputs of which the largest amplitude counts."""
+        """Positions of the outputs whose largest amplitude is the peak."""
         own = self.system.peak_of
         return FIRST + self.peak_output if own is None else own

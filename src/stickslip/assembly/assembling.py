@@ -23,7 +23,7 @@ REMEMBERED_AS = "with more modes"
 def assemble(
     model: Model, harmonics: int, store: Store = in_memory, *, wave_number: int | None = None, every_wave: bool = False
 ) -> Assembled:
-    """Reduce the parts of a model, join them, pair the contacts, and place all under the static loads.
+    """Reduce the parts of a model, join them, pair the contacts, and apply the static loads.
 
     Parameters
     ----------
@@ -32,18 +32,19 @@ def assemble(
     harmonics
         Highest harmonic of the response.
     store
-        Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+        Cache of reductions: a function of a key text and of a function that computes named arrays. It returns the arrays, from an
+        earlier run where it has them.
     wave_number
-        Of a wheel: that in which a motion travels that nothing drives; harmonic loads are then left out. None: the loads say.
+        Wave number of a self-excited motion of a wheel; harmonic loads are then left out. None: it follows from the loads.
     every_wave
-        Whether all waves of a wheel are reduced, as its stability against every one of them needs.
+        Whether all waves of a wheel are reduced. Stability against every wave needs them.
 
     Raises
     ------
     InputError
-        If something of the model does not fit; the message names it.
+        If the model is inconsistent. The message names the place.
     SingularError
-        If nothing holds a body, or the static loads find no equilibrium.
+        If a body has no support, or there is no equilibrium under the static loads.
     """
     if wave_number is not None:
         model = model.undriven
@@ -54,7 +55,7 @@ def assemble(
 
 
 def with_more_modes(model: Model) -> Model | None:
-    """Return the model with half again as many modes; None where its parts keep all there are."""
+    """Return the model with half again as many modes; None where its parts keep all modes already."""
     own = {name: _more(part) for name, part in model.parts.items()}
     if all(own[name] is part for name, part in model.parts.items()):
         return None
@@ -62,12 +63,12 @@ def with_more_modes(model: Model) -> Model | None:
 
 
 def more_modes(model: Model, harmonics: int, store: Store) -> Assembled | None:
-    """Return a model reduced with half again as many modes; None where it keeps all, or these cannot be had.
+    """Assemble a model with half again as many modes; None where it keeps all modes already, or the reduction fails.
 
     Parameters
     ----------
     model
-        As it was solved; a wheel whose sectors differ has no such model.
+        The solved model. For a wheel whose sectors differ the result is None.
     harmonics, store
         As in `assemble`.
     """

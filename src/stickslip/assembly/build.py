@@ -41,27 +41,26 @@ UNKNOWN = Frequencies(*(np.zeros(0),) * 4)
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The linear side of a model on few coordinates.
+    """Linear part of a reduced model: everything but the contact forces.
 
     Parameters
     ----------
     side
-        One structure, or the waves of a wheel.
+        Structure, or the waves of a wheel.
     gaps
-        (3 p, n) CSR.
+        (3 p, n) CSR, gaps t, w, n of p contact points from the coordinates.
     steady
         (n,) static load of steady rotation, N.
     of_dofs
-        From dofs of all parts to coordinates; the second argument is the key that asks.
+        Dofs of all parts -> coordinates. The second argument is the study key, for messages.
     load
-        From a force on the dofs of all parts, in a harmonic, to one on the coordinates.
+        Force on the dofs of all parts and harmonic -> force on the coordinates.
     of_wave
-        From a wave number to a structure whose modes are those of the reduced model, its gaps, and its coordinates of dofs of all
-        parts.
+        Wave number -> structure with the modes of the reduced model, its gaps, and the map from dofs of all parts to its coordinates.
     field
-        From the name of a load of `Model.spread` and a harmonic to the load on the coordinates; None where there is none.
+        Name of a load of `Model.spread` and harmonic -> load on the coordinates; None without such loads.
     expand
-        From coordinates and a harmonic to all dofs of all parts; only where `with_ways_back` was the store.
+        Coordinates and harmonic -> all dofs of all parts. It exists only with the store `with_ways_back`.
     """
 
     side: LinearSide
@@ -83,7 +82,7 @@ def assemble_tuned(
     every_wave: bool = False,
     checked: bool = True,
 ) -> Assembled:
-    """Return a single structure or a tuned wheel as solvers see it; see `assemble`. Frequencies of the full model are left out if it is not to be `checked`."""
+    """Assemble a single structure or a tuned wheel; see `assemble`. `checked` adds the frequencies of the full model."""
     what = asked(model, harmonics)
     labels = what.labels
     order = what.order if wave_number is None else wave_number
@@ -150,15 +149,15 @@ def linear_side(
     model
         The model.
     order, harmonics
-        Engine order (of no meaning for a single structure) and highest harmonic.
+        Engine order (unused for a single structure) and highest harmonic.
     kept
-        Dofs of all parts that stay physical beside those of contacts and joins.
+        Dofs of all parts that stay physical, in addition to those of contacts and joins.
     stay
-        Outputs, which have to be coordinates of their own.
+        Dofs of outputs, each of which must be a coordinate.
     store
         As in `assemble`.
     more
-        Wave numbers that are reduced beside those of the harmonics.
+        Wave numbers that are reduced in addition to those of the harmonics.
     """
     kept, needed = physical(model, kept)
     bodies = model.places.bodies()
@@ -199,12 +198,12 @@ def linear_side(
 
 
 def flow_around(model: Model, store: Store = in_memory, speed: float | None = None) -> Flow | None:
-    """Return the aerodynamic force on a model, at its own speed or at another one in rad/s; None where it has no coefficients.
+    """Return the aerodynamic force on a model at its speed, or at another `speed` in rad/s; None without coefficients.
 
     Raises
     ------
     InputError
-        If the coefficients are those of other speeds.
+        If the coefficients belong to other speeds.
     """
     given = model.aerodynamics
     if given is None:
@@ -215,7 +214,7 @@ def flow_around(model: Model, store: Store = in_memory, speed: float | None = No
 
 
 def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
-    """Return all dofs that stay physical beside some that are `kept`, and those of them that no shapes of joins replace."""
+    """Return all dofs that stay physical, `kept` included, and those among them that no interface modes replace."""
     pairs, ties = model.pairs, model.ties
     used = [operator.nonzero()[1] for operator in (pairs.own, pairs.following, ties.weights)]
     needed = np.unique(np.concatenate([kept, *used[:2], model.places.bodies()]))
@@ -263,7 +262,7 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
 
 
 def free_coordinates(model: Model, linear: Linear) -> IntArray | None:
-    """Return the coordinates of rigid bodies that no join holds."""
+    """Return the coordinates of rigid bodies without a join; None without such bodies."""
     dofs = _free_dofs(model)
     return linear.of_dofs(dofs, "part") if dofs.size else None
 
@@ -273,7 +272,7 @@ def _free_dofs(model: Model) -> IntArray:
 
 
 def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> HarmonicLoad:
-    """Return loads on the coordinates by their forces: static ones and harmonics; and that of steady rotation."""
+    """Return the load on the coordinates: static forces with those of steady rotation, and harmonics."""
     static = np.zeros(linear.side.n)
     if model.centrifugal and model.speed > 0:
         static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
@@ -303,7 +302,7 @@ def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, F
 
 
 def holding_points(model: Model, contacts: ContactsAs) -> BoolArray:
-    """Return the (p,) contact points that hold in small vibrations: all ``stuck``, none ``open``, or those pressed in the ``static`` state."""
+    """Return which contact points (p,) stick in small vibrations: ``stuck``: all; ``open``: none; ``static``: those pressed at rest."""
     p = len(model.pairs.names)
     if contacts != "static" or not p:
         return np.full(p, contacts == "stuck")
@@ -328,7 +327,7 @@ def _pressed(model: Model) -> BoolArray:
 
 
 def frequencies(model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store) -> Frequencies:
-    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; of a wheel, of the first harmonic that is driven."""
+    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; on a wheel for the first driven harmonic."""
     number = 0 if order is None else excited_wave(order, model.sectors, _first(model))
     reduced, gaps, place = linear.of_wave(number)
     bodies = _free_dofs(model)
@@ -363,6 +362,6 @@ def _lowest(model: Model, structure: Structure, count: int, store: Store) -> Flo
 
 
 def contact_table(pairs: Pairs) -> ContactTable:
-    """Return what results say of contact points."""
+    """Return the table of the contact points for results."""
     laws = tuple(law_name(law) for law in pairs.laws)
     return ContactTable(pairs.names, pairs.groups, laws, pairs.position, pairs.frame, pairs.area)

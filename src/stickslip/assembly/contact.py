@@ -25,25 +25,25 @@ class Contact:
         The first surface gives the points and the normal, ``part.surface``; the second is ``part.surface``, ``next.part.surface``
         (of the neighbouring sector) or ``ground``. The gap is ``frameᵀ (u_second - u_first)``, with n out of the first body.
     law
-        Its parameters hold for what `share` says.
+        Contact law. Its stiffnesses and forces refer to the unit of `share`.
     share
-        ``interface``: stiffnesses and forces of the law are those of the whole interface, shared among its points; ``point``: of
-        each point; ``area``: per square metre.
+        Unit of the parameters of the law. ``interface``: the whole interface, shared among its points; ``point``: each point;
+        ``area``: one square metre.
     pairing
-        How points find their partners.
+        Method that finds the partner of each point.
     tangent
-        Direction whose part in the contact plane is t; None: that of the surface's own frames, or any where the law does not tell
-        its tangents apart.
+        Direction whose projection on the contact plane is t; None: t of the surface's own frames, or any direction where the law is
+        the same along t and w.
     normal
-        Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: that of the surfaces.
+        Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: the normal of the surfaces.
     acts
-        For surfaces of single dofs, which have no normal: the direction of the contact that their relative motion is.
+        Contact direction (t, w or n) of the relative motion of single dofs, which have no normal.
     tolerance
-        Distance of partners node to node, reach of a segment, m; None: the pairing's own.
+        Largest distance of partners, m: between nodes, or from a point to its segment; None: the default of the pairing.
     gap
-        Clearance at rest, m; negative for an interference: so far the bodies would overlap if nothing gave way.
+        Clearance at rest, m. A negative value is an interference, the overlap of the undeformed bodies.
     preload
-        Normal force at rest of what `share` says, N or Pa.
+        Normal force at rest for the unit of `share`, N or Pa.
     """
 
     between: tuple[str, str]
@@ -60,14 +60,14 @@ class Contact:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Join:
-    """Two surfaces tied to each other for good: the first follows the second.
+    """Permanent tie of two surfaces: the first follows the second.
 
     Parameters
     ----------
     between, pairing, tolerance
-        As of a `Contact`. ``spatial_harmonics`` couples the flanges of wheels of different numbers of sectors in the mean.
+        As in `Contact`. ``spatial_harmonics`` couples flanges of wheels with different numbers of sectors in the mean.
     harmonics
-        Of such a flange: those of the circumference that are coupled, from 0 on.
+        Circumferential harmonics, from 0, that such flanges couple.
 
     Raises
     ------

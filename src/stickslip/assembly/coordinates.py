@@ -15,16 +15,16 @@ from stickslip.reduction.basis import in_coordinates, surviving_sets
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """Coordinates of parts side by side, tied by the joins.
+    """Coordinates of all parts, tied by the joins.
 
     Parameters
     ----------
     ids
-        (n0,) dof among those of all parts that each untied coordinate is; -1 for modal ones.
+        (n0,) dof of all parts behind each untied coordinate; -1 for modal coordinates.
     tie
-        (n0, n) CSR: untied coordinates from those that stay; None where nothing is tied.
+        (n0, n) CSR from independent to untied coordinates; None without ties.
     stays
-        (n,) untied coordinates that stay.
+        (n,) untied coordinates that are independent.
     """
 
     ids: IntArray
@@ -37,7 +37,7 @@ class Coordinates:
         return int(self.stays.size)
 
     def tied(self, structure: Structure) -> Structure:
-        """Return a structure of the untied coordinates on those that stay, without a way back."""
+        """Return a structure of the untied coordinates on the independent ones, without `basis`."""
         if self.tie is None:
             return structure
         sets = surviving_sets(structure, self.stays)
@@ -45,7 +45,7 @@ class Coordinates:
         return replace(found, basis=None)
 
     def columns(self, operator: Matrix) -> Matrix:
-        """Return an operator (m, N) on the dofs of all parts as one on the coordinates; what they do not hold must not move."""
+        """Return an operator (m, N) on the dofs of all parts as one on the coordinates. It must be zero at other dofs."""
         mine = scipy.sparse.csr_array(operator).tocoo()
         place = np.full(operator.shape[1], -1)
         known = self.ids >= 0
@@ -57,27 +57,27 @@ class Coordinates:
         return own if self.tie is None else scipy.sparse.csr_array(own @ self.tie)
 
     def untied(self, q: Matrix) -> Matrix:
-        """Return the untied coordinates (n0,) from those that stay."""
+        """Return the untied coordinates (n0,) from the independent ones (n,)."""
         return q if self.tie is None else np.asarray(self.tie @ q)
 
     def load(self, untied: Matrix) -> Matrix:
-        """Return a load (n0,) on the untied coordinates as one on those that stay."""
+        """Return a load (n0,) on the untied coordinates as one (n,) on the independent ones."""
         return untied if self.tie is None else np.asarray(self.tie.T @ untied)
 
     def load_of_dofs(self, force: Matrix) -> Matrix:
-        """Return a force (N,) on the dofs of all parts as one on the coordinates that stay; of what they do not hold nothing is left."""
+        """Return a force (N,) on the dofs of all parts as one (n,) on the independent coordinates. Forces on other dofs are dropped."""
         untied = np.zeros(self.ids.size, dtype=force.dtype)
         known = self.ids >= 0
         untied[known] = force[self.ids[known]]
         return self.load(untied)
 
     def of_dofs(self, dofs: IntArray, table: Dofs, place: str) -> IntArray:
-        """Return the coordinates that dofs of the parts are.
+        """Return the coordinates of dofs of the parts.
 
         Raises
         ------
         InputError
-            If one follows several others; `place` is the key that asks for it.
+            If a dof follows several others. `place` is the study key, for the message.
         """
         rows = self.columns(scipy.sparse.eye_array(len(table), format="csr")[dofs])
         single = (np.diff(rows.indptr) == 1) & np.isclose(np.asarray(rows.sum(axis=1)).ravel(), 1.0)
@@ -92,7 +92,7 @@ class Coordinates:
 
 
 def coordinates(ids: IntArray, ties: Ties) -> Coordinates:
-    """Return the coordinates of parts whose untied ones are the dofs `ids` (-1: modal)."""
+    """Return the coordinates of parts from the dof `ids` of each untied coordinate (-1: modal)."""
     if not ties.followers.size:
         return Coordinates(ids, None, np.arange(ids.size))
     tie, stays = ties.matrix(ids)

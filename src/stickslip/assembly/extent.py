@@ -19,9 +19,9 @@ class Extent:
     Parameters
     ----------
     stiff_volume
-        Young's modulus times volume of all elastic parts, J: at least what their mean strain is told by; NaN where one has no mesh.
+        Young's modulus times volume of all elastic parts, J, the scale of the mean strain; NaN where a part has no mesh.
     labels, from_clamp
-        Outputs, and the distance of each from the nearest clamped node of its part, m; NaN where there is none.
+        Outputs, and the distance of each from the nearest clamped node of its part, m; NaN without clamped nodes.
     """
 
     stiff_volume: float
@@ -30,7 +30,7 @@ class Extent:
 
 
 def extent_of(model: Model, harmonics: int) -> Extent:
-    """Return how large and stiff a model is; `harmonics` as in `assemble`."""
+    """Return size and stiffness of a model; `harmonics` as in `assemble`."""
     volumes = [_stiff_volume(part) for part in model.parts.values() if part.body is None]
     labels, table = asked(model, harmonics).labels, model.places.dofs
     away = [_from_clamp(model.parts[table.part[d]], table.position[d]) for d in labels.dofs]

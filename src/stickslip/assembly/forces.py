@@ -95,11 +95,11 @@ def _unit(key: str, load: Load) -> FloatArray:
 
 
 class Driving(Protocol):
-    """What of a load says how it travels."""
+    """Harmonic and engine order of a load."""
 
     @property
     def harmonic(self) -> int:
-        """Multiple of its own engine order; 0: static."""
+        """Multiple of the load's engine order; 0: static."""
         ...
 
     @property
@@ -109,22 +109,22 @@ class Driving(Protocol):
 
 
 def engine_order(loads: Mapping[str, Driving], wheel: bool) -> tuple[int | None, dict[str, int]]:
-    """Return the base order of the loads, and the harmonic that each acts in.
+    """Return the base engine order of the loads, and the harmonic of each load.
 
-    Loads with one engine order have it as their base. Of several the base is the greatest common divisor m_0 of the orders
+    Loads with one engine order have it as their base. With several, the base is the greatest common divisor m_0 of the orders
     ``harmonic · engine_order``: a load of order m acts in harmonic m/m_0 of the frequency m_0 Ω, and travels as the wave m.
 
     Returns
     -------
     order
-        None for a single structure, and where nothing vibrates.
+        Base order; None for a single structure, and without harmonic loads.
     harmonics
-        Of each load; 0 of static ones.
+        Harmonic of each load; 0 for static loads.
 
     Raises
     ------
     InputError
-        If a load has one and the model is no sector, or has none and it is one; if some loads have order 0 and others not.
+        If a load on a sector has no engine order, or one elsewhere has one; if some loads have order 0 and others not.
     """
     found: dict[str, int] = {}
     for name, load in loads.items():
@@ -159,21 +159,21 @@ def engine_order(loads: Mapping[str, Driving], wheel: bool) -> tuple[int | None,
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Dofs that are reported, by name.
+    """Names of reported dofs.
 
     Parameters
     ----------
     names
-        ``tip1.x`` and so on.
+        Labels such as ``tip1.x``.
     dofs
-        Among those of all parts.
+        (k,) dofs of all parts.
     """
 
     names: tuple[str, ...]
     dofs: IntArray
 
     def of(self, names: tuple[str, ...], place: str) -> IntArray:
-        """Return the dofs of some of the names; an `InputError` at `place` says what is near."""
+        """Return the dofs of some of the names; an `InputError` at `place` suggests similar names."""
         at = dict(zip(self.names, self.dofs, strict=True))
         for name in names:
             if name not in at:
@@ -182,12 +182,12 @@ class Labels:
 
 
 def output_labels(places: Places, outputs: tuple[Output, ...], loads: Mapping[str, Load]) -> Labels:
-    """Return what is reported: the outputs, or where harmonic loads act if there are none.
+    """Return the reported dofs: the outputs, or without outputs the dofs under harmonic loads.
 
     Raises
     ------
     InputError
-        If a place is not there, is clamped, or has not the directions asked for.
+        If a place does not exist, is clamped, or lacks a requested direction.
     """
     if not outputs:
         vibrating = {name: load for name, load in loads.items() if load.harmonic > 0}
@@ -237,7 +237,7 @@ def _first(places: Places, spot: Spot) -> IntArray:
 
 
 def first_nodes(places: Places, outputs: tuple[Output, ...]) -> tuple[str, ...]:
-    """Return a line about each output on a set of several nodes: it is the first of them."""
+    """Return a line about each output on a set of several nodes, which reports the first node."""
     found = []
     for output in outputs:
         if output.near is None and places.parts[output.on.partition(".")[0]].body is None:
@@ -251,7 +251,7 @@ def first_nodes(places: Places, outputs: tuple[Output, ...]) -> tuple[str, ...]:
 
 
 def far_outputs(places: Places, outputs: tuple[Output, ...]) -> list[str]:
-    """Return a warning about each output whose nearest node is far from the place asked for."""
+    """Return a warning about each output whose nearest node is far from the requested place."""
     found = []
     for output in outputs:
         if output.near is None or output.on not in places.parts:
@@ -288,7 +288,7 @@ def _nearest(places: Places, output: Output, key: str) -> IntArray:
 
 
 def error_names(labels: Labels, contacts: Labels, loads: Mapping[str, Load], over: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the labels over which the error of missing harmonics is taken: by default all outputs."""
+    """Return the labels over which the truncation error is taken: by default all outputs."""
     if over in (*ANSWER, ("outputs",)):
         return labels.names
     if over == ("contacts",):
@@ -311,7 +311,7 @@ def _axis_of_excitation(loads: Mapping[str, Load]) -> str | None:
 
 
 def beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
-    """Say of engine orders not below the number of sectors that the sectors cannot tell them from lower ones."""
+    """Return a warning about engine orders not below the number of sectors: they act as lower ones do."""
     return [
         f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}: a force "
         "that changes so much within a sector is taken as the same all over its place."

@@ -23,7 +23,7 @@ Felt = Callable[[DynamicStiffness], DynamicStiffness]
 
 
 def as_it_is(side: DynamicStiffness) -> DynamicStiffness:
-    """Return what vibrates as a steady motion feels it."""
+    """Return the dynamic stiffness unchanged, as a steady motion has it."""
     return side
 
 
@@ -34,17 +34,17 @@ class Nodes:
     Parameters
     ----------
     part
-        Its name.
+        Name of the part.
     numbers
-        (n,) node numbers; 0 of the centre of a rigid body.
+        (n,) node numbers; 0 for the centre of a rigid body.
     points
-        (n, 3) in m.
+        (n, 3) positions, m.
     cells
         (m, k) nodes of each cell in VTK order; None where the part has no mesh.
     cell_numbers
-        (m,) of the cells; None without a mesh.
+        (m,) numbers of the cells; None without a mesh.
     dofs
-        (n, 3) displacements among the dofs of all parts; -1 where a node is held.
+        (n, 3) dofs x, y, z of all parts; -1 where a node is clamped.
     """
 
     part: str
@@ -61,12 +61,12 @@ class Nodes:
 
 
 def nodes_of(model: Model) -> tuple[Nodes, ...]:
-    """Return the nodes of all parts that have a place in space.
+    """Return the nodes of all parts with known positions.
 
     Raises
     ------
     InputError
-        If none has.
+        If no part has any.
     """
     found = [own for name in model.parts if (own := _nodes(model, name)) is not None]
     if not found:
@@ -94,18 +94,18 @@ def _nodes(model: Model, name: str) -> Nodes | None:
 
 @dataclass(frozen=True, eq=False)
 class Everywhere:
-    """From the coordinates that a motion is solved for to all dofs of all parts.
+    """Recovery of all dofs of all parts from the coordinates that a motion is solved for.
 
     Parameters
     ----------
     system, load
-        As those of `Assembled`.
+        As in `Assembled`.
     output_labels, outputs
-        What is reported, and the (k, 2) sector and dof of all parts of each.
+        Labels of the outputs, and (k, 2) the sector and the dof of all parts of each.
     order, sectors
-        Engine order or wave number, and number of sectors of a wheel; 0 and 1 of a single structure.
+        Engine order or wave number, and number of sectors of a wheel; 0 and 1 for a single structure.
     alike
-        Whether all sectors do what one does, later; else each has a motion of its own.
+        Whether all sectors have the same motion with a phase shift; otherwise each sector has its own.
     """
 
     system: System
@@ -118,18 +118,18 @@ class Everywhere:
     _expand: Callable[[Matrix, int], Matrix]
 
     def fields(self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is) -> ComplexArray:
-        """Return the (s, H+1, N) motion of all dofs: of each sector on the axes of the first one turned to it, of one where they are alike.
+        """Return the (s, H+1, N) motion of all dofs of each sector in its own axes, or of one sector where all are alike.
 
         Parameters
         ----------
         omega
             In rad/s.
         retained
-            (H+1, n) motion of the retained coordinates of the system and of `more`, in rising order.
+            (H+1, n) motion of the retained coordinates of the system and of `more`, in rising order, m.
         more
-            Coordinates that are known, too.
+            Further coordinates with known motion.
         felt
-            What vibrates as the motion feels it, from what vibrates in steady motion.
+            Map from the dynamic stiffness of a steady motion to that of this motion.
         """
         condensed = felt(self.system.condensed(self.load, len(retained) - 1, more))
         every = condensed.recover(omega, retained)
@@ -137,21 +137,21 @@ class Everywhere:
         return np.stack(each, axis=1)
 
     def phase(self, harmonic: int, sector: int) -> complex:
-        """Return what the motion of a sector is ahead of that of sector 0, on its own axes, in a harmonic, where sectors are alike."""
+        """Return the phase factor of a harmonic between a sector and sector 0, each in its own axes, where all sectors are alike."""
         return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
 
 
 def everywhere(model: Model, harmonics: int, *, every_wave: bool = False, wave_number: int | None = None) -> Everywhere:
-    """Reduce a model again, with the way back to all its dofs.
+    """Reduce a model again, with the recovery of all its dofs.
 
     Parameters
     ----------
     model
-        As it was solved.
+        The solved model.
     harmonics, every_wave
-        As in `assemble`: with others of a wheel the number of modes may be another one.
+        As in the call of `assemble`. Other values may change the number of modes of a wheel.
     wave_number
-        Of a tuned wheel that no load drives; None: that of the loads.
+        Wave number of a self-excited motion of a tuned wheel; None: it follows from the loads.
     """
     what = asked(model, harmonics)
     names, dofs = what.labels.names, what.labels.dofs

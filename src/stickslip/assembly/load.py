@@ -17,9 +17,9 @@ class Load:
     Parameters
     ----------
     on
-        ``part`` (a rigid body: at its centre of mass), ``part.set`` (shared equally among its nodes), or a dof ``part.node12.x``.
+        ``part`` (a rigid body, at its centre of mass), ``part.set`` (shared equally among its nodes), or a dof ``part.node12.x``.
     newton
-        The whole force, or its amplitude, N.
+        Resultant force, or its amplitude, N.
     direction
         Unit vector in global axes (of the sector, on a wheel); None where `on` is a single dof.
     harmonic
@@ -27,16 +27,17 @@ class Load:
     phase
         In rad.
     engine_order
-        m of a wheel's excitation: harmonic h travels as the wave ``h m``, 0: all sectors alike; None for a single structure.
+        Engine order m on a wheel: harmonic h travels as the wave ``h m``; 0: all sectors alike; None for a single structure.
     omega, omega_ratio
-        Of a load that acts with a frequency of its own, a motion of two frequencies: rad/s, or times that of the other loads. None: it acts with theirs.
+        Frequency of a load with its own frequency, rad/s, or its ratio to the frequency of the other loads; the motion then has two
+        frequencies. None: the frequency of the other loads.
     field
-        Pressure on the facets of a surface in place of a force: `newton` is then its share, 1 for all of it; None: a force.
+        Pressure on the facets of a surface instead of a force. `newton` is then a factor, 1 for the whole field. None: a force.
 
     Raises
     ------
     InputError
-        If a number is no count or not finite, or a static load has a phase.
+        If the harmonic or the engine order is no count, a number is not finite, or a static load has a phase or an own frequency.
     """
 
     on: str
@@ -70,24 +71,24 @@ class Load:
 
     @property
     def second(self) -> bool:
-        """Whether it acts with a frequency of its own."""
+        """Whether the load has its own frequency."""
         return self.omega is not None or self.omega_ratio is not None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """A point whose motion is reported.
+    """Point whose motion is reported.
 
     Parameters
     ----------
     name
-        Its labels are ``name.x`` and so on.
+        Name of the output; its labels are ``name.x`` and so on.
     on
         ``part.set`` (its first node), a dof ``part.node12.x``, or a part together with `near`.
     near
         (3,) place in m; the nearest node of the part `on` is taken.
     directions
-        Of x, y, z, rx, ry, rz; those that the point has, if empty.
+        Reported components, from x, y, z, rx, ry, rz; empty: all components of the point.
     """
 
     name: str
@@ -97,7 +98,7 @@ class Output:
 
 
 def refuse_second(loads: Mapping[str, Load]) -> None:
-    """Refuse loads with a frequency of their own, where a motion has one frequency."""
+    """Refuse loads with their own frequency in analyses of one frequency."""
     own = next((name for name, load in loads.items() if load.second), None)
     if own is not None:
         raise input_error(

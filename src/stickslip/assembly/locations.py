@@ -27,26 +27,26 @@ NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """What a name of a model means.
+    """Surface or dofs behind a name of a model.
 
     Parameters
     ----------
     name
-        ``part.set`` and the like.
+        Name such as ``part.set``.
     part
         Name of the part.
     surface
-        Points that move along x, y, z, with operators on the dofs of all parts; None for single dofs.
+        Points with motion along x, y, z, and their operators on the dofs of all parts; None for single dofs.
     dofs
         (k,) single dofs; empty for points.
     frame
-        (p, 3, 3) columns t, w, n that belong to the points; None where facets tell the normals.
+        (p, 3, 3) columns t, w, n of the frames of the points; None where normals follow from facets.
     labels
-        Names of the points; empty: they have none.
+        Names of the points; empty without names.
     nodes
-        (p, 3) dofs of points that are nodes, -1 where they are held; None for points of rigid bodies.
+        (p, 3) dofs of points that are nodes, -1 where they are clamped; None for points of rigid bodies.
     area
-        (p,) areas in m² that belong to the points of a rigid body; None where they have none of their own.
+        (p,) areas of the points of a rigid body, m²; None where the points have no own areas.
     """
 
     name: str
@@ -61,12 +61,12 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """The dofs of all parts side by side, and what stands where.
+    """Dofs of all parts in one numbering, and the names that stand for them.
 
     Parameters
     ----------
     parts
-        By name.
+        Name -> part.
     """
 
     parts: Mapping[str, Part]
@@ -92,31 +92,31 @@ class Places:
         return np.arange(first, first + self.parts[name].structure.n)
 
     def bodies(self, held: IntArray | None = None) -> IntArray:
-        """Return the dofs of rigid bodies; without those of bodies of which a dof is among `held`."""
+        """Return the dofs of rigid bodies, without bodies that have a dof among `held`."""
         own = [self.own(name) for name, part in self.parts.items() if part.body is not None]
         return stacked(o for o in own if held is None or not np.isin(o, held).any())
 
     def part_of(self, name: str, place: str) -> Part:
-        """Return a part by name; `place` is the key that names it."""
+        """Return a part by name; `place` is the study key, for messages."""
         if name not in self.parts:
             known = list(self.parts)
             raise input_error(place, f"there is no part {name!r}", did_you_mean(name, known))
         return self.parts[name]
 
     def spot(self, name: str, place: str) -> Spot:
-        """Return what a name means.
+        """Return the surface or the dofs behind a name.
 
         Parameters
         ----------
         name
             ``part`` (a rigid body: its centre), ``part.surface``, ``part.set``, ``part.node12``, ``part.node12.x``, ``part.rx``.
         place
-            Key of the model that holds the name, for messages.
+            Study key of the name, for messages.
 
         Raises
         ------
         InputError
-            If there is no such thing; the message says what is near.
+            If the name is unknown. The message suggests similar names.
         """
         head, _, rest = name.partition(".")
         part = self.part_of(head, place)
@@ -197,7 +197,7 @@ class Places:
         return Spot(name, head, surface, rows[:0, 0], nodes=dofs)
 
     def rows(self, head: str, numbers: IntArray) -> IntArray:
-        """Return the (k, 6) dofs x, y, z, rx, ry, rz of nodes of a part by number; -1 where there is none."""
+        """Return the (k, 6) dofs x, y, z, rx, ry, rz of nodes of a part by number; -1 for missing dofs."""
         rows = node_rows(self.parts[head].structure.dofs, numbers)
         return np.where(rows >= 0, rows + self.offset(head), -1)
 
@@ -223,7 +223,7 @@ def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
 
 
 def node_rows(table: Dofs, numbers: IntArray) -> IntArray:
-    """Return the (k, 6) rows x, y, z, rx, ry, rz of nodes by number in a table of dofs; -1 where there is none."""
+    """Return the (k, 6) rows x, y, z, rx, ry, rz of nodes by number in a table of dofs; -1 for missing dofs."""
     order = np.argsort(numbers, kind="stable")
     mine = np.flatnonzero(np.isin(table.node, numbers) & (table.node >= 0))
     at = order[np.searchsorted(numbers, table.node[mine], sorter=order)]
@@ -236,7 +236,7 @@ def node_rows(table: Dofs, numbers: IntArray) -> IntArray:
 
 
 def stacked(arrays: Iterable[IntArray]) -> IntArray:
-    """Return arrays of whole numbers, maybe none, one after the other."""
+    """Return integer arrays concatenated; an empty array for none."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *arrays])
 
 
@@ -248,12 +248,12 @@ def picked(index: IntArray, n: int) -> Matrix:
 
 
 def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
-    """Return the facets that continue a surface smoothly on to clamped nodes, and these nodes; indices into the points of its mesh.
+    """Return the facets that continue a surface smoothly onto clamped nodes, and these nodes, as indices of mesh points.
 
     Returns
     -------
-    facets : (m, k), none where the surface has no facets of its own or holds clamped nodes itself
-    nodes : the clamped ones among them
+    facets : (m, k) nodes of each facet; empty where the surface has no facets, or contains clamped nodes itself
+    nodes : clamped nodes of these facets
     """
     from scipy.spatial import cKDTree
 

@@ -42,12 +42,12 @@ ContactsAs = Literal["static", "stuck", "open"]
 
 
 def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
-    """Return a structure without the coordinates of some parts; `basis` leads back to all of them.
+    """Return a structure without the coordinates of some parts; `basis` maps to all coordinates.
 
     Raises
     ------
     InputError
-        If nothing is left.
+        If no coordinate is left.
     """
     if not names:
         return structure
@@ -71,36 +71,37 @@ class Model:
     Parameters
     ----------
     parts, contacts, joins, loads
-        By name.
+        Parts, contacts, joins and loads by name.
     outputs
-        Where motion is reported; none: where harmonic loads act. The first label decides the peak unless `peak_output` names another.
+        Reported points; none: the points under harmonic loads. The peak is that of the first label unless `peak_output` names another.
     peak_output, amplitude_of
-        Label of the output whose peak is resolved, empty: the first one; what an amplitude is: ``first``, ``half_peak_to_peak``, ``rms``.
+        Label of the output whose peak is resolved (empty: the first one), and the definition of its amplitude: ``first``,
+        ``half_peak_to_peak`` or ``rms``.
     alert_over
-        Labels over which the error of missing harmonics is taken, or ``answer``, ``outputs``, ``contacts``, ``along``; empty: the answer.
+        Labels over which the truncation error is taken, or ``answer``, ``outputs``, ``contacts``, ``along``; empty: ``answer``.
     speed
-        Of rotation, rad/s.
+        Rotor speed, rad/s.
     tangent, coriolis
         As in `RotatingSolid.at_speed`.
     centrifugal
         Whether the centrifugal load of rotating parts is a static load of the response.
     interface_modes
-        Of a single structure: number of characteristic shapes that stand for the nodes of joined surfaces in the forced response;
-        None: the nodes themselves.
+        Number of characteristic shapes that replace the nodes of joined surfaces of a single structure in the forced response;
+        None: the nodes are kept.
     retention
-        Stiffness that holds the mean position of free rigid bodies, N/m.
+        Stiffness of springs that keep the mean position of free rigid bodies, N/m.
     mistuning
-        How the sectors of a wheel differ; None: all are alike.
+        Differences between the sectors of a wheel; None: all are alike.
     modes_like
-        Speeds in rad/s. One: the modal coordinates of reductions are turned to its modes, so that reduced matrices change smoothly
-        with the speed. Several: what the modes of all of them span is kept. Empty: they are the modes at `speed`.
+        Reference speeds of the reduction, rad/s. One: modal coordinates are rotated to the modes at this speed, so that reduced
+        matrices change smoothly with the speed. Several: the span of the modes at all of them is kept. Empty: the modes at `speed`.
     aerodynamics
-        Of a sector of a wheel: what blades feel of their neighbours' motion through the fluid; None for nothing. `at` leaves it out.
+        Aerodynamic coupling of the blades of a wheel; None without a fluid. `at` neglects it.
 
     Raises
     ------
     InputError
-        When it is first used: naming the part, contact, join or load, and what is wrong with it.
+        On first use of an inconsistent model. The message names the part, contact, join or load, and the reason.
     """
 
     parts: Mapping[str, Part]
@@ -159,7 +160,7 @@ class Model:
 
     @property
     def rotates(self) -> bool:
-        """Whether a speed changes it: meshes and rigid bodies, not matrices."""
+        """Whether the model depends on the speed: with meshes and rigid bodies, not with matrices alone."""
         return any(part.body is not None for part in self.parts.values()) or self._has_mesh
 
     @property
@@ -175,7 +176,7 @@ class Model:
 
     @cached_property
     def places(self) -> Places:
-        """What its names mean."""
+        """Surfaces and dofs behind the names of the model."""
         return Places(self.parts)
 
     @cached_property
@@ -184,24 +185,24 @@ class Model:
 
     @cached_property
     def stages(self) -> Multistage | None:
-        """Its wheels, where joins couple several by spatial harmonics; None otherwise."""
+        """Wheels of a model whose joins couple several by spatial harmonics; None otherwise."""
         return stages_of(self.places, self.joins, self.contacts, self.speed * self.rotates)
 
     @cached_property
     def neighbours(self) -> Neighbours | None:
-        """How its parts meet their neighbours on the wheel; None for a single structure."""
+        """Cyclic faces between the parts of neighbouring sectors; None for a single structure."""
         found = self._unjoined
         return None if found is None else with_joins(found, self.ties)
 
     @cached_property
     def ties(self) -> Ties:
-        """What its joins tie."""
+        """Ties of the joins."""
         turn = None if self._unjoined is None else self._unjoined.turn
         return tie_joins(self.places, self.joins, turn)
 
     @cached_property
     def pairs(self) -> Pairs:
-        """Points of its contacts."""
+        """Contact points of all contacts."""
         refuse_joined(self.contacts, self.joins)
         here = self.neighbours
         return pair_contacts(self.places, self.contacts, None if here is None else here.turn)
@@ -217,17 +218,17 @@ class Model:
 
     @property
     def driven(self) -> dict[str, int]:
-        """The harmonic of this frequency that each load acts in, 0 of static ones."""
+        """Harmonic of each load, as a multiple of the frequency of `engine_order`; 0 for static loads."""
         return self._orders[1]
 
     @cached_property
     def memo(self) -> dict[str, Any]:
-        """What is computed of it once; it is left behind by `pickle`."""
+        """Cache of derived quantities; `pickle` drops it."""
         return {}
 
     @property
     def spread(self) -> tuple[str, ...]:
-        """Names of the loads that act on so many nodes that waves know them by projection alone: pressure fields on a wheel."""
+        """Names of the loads whose nodes do not stay in the reduction: pressure fields on a wheel, which are projected on its modes."""
         fields = [name for name, load in self.loads.items() if load.field is not None]
         return tuple(fields) if self.sectors > 1 else ()
 
@@ -237,7 +238,7 @@ class Model:
 
     @property
     def facts(self) -> Facts:
-        """Mass, size and counts; of one sector."""
+        """Mass, size and counts of one sector."""
         return facts_of_parts(self.parts.values())
 
     @property
@@ -254,11 +255,11 @@ class Model:
         return tuple(dict.fromkeys([*own, *self.pairs.warnings]))
 
     def spin(self, speed: float) -> Spin:
-        """Return how it turns at a speed in rad/s."""
+        """Return the rotation of the model at a speed in rad/s."""
         return Spin(float(speed), self.tangent, self.coriolis, self.axis, self.modes_like)
 
     def full(self, speed: float, *, with_damping: bool = False) -> Structure:
-        """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them; `with_damping` as in `at`."""
+        """Return all parts at a speed in rad/s, without joins and cyclic faces; `with_damping` as in `at`."""
         spin, rest = self.spin(speed), self.steady
         own = {name: at_speed(name, part, spin, rest[name]) for name, part in self.parts.items()}
         if with_damping:
@@ -267,7 +268,7 @@ class Model:
 
     @cached_property
     def steady(self) -> dict[str, Steady]:
-        """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
+        """Name of a part -> conditions of its displacement in steady rotation, from cyclic faces and joins."""
         if self.joins and self._has_mesh:
             loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
             return joined_displacements(self.places, self.coordinates, (self.neighbours, self.ties), loose)
@@ -276,7 +277,7 @@ class Model:
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        """Coordinates of `full` that the joins leave."""
+        """Coordinates of `full` under the ties of the joins."""
         return coordinates(np.arange(self.places.n), self.ties)
 
     def at(
@@ -294,17 +295,17 @@ class Model:
         speed
             In rad/s.
         wave_number
-            Modulo the number of sectors; of no meaning for a single structure.
+            Wave number modulo the number of sectors; unused for a single structure.
         contacts
-            What contacts do: ``open``: nothing; ``stuck``: all are springs; an array (p,): the points that are springs, as
-            `holding_points` finds them in the static state. Rigid bodies that nothing holds then are left out.
+            State of the contacts. ``open``: no forces; ``stuck``: all are springs; an array (p,): these points are springs, as
+            `holding_points` finds them in the static state. Rigid bodies without any support are then left out.
         with_damping
-            Whether the parts are damped as far as this follows from their matrices; ratios of modes are left out.
+            Whether to include damping from the matrices of the parts; modal damping ratios are never included.
 
         Returns
         -------
         Structure
-            Sparse where a part is; `basis` leads to the dofs of all parts, in the order of `places`.
+            Sparse if a part is sparse; `basis` maps to the dofs of all parts, in the order of `places`.
         """
         at = self.coordinates
         structure, tie = at.tied(self.full(speed, with_damping=with_damping)), at.tie
@@ -333,7 +334,7 @@ class Model:
 
     @cached_property
     def skin(self) -> Skin | None:
-        """The skin of its meshes; None where no part has one."""
+        """Outer surface of the meshes; None where no part has a mesh."""
         return skin_of(self.parts)
 
     def on_skin(self, field: Matrix) -> Matrix:
@@ -349,12 +350,12 @@ class Model:
         }
 
     def static_state(self, speed: float) -> StaticState | None:
-        """Return what the centrifugal load does to the solids at a speed in rad/s; None at rest, and where no speed changes anything."""
+        """Return the static state of the solids under the centrifugal load at a speed in rad/s; None without such a load."""
         return static_state(self.parts, self.static_displacement(speed), speed)
 
     @cached_property
     def undriven(self) -> "Model":
-        """The same without harmonic loads, its motion reported at the same places."""
+        """The model without harmonic loads, with the same outputs."""
         driven = {name: load for name, load in self.loads.items() if load.harmonic > 0}
         still = {name: load for name, load in self.loads.items() if name not in driven}
         places = tuple(Output(name=name, on=load.on) for name, load in driven.items())

@@ -21,17 +21,17 @@ class Asked:
     Parameters
     ----------
     order
-        Engine order, of several their base; None for a single structure, and where nothing vibrates.
+        Engine order, for several orders their base; None for a single structure, and without harmonic loads.
     orders
-        Engine order of each harmonic that loads drive.
+        Harmonic -> engine order of its loads.
     forces
-        (N,) of each load.
+        Name of a load -> (N,) force on the dofs of all parts, N.
     labels
-        What is reported.
+        Reported dofs.
     spread
-        Loads of which no dof has to stay (`Model.spread`).
+        Loads whose dofs need not stay in the reduction (`Model.spread`).
     names, watched
-        Labels over which the error of missing harmonics is taken, and their dofs.
+        Labels over which the truncation error is taken, and their dofs.
     """
 
     order: int | None
@@ -44,23 +44,23 @@ class Asked:
 
     @property
     def stay(self) -> IntArray:
-        """Dofs that have to be coordinates of their own."""
+        """Dofs that must each be a coordinate."""
         return np.concatenate([self.labels.dofs, self.watched])
 
     @property
     def kept(self) -> IntArray:
-        """Dofs that stay physical beside those of contacts and joins."""
+        """Dofs that stay physical, in addition to those of contacts and joins."""
         near = [np.flatnonzero(f) for name, f in self.forces.items() if name not in self.spread]
         return np.concatenate([self.stay, *near])
 
 
 def asked(model: Model, harmonics: int) -> Asked:
-    """Return what is asked of a model.
+    """Return forces, outputs and watched dofs of a response to a model.
 
     Raises
     ------
     InputError
-        If a place is none, a load is none of the harmonics, or nothing holds a body.
+        If a place is unknown, a load drives a harmonic above the highest one, or a body has no support.
     """
     order, driven = model.engine_order, model.driven
     forces = {name: force_of(model.places, name, load) for name, load in model.loads.items()}
@@ -97,7 +97,7 @@ def _joined(*labels: Labels) -> Labels:
 
 
 def contact_labels(model: Model) -> Labels:
-    """Return names of the motion of contact points, ``point.x`` and so on, of those that are nodes."""
+    """Return labels ``point.x`` and so on for the displacements of contact points that are nodes."""
     pairs, table = model.pairs, model.places.dofs
     known = [(i, dof) for i, row in enumerate(pairs.nodes) for dof in row if dof >= 0]
     names = tuple(f"{pairs.names[i]}.{table.component[dof]}" for i, dof in known)
@@ -110,7 +110,7 @@ def _body_labels(model: Model) -> Labels:
 
 
 def static_forces(model: Model, forces: Mapping[str, Matrix]) -> dict[str, FloatArray]:
-    """Return the static forces (N,) on the dofs of all parts, by the keys that give them."""
+    """Return the static forces (N,) on the dofs of all parts, N, by study key."""
     static = {f"load.{name}": np.real(force) for name, force in forces.items() if model.loads[name].harmonic == 0}
     if model.centrifugal and model.speed > 0:
         static["rotation.speed_rpm"] = centrifugal_of_bodies(model)
@@ -131,6 +131,6 @@ def centrifugal_of_bodies(model: Model) -> FloatArray:
 
 
 def excitation(model: Model) -> float:
-    """Return the amplitude by which responses are divided, N; NaN where nothing vibrates."""
+    """Return the force amplitude by which responses are divided, N; NaN without harmonic loads."""
     driven = [amplitude(model.places, name, load) for name, load in model.loads.items() if load.harmonic > 0]
     return max(driven, default=float("nan")) or float("nan")

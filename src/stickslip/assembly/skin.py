@@ -12,7 +12,7 @@ from stickslip.model.part import Part
 
 
 def skin_of(parts: Mapping[str, Part]) -> Skin | None:
-    """Return the skin of all meshes by their corner nodes; None where no part has one."""
+    """Return the outer surface of all meshes by their corner nodes; None where no part has a mesh."""
     points, triangles, cuts = [], [], []
     count = 0
     for part in parts.values():

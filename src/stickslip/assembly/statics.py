@@ -25,16 +25,16 @@ MOST_DISPLACEMENT = 0.02  # of the largest radius
 def joined_displacements(
     places: Places, at: Coordinates, tied: tuple[Neighbours | None, Ties], loose: IntArray
 ) -> dict[str, Steady]:
-    """Solve the linear statics of all joined parts at rest under the centrifugal load at 1 rad/s.
+    """Return the displacements of joined parts by linear statics under the centrifugal load at 1 rad/s.
 
     Parameters
     ----------
     places, at
-        The parts, and the coordinates that their joins leave.
+        The parts, and their coordinates under the ties of the joins.
     tied
-        How they meet their neighbours on a wheel, None for a single structure; and what joins tie.
+        Cyclic faces between neighbours on a wheel (None for a single structure), and ties of the joins.
     loose
-        Dofs that nothing holds, which stay where they are.
+        Dofs without supports, whose displacement is set to zero.
     """
     parts, (here, _) = places.parts, tied
     free = _free_solids(places, *tied)
@@ -67,18 +67,18 @@ def _free_solids(places: Places, here: Neighbours | None, joins: Ties) -> dict[s
 
 @dataclass(frozen=True)
 class StaticState:
-    """What the centrifugal load does to a model's solids at a speed, by linear statics and without contacts.
+    """Static deformation of a model's solids under the centrifugal load, by linear statics without contacts.
 
     Parameters
     ----------
     speed
-        In rad/s.
+        Rotor speed, rad/s.
     displacement
-        Largest length of a node's displacement in m.
+        Largest displacement of a node, m.
     strain
-        Largest principal strain, as a magnitude, at the middles of the elements.
+        Largest magnitude of a principal strain at the element centres.
     rotation
-        Largest rotation there, in rad.
+        Largest rotation at the element centres, rad.
     radius
         Largest distance of a node from the axis in m.
     """
@@ -101,7 +101,7 @@ class StaticState:
 
 
 def static_state(parts: Mapping[str, Part], displacement: Mapping[str, FloatArray], speed: float) -> StaticState | None:
-    """Return the static state of the parts whose meshes have a displacement (nodes, 3) in m at a speed in rad/s; None of none."""
+    """Return the static state of parts from the displacements (nodes, 3), m, of their meshes at a speed in rad/s; None without any."""
     rows = []
     for name, moved in displacement.items():
         part = parts[name]

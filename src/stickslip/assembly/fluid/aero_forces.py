@@ -32,18 +32,18 @@ TIE = 1e-4  # share by which components of a mode have to differ for the larger 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The aerodynamic force on a model at a speed; `flow_around` in `build` makes it.
+    """Aerodynamic force on a model at a speed; `flow_around` in `build` makes it.
 
     Parameters
     ----------
     model
         The model.
     speed
-        In rad/s.
+        Rotor speed, rad/s.
     influence
-        Coefficients at this speed.
+        Influence coefficients at this speed.
     holds
-        (p,) contact points that hold in the modes of its waves.
+        (p,) contact points that stick in the modes of the waves.
     store
         As in `assemble`.
     """
@@ -55,7 +55,7 @@ class Flow:
     store: Store = in_memory
 
     def patterns(self, wave_number: int) -> Matrix:
-        """Return the (N, m) patterns of force on the dofs of all parts in a wave; waves k and n_s − k have each other's conjugates."""
+        """Return the (N, m) force patterns of a wave on the dofs of all parts; waves k and n_s − k have conjugate patterns."""
         given, sectors = self.given, self.model.sectors
         number = wave_number % sectors
         if given.of_points:
@@ -69,17 +69,17 @@ class Flow:
         return self._remembered(f"{number}", lambda: self._of_wave(number))
 
     def on(self, wave_number: int, patterns: Matrix) -> Feedback:
-        """Return the force on a wave, given its patterns in coordinates of it."""
+        """Return the force on a wave from the force patterns in coordinates of the wave."""
         angle = wave(wave_number, self.model.sectors).phase_angle
         return Feedback(patterns, angle, self.influence, self.given.reference)
 
     def on_structure(self, wave_number: int, moving: Structure) -> Feedback:
-        """Return the force on a wave whose `basis` leads to the dofs of all parts, as that of `Model.at` does."""
+        """Return the force on a wave whose `basis` leads to the dofs of all parts, such as one of `Model.at`."""
         return self.on(wave_number, np.asarray(moving.project(self.patterns(wave_number))))
 
     @property
     def given(self) -> Aerodynamics:
-        """What the model says of them."""
+        """Aerodynamics of the model."""
         assert self.model.aerodynamics is not None
         return self.model.aerodynamics
 
@@ -167,7 +167,7 @@ class Flow:
 
 
 def own_dofs(model: Model) -> IntArray:
-    """Return the dofs of all parts that are the sector's own: all but those that follow the neighbour's, a phase angle ahead."""
+    """Return the sector's own dofs of all parts, without those that follow the neighbour a phase angle ahead."""
     here = model.neighbours
     following = np.zeros(0, dtype=np.int64) if here is None else np.setdiff1d(here.high, here.low)
     return np.setdiff1d(np.arange(model.places.n), following)
@@ -176,7 +176,7 @@ def own_dofs(model: Model) -> IntArray:
 def phases(shapes: Matrix, own: IntArray) -> ComplexArray | FloatArray:
     """Return the (m,) factors that make the largest component of each shape (n, m) on the dofs `own` real and positive.
 
-    Of components that are equally large to `TIE` the first one counts, so that rounding does not choose.
+    Among components that are equal to within `TIE` the first one decides, so that rounding does not.
     """
     sizes = np.abs(shapes[own])
     top = own[(sizes >= (1 - TIE) * sizes.max(axis=0)).argmax(axis=0)]
@@ -185,7 +185,7 @@ def phases(shapes: Matrix, own: IntArray) -> ComplexArray | FloatArray:
 
 
 def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
-    """Return the (m,) largest displacements of nodes of shapes (n, m); dofs of no node are displacements by themselves."""
+    """Return the (m,) largest nodal displacements of shapes (n, m). A dof without a node counts by itself."""
     along = np.isin(np.array(table.component), AXES)
     parts = np.array(table.part) if table.part else np.full(len(table), "")
     squares = np.abs(shapes) ** 2
@@ -201,16 +201,16 @@ def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
 
 
 def about_static_state(system: System, load: HarmonicLoad, fluid: Matrix | None) -> HarmonicLoad:
-    """Return the load with what holds the static state where it is without the fluid: coefficients are those of motion about it.
+    """Return the load with a static force that keeps the static state as it is without the fluid: coefficients describe motion about it.
 
     Parameters
     ----------
     system
-        What vibrates holds the frozen force.
+        System whose matrices include the frozen aerodynamic force.
     load
-        Whose static part leads to the state.
+        Load whose static part leads to the static state.
     fluid
-        (n, n) stiffness that the frozen force takes from the mean; None for none.
+        (n, n) stiffness by which the frozen force changes the mean; None without a fluid.
     """
     if fluid is None:
         return load
@@ -223,7 +223,7 @@ def about_static_state(system: System, load: HarmonicLoad, fluid: Matrix | None)
 
 
 def fluid_of(side: LinearSide) -> Matrix | None:
-    """Return the (n, n) stiffness that the frozen force takes from the mean of one sector; None for none."""
+    """Return the (n, n) stiffness by which the frozen force changes the mean of one sector; None without a fluid."""
     force = side.feedback_of(0)
     return None if force is None else force.stiffness().real
 

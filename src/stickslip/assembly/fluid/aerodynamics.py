@@ -13,31 +13,31 @@ Direction = tuple[float, float, float] | None
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Aerodynamics:
-    """Influence coefficients of a wheel and what they belong to: modes, or points.
+    """Influence coefficients of a wheel, and the modes or points that they refer to.
 
     Parameters
     ----------
     influence
-        The coefficients, of the modes or points in their order.
+        Coefficients, in the order of the modes or points.
     reference
-        ω_r in rad/s: at this frequency the force is exact where matrices stand for it.
+        Reference frequency ω_r, rad/s. Constant matrices represent the force exactly at this frequency.
     modes
         Numbers of the modes, from 1.
     shapes
-        ``wave``: each wave has its own modes; ``blade_alone``: those of a part with the nodes `clamped` and its cyclic faces held, in all
-        waves; ``nodal_diameter``: those of one nodal diameter, in all waves.
+        ``wave``: modes of each wave; ``blade_alone``: modes of a part with the nodes `clamped` and its cyclic faces fixed, in all
+        waves; ``nodal_diameter``: modes of one nodal diameter, in all waves.
     nodal_diameter
-        Whose modes the shapes are; of no meaning for other `shapes`.
+        Nodal diameter of the modes for ``nodal_diameter``; unused otherwise.
     clamped
-        Place that holds the blade where its shapes are those of it alone, ``blade.root``.
+        Node set at which the blade is fixed for ``blade_alone``, such as ``blade.root``.
     largest_displacement
-        That the modes were scaled to, in m: coefficients are in J then; None: to unit mass, coefficients in 1/s².
+        Largest displacement of the scaled modes, m; coefficients are then in J. None: modes of unit mass, coefficients in 1/s².
     over
-        Part on which the largest displacement is looked for; empty: everywhere.
+        Part on which the largest displacement is taken; empty: all parts.
     contacts
-        What contacts do where the modes are those of waves, as in `Model.at`.
+        Contact state of the modes for ``wave``, as in `Model.at`.
     points
-        Name -> place and direction, as in `Load`, where the coefficients belong to points; empty: to modes.
+        Name -> place and direction, as in `Load`, for coefficients that refer to points; empty: they refer to modes.
 
     Raises
     ------
@@ -73,7 +73,7 @@ class Aerodynamics:
             raise input_error("Aerodynamics.modes", f"are {self.modes}", "The lowest is 1.")
 
     def require(self, sectors: int) -> None:
-        """Refuse what does not fit a wheel: a blade that is a neighbour twice, nodal diameters that it does not have."""
+        """Refuse coefficients that do not fit a wheel: a blade that is a neighbour twice, or a nodal diameter out of range."""
         twice = one_twice(self.influence.distances, sectors)
         if twice:
             raise input_error(
@@ -90,5 +90,5 @@ class Aerodynamics:
 
     @property
     def of_points(self) -> bool:
-        """Whether the coefficients belong to points."""
+        """Whether the coefficients refer to points."""
         return bool(self.points)

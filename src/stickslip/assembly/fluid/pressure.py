@@ -40,7 +40,7 @@ class PressureField:
         (n, 3) vector of the area in m² that belongs to each point, normal to the surface; all point out of the body, or all into it.
         None: the pressure is interpolated and integrated on the facets of the structure.
     source
-        Where it comes from, for messages.
+        File or origin of the field, for messages.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class PressureField:
             )
 
     def on(self, places: Places, name: str, place: str) -> "Projected":
-        """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the key that names the surface.
+        """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the study key of the surface.
 
         Raises
         ------
@@ -87,17 +87,17 @@ class Projected:
     Parameters
     ----------
     force
-        (N,) on the dofs of all parts, N; what acts on clamped nodes is in none of them.
+        (N,) forces on the dofs of all parts, N, without the part on clamped nodes.
     before, after
-        (2, 3) force in N and moment about the origin in N m: of the field, and of the forces on all nodes of the surface.
+        (2, 3) resultant force (N) and moment about the origin (N m) of the field, and of the forces on all nodes of the surface.
     clamped
-        (3,) force in N on clamped nodes.
+        (3,) force on clamped nodes, N.
     offset
         Largest distance of a point of the field from the surface, m.
     inward
-        Whether its normals point into the body.
+        Whether the normals of the field point into the body.
     warnings
-        What the user should know.
+        Warnings for the user.
     """
 
     force: ComplexArray
@@ -110,7 +110,7 @@ class Projected:
 
     @property
     def newton(self) -> float:
-        """Magnitude of the whole force, N."""
+        """Magnitude of the resultant force, N."""
         return float(np.linalg.norm(self.after[0]))
 
 
@@ -126,18 +126,18 @@ def _with_facets(spot: Spot, place: str) -> Surface:
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Points of a field on facets.
+    """Projections of the points of a field on facets.
 
     Parameters
     ----------
     facet, reference
-        (n,) facet of each point, and (n, 2) the place on it.
+        (n,) facet of each point, and (n, 2) its local coordinates there.
     offset
-        (n,) distance to it, m.
+        (n,) distance from the facet, m.
     sense
-        1 where the normals of the field point out of the body, -1 into it.
+        1 where the normals of the field point out of the body, -1 where they point into it.
     misfit
-        (n,) distance in m, longer where the facet looks elsewhere.
+        (n,) distance, m, enlarged where the normals of facet and point differ.
     """
 
     facet: IntArray
@@ -278,7 +278,7 @@ def nearest(surface: Surface, points: FloatArray) -> Feet:
 def on_sides(
     surface: Surface, points: FloatArray, area: FloatArray, reach: float, source: str, name: str
 ) -> tuple[Feet, tuple[str, ...]]:
-    """Return the nearest facet that looks as a point's normal does, all normals out of the body or all into it, and warnings.
+    """Return the nearest facet with the normal of each point, all normals out of the body or all into it, and warnings.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def on_sides(
     reach
         Largest distance of a point from its facet, m.
     source, name
-        Of the field, and of the surface, for messages.
+        Names of the field and of the surface, for messages.
 
     Raises
     ------
@@ -349,7 +349,7 @@ def on_sides(
 
 
 def between_sides(surface: Surface, feet: Feet, points: FloatArray, reach: float) -> float:
-    """Return the share of points, each at its nearest facet, that stand more than half as far off as the other side of the body is."""
+    """Return the share of points whose distance from the nearest facet is above half their distance from the other side of the body."""
     middle, _ = facet_balls(surface)
     facing = unit_normals(surface, np.arange(len(surface.facets)), centres(surface.facets))
     unit = -facing[feet.facet]

@@ -17,14 +17,14 @@ SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do
 
 
 def whole(surface: Surface) -> bool:
-    """Whether facets hold all points."""
+    """Whether every point belongs to a facet."""
     return bool(len(surface.facets)) and len(surface.used) == len(surface.points)
 
 
 def with_normals(
     key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Surface:
-    """Return side A with its normals: of its own frames or facets, those that the contact names, or against those of side B."""
+    """Return side A with normals: from its frames or facets, from the contact, or opposite to those of side B."""
     from scipy.spatial import cKDTree
 
     if contact.normal is not None:
@@ -63,7 +63,7 @@ def _named(key: str, normal: tuple[float, float, float], first: Spot, a: Surface
 
 
 def normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
-    """Return the points of a surface whose normals are known, and these: of its own frames or facets."""
+    """Return the points of a surface with normals from its frames or facets, and these normals; None without any."""
     if spot.frame is not None:
         return surface.points, spot.frame[:, :, 2]
     if not len(surface.facets):
@@ -74,7 +74,7 @@ def normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | 
 def direction(
     key: str, contact: Contact, law: ContactLaw, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Any:
-    """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
+    """Return the direction of t: from the contact or from the frames; any direction where the law is the same along t and w."""
     from scipy.spatial import cKDTree
 
     if contact.tangent is not None:
@@ -97,7 +97,7 @@ def direction(
 
 
 def told_apart(law: Any, *, per_area: bool) -> str:
-    """Say in what a law differs along t and w: parameters ``NAME_t`` and ``NAME_w``, by their keys; empty where it does not."""
+    """Return the keys of the parameters ``NAME_t`` and ``NAME_w`` in which a law differs along t and w; empty without a difference."""
     known = {entry.name: entry for entry in fields(law)} if is_dataclass(law) else {}
     said = []
     for name, entry in known.items():

@@ -18,14 +18,14 @@ from stickslip.reduction.contact_coordinates import in_relative_coordinates
 
 @dataclass(frozen=True, eq=False)
 class InGaps:
-    """A structure in coordinates of which each gap is one.
+    """Structure with each gap as a coordinate.
 
     Parameters
     ----------
     structure, gaps
         The structure, and (3 p, n) CSR from its coordinates to the gaps.
     place
-        (n0,) where each coordinate of before is now, -1 where it became part of gaps; None: all are as they were.
+        (n0,) new position of each previous coordinate; -1 where gaps replace it; None: no coordinate changed.
     """
 
     structure: Structure
@@ -33,16 +33,16 @@ class InGaps:
     place: IntArray | None = None
 
     def load(self, force: Matrix) -> Matrix:
-        """Return a load on the coordinates of before as one on those of now."""
+        """Return a load (n0,) on the previous coordinates as one (n,) on the new ones."""
         return force if self.place is None else self.structure.project(force)
 
     def of(self, coordinates: IntArray, key: str) -> IntArray:
-        """Return where coordinates of before are now.
+        """Return the new positions of previous coordinates.
 
         Raises
         ------
         InputError
-            If one became part of a gap; `key` is the key that asks for it.
+            If a gap replaces one of them. `key` is the study key, for the message.
         """
         if self.place is None:
             return coordinates
@@ -57,7 +57,7 @@ class InGaps:
 
 
 def in_gaps(pairs: Pairs, structure: Structure, gaps: Matrix) -> InGaps:
-    """Write a structure in the gaps of its contacts where one of them is rigid and its gaps are no coordinates.
+    """Use the gaps of all contacts as coordinates, if a contact is rigid and its gaps are no coordinates yet.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def in_gaps(pairs: Pairs, structure: Structure, gaps: Matrix) -> InGaps:
 
 
 def are_coordinates(gaps: Matrix, rigid: BoolArray) -> bool:
-    """Whether each gap of the contacts that are `rigid` (p,) is a coordinate of its own, times a factor."""
+    """Whether each gap of the `rigid` contacts (p,) is proportional to a coordinate of its own."""
     entries = np.diff(gaps.indptr)[np.repeat(rigid, 3)]
     columns = gaps[np.repeat(rigid, 3)].indices
     return bool(np.all(entries <= 1) and np.unique(columns).size == columns.size)
@@ -102,7 +102,7 @@ def refuse_mixed_gaps(model: Model, gaps: Matrix) -> None:
 
 
 def held_gaps(model: Model, gaps: Matrix) -> int:
-    """Return how many gaps (3 p, n) rigid contacts hold while they stick."""
+    """Return how many of the gaps (3 p, n) sticking rigid contacts constrain."""
     entries = np.diff(scipy.sparse.csr_array(gaps).indptr)
     return int(np.count_nonzero(entries[np.repeat(_rigid(model.pairs), 3)]))
 
@@ -112,7 +112,7 @@ def _rigid(pairs: Pairs) -> BoolArray:
 
 
 def refuse_rigid(model: Model) -> None:
-    """Refuse rigid contacts that cannot be solved: of free rigid bodies, and single dofs that nothing presses."""
+    """Refuse unsolvable rigid contacts: those of free rigid bodies, and those of single dofs without a normal force."""
     pairs, laws = model.pairs, dict(zip(model.pairs.groups, model.pairs.laws, strict=True))
     for name, law in laws.items():
         if not isinstance(law, Rigid):
@@ -136,21 +136,21 @@ def refuse_rigid(model: Model) -> None:
 
 
 def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequence[str]) -> InGaps:
-    """Write a reduced structure in the rows of its gaps, where that leaves fewer coordinates for contacts to touch.
+    """Use the gaps of a reduced structure as coordinates where contacts then act on fewer coordinates.
 
-    A point on a facet of six nodes touches 18 dofs and has three rows. What the coordinates that stay add to a row is left in the
-    gap operator: a row then is the motion of the other side at that point.
+    A point on a facet of six nodes acts on 18 dofs and has three gaps. The contribution of the coordinates `stay` remains in the gap
+    operator. The new coordinate is then the motion of the other side at that point.
 
     Parameters
     ----------
     structure
-        Of all parts; a sparse one is left as it is.
+        Reduced structure of all parts; a sparse one is returned unchanged.
     gaps
         (3 p, n) CSR rows t, w, n.
     stay
-        Coordinates that stay what they are: outputs, and rigid bodies.
+        Coordinates that must not change: outputs, and rigid bodies.
     names
-        Of the p contact points.
+        Names of the p contact points.
     """
     same = InGaps(structure, gaps)
     fixed = np.isin(np.arange(structure.n), stay).astype(float)

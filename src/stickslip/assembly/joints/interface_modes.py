@@ -18,16 +18,16 @@ KEY = "reduction.interface_modes"
 
 @dataclass(frozen=True, eq=False)
 class OnShapes:
-    """A joined structure in which shapes may stand for the nodes of joined surfaces.
+    """Joined structure whose joined surfaces may move in a few shapes.
 
     Parameters
     ----------
     structure
-        The structure, without its way back.
+        The structure, without `basis`.
     way
-        (n0, n) CSR from its coordinates to those of before; None: they are the same.
+        (n0, n) CSR from the new to the previous coordinates; None: they are the same.
     place
-        (n0,) where each coordinate of before is now, -1 where shapes stand for it.
+        (n0,) new position of each previous coordinate; -1 where shapes replace it.
     """
 
     structure: Structure
@@ -35,32 +35,32 @@ class OnShapes:
     place: IntArray
 
     def columns(self, operator: Matrix) -> Matrix:
-        """Return an operator on the coordinates of before as one on those of now."""
+        """Return an operator (m, n0) on the previous coordinates as one (m, n) on the new ones."""
         return operator if self.way is None else scipy.sparse.csr_array(operator @ self.way)
 
     def load(self, force: Matrix) -> Matrix:
-        """Return a load on the coordinates of before as one on those of now."""
+        """Return a load (n0,) on the previous coordinates as one (n,) on the new ones."""
         return force if self.way is None else np.asarray(self.way.T @ force)
 
 
 def on_shapes(model: Model, structure: Structure, at: Coordinates, needed: IntArray) -> OnShapes:
-    """Reduce what joins tie, where the model asks for it.
+    """Reduce joined surfaces to characteristic shapes, if the model has `interface_modes`.
 
     Parameters
     ----------
     model
-        The model; `Model.interface_modes` says how many shapes.
+        The model; `Model.interface_modes` is the number of shapes.
     structure
         All parts, reduced and joined.
     at
-        Its coordinates.
+        Coordinates of the structure.
     needed
-        Dofs of all parts that stay coordinates: of contacts, loads, outputs and bodies.
+        Dofs of all parts that must stay coordinates, because contacts, loads, outputs or bodies use them.
 
     Raises
     ------
     InputError
-        If nothing is joined but what contacts, loads and outputs need.
+        If no joined dofs are left to reduce.
     """
     same = OnShapes(structure, None, np.arange(structure.n))
     if model.interface_modes is None:

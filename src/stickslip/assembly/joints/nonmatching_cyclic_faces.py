@@ -24,12 +24,12 @@ def unlike_faces(part: Part) -> CyclicSector:
     Parameters
     ----------
     part
-        With a mesh; nodes of its faces are held in all directions or in none.
+        Part with a mesh. Nodes of its faces are clamped in all directions or in none.
 
     Raises
     ------
     InputError
-        If there is no mesh, the faces do not cover each other, a node lies on the axis, or is held in part.
+        If there is no mesh, the faces do not cover each other, or a node lies on the axis or is clamped in some directions.
     """
     check_sectors("part", part.sectors)
     if part.mesh is None:

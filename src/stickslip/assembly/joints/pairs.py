@@ -39,14 +39,14 @@ ROWS = {"tangential": 0, "normal": 2}
 
 @dataclass(frozen=True)
 class Turn:
-    """How the next sector lies to this one.
+    """Rotation from a sector to the next one.
 
     Parameters
     ----------
     sectors
-        Of the wheel.
+        Number of sectors of the wheel.
     axis
-        None where a turn changes no coordinate.
+        Axis of the wheel; None where coordinates do not change from sector to sector.
     """
 
     sectors: int
@@ -60,29 +60,29 @@ class Turn:
         return self.axis.rotation(2 * np.pi / self.sectors)
 
     def points(self, points: FloatArray) -> FloatArray:
-        """Return points (n, 3) of this sector as those of the next."""
+        """Return points (n, 3) of this sector, rotated to the next sector."""
         return points if self.axis is None else self.axis.turned(points, 2 * np.pi / self.sectors)
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Contact points, on N dofs.
+    """Contact points on N dofs of all parts.
 
     Parameters
     ----------
     own, following
-        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, the second for the next sector's dofs in its own axes.
+        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, with u_next the dofs of the next sector in its own axes.
     names, groups
-        Of each point, and the contact that it belongs to.
+        Name of each point, and of its contact.
     laws
-        Of each point, its share of the contact's.
+        Law of each point, its share of the law of the contact.
     position, frame, area
-        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where there is none.
+        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where unknown.
     nodes
-        (p, 3) dofs x, y, z of the node that a point is, of the first side, or of the second where the first is a rigid body; -1
-        where there is none.
+        (p, 3) dofs x, y, z of the node at a point, on the first side, or on the second where the first is a rigid body; -1
+        without a node.
     warnings
-        What the user should know.
+        Warnings for the user.
     """
 
     own: Matrix
@@ -103,16 +103,16 @@ def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | 
     Parameters
     ----------
     places
-        What the names mean.
+        Surfaces and dofs by name.
     contacts
-        By name.
+        Name -> contact.
     turn
-        Of the wheel that the model is a sector of; None for none.
+        Rotation from sector to sector; None where the model is no sector.
 
     Raises
     ------
     InputError
-        Naming the contact and what is wrong with it.
+        If a contact cannot be paired. The message names it and the reason.
     """
     n = places.n
     found = [one_contact(places, name, contact, turn) for name, contact in contacts.items()]
@@ -203,7 +203,7 @@ def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArr
 def sides(
     places: Places, key: str, contact: Contact | Join, turn: Turn | None
 ) -> tuple[Spot, Spot | None, Turn | None]:
-    """Return both sides of a contact or join, None for the ground, and the turn of the second where it is the next sector's."""
+    """Return both sides of a contact or join (None: ground), and the rotation of the second where it belongs to the next sector."""
     one, two = contact.between
     place = f"{key}.between"
     if one.startswith(NEXT) or one == GROUND:
@@ -225,7 +225,7 @@ def sides(
 
 
 def refuse_itself(place: str, first: Spot, second: Spot) -> None:
-    """Refuse two sides that are the same, or single dofs of which one meets itself."""
+    """Refuse two sides that are the same, or that share a single dof."""
     same = first.name == second.name
     met = first.dofs.shape == second.dofs.shape and bool(np.any(first.dofs == second.dofs))
     if same or met:
@@ -279,7 +279,7 @@ def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairin
 
 
 def widened(first: Surface, second: Spot | None, turn: Turn | None) -> tuple[Surface, Surface | None]:
-    """Return both surfaces, the second turned to where the next sector has it, on the dofs of this sector and then of the next."""
+    """Return both surfaces, the second rotated to the next sector, on the dofs of this sector followed by those of the next."""
     if second is None:
         return first, None
     b = second.surface

@@ -14,7 +14,7 @@ from stickslip.errors import InputError, input_error
 
 
 def at_rest(key: str, contact: Contact) -> ContactLaw:
-    """Return the law with the contact's preload and gap in it."""
+    """Return the law with the preload and the gap of the contact."""
     law: Any = contact.law
     if contact.preload == 0.0 and contact.gap == 0.0:
         return contact.law

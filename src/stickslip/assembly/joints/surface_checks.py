@@ -35,9 +35,9 @@ def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | 
     Parameters
     ----------
     key, contact
-        ``contact.NAME``, and what it says.
+        Key ``contact.NAME``, and the contact.
     mine, theirs
-        Points and outward normals of both sides; None where the second has none.
+        Points and outward normals of both sides; None where the second side has no normals.
     """
     if theirs is None or not len(mine[0]):
         return
@@ -54,7 +54,7 @@ def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | 
 
 
 def refuse_without_facets(key: str, contact: Contact, a: Surface, b: Surface) -> None:
-    """Refuse points without facets where the pairing asks for facets, and say what does."""
+    """Refuse points without facets where the pairing needs facets. The message names a pairing that fits."""
     one, two = contact.between
     need = {"node_to_segment": (b,), "segment_to_segment": (a, b)}.get(contact.pairing, ())
     if all(len(side.facets) for side in need):
@@ -70,14 +70,14 @@ def refuse_without_facets(key: str, contact: Contact, a: Surface, b: Surface) ->
 
 
 def with_pairing(error: InputError, contact: Contact, a: Surface, b: Surface) -> InputError:
-    """Return an error of points without partners; of points without facets that meet facets, with the pairing for them."""
+    """Return an error about points without partners. For points that meet facets it names the suitable pairing."""
     if contact.pairing != "node_to_node" or len(a.facets) or not len(b.facets):
         return error
     return input_error(error.place, error.problem, f"{MEET_FACETS}.")
 
 
 def tilt_warning(key: str, contact: Contact, part: str, mine: Normals, theirs: Normals | None) -> tuple[str, ...]:
-    """Warn of a rigid part no point of which lies flat on the other surface; arguments as of `refuse_averted`."""
+    """Warn of a rigid part without a point that lies flat on the other surface; arguments as in `refuse_averted`."""
     if theirs is None or not len(mine[0]):
         return ()
     angle = float(np.min(_from_opposite(mine, theirs)))  # a curved surface is flat on it somewhere
@@ -108,7 +108,7 @@ def _mean(normals: FloatArray) -> str:
 
 
 def overlap_warning(key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]) -> tuple[str, ...]:
-    """Warn of surfaces that as they are placed overlap by more than their facets can be off and the contact says, or nowhere touch."""
+    """Warn of surfaces that overlap by more than facet error and interference explain, or that touch nowhere."""
     sizes = [float(np.median(facet_balls(side)[1])) for side in sides if len(side.facets)]
     worst = int(np.argmin(pairing.initial_gap))
     deep = float(-pairing.initial_gap[worst])
@@ -138,7 +138,7 @@ def _apart(key: str, contact: Contact, gap: float) -> str:
 
 
 def refuse_joined(contacts: Mapping[str, Contact], joins: Mapping[str, Join]) -> None:
-    """Refuse a contact between surfaces that a join ties for good."""
+    """Refuse a contact between surfaces that a join ties."""
     for name, contact in contacts.items():
         for other, tied in joins.items():
             if set(contact.between) == set(tied.between):
@@ -150,7 +150,7 @@ def refuse_joined(contacts: Mapping[str, Contact], joins: Mapping[str, Join]) ->
 
 
 def refuse_held(key: str, operator: Matrix) -> None:
-    """Refuse a contact no point of which can move."""
+    """Refuse a contact in which no point can move."""
     if not operator.nnz:
         raise input_error(
             f"{key}.between",
@@ -160,7 +160,7 @@ def refuse_held(key: str, operator: Matrix) -> None:
 
 
 def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]:
-    """Warn of a contact with normal stiffness of which no point can move along its normal."""
+    """Warn of a contact with normal stiffness in which no point can move along its normal."""
     rigid = isinstance(law, Rigid)
     if abs(operator[2::3]).max() > FLAT or not (rigid or law.stuck_stiffness()[2] > 0):
         return ()
@@ -172,7 +172,7 @@ def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]
 
 
 def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:
-    """Warn of facets at the rim of a surface that its clamped nodes, which readers take out of sets, leave out."""
+    """Warn of facets that a surface lacks at its rim, because readers remove clamped nodes from node sets."""
     mesh, (rim, left) = places.parts[spot.part].mesh, clamped_rim(places, spot)
     if mesh is None or spot.surface is None or not left.size:
         return ()
@@ -191,7 +191,7 @@ def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
     Parameters
     ----------
     found
-        Of each contact its rows (3 p, N), and whether it is one of surfaces.
+        Name of a contact -> its gap rows (3 p, N), and whether it joins surfaces.
     """
     touched: dict[str, frozenset[int]] = {
         name: frozenset(np.unique(scipy.sparse.csr_array(rows).indices).tolist())
@@ -206,7 +206,7 @@ def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
 
 
 def refuse_contacts_of_dofs(places: Places, contacts: Mapping[str, Contact]) -> None:
-    """Refuse contacts of single dofs of matrices that do not say how they act; those of meshes are looked at when they are paired."""
+    """Refuse contacts of single dofs of matrix parts without a direction `acts`; dofs of meshes are checked when they are paired."""
     for name, contact in contacts.items():
         part = places.parts.get(contact.between[0].partition(".")[0])
         if contact.acts is None and part is not None and part.mesh is None and part.body is None:
@@ -215,7 +215,7 @@ def refuse_contacts_of_dofs(places: Places, contacts: Mapping[str, Contact]) -> 
 
 
 def refuse_without_direction(name: str, contact: Contact, first: Spot) -> None:
-    """Refuse a contact of single dofs that does not say what their motion is to it."""
+    """Refuse a contact of single dofs without a direction `acts`."""
     if contact.acts is None and first.surface is None:
         raise input_error(
             f"contact.{name}.acts",
@@ -225,7 +225,7 @@ def refuse_without_direction(name: str, contact: Contact, first: Spot) -> None:
 
 
 def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -> InputError:
-    """Return an error of two surfaces of which one finds no partner, with the set of the second part that lies nearer."""
+    """Return an error about a surface without partners, with the set of the second part that lies nearest."""
     assert second.surface is not None
     part = places.parts[second.part]
     own = _distance(first, second.surface.points)
@@ -254,7 +254,7 @@ def _distance(surface: Surface, points: FloatArray) -> float:
 def named(
     key: str, contact: Contact | Join, pair: Callable[[], Found], surfaces: tuple[Surface, Surface] | None = None
 ) -> Found:
-    """Say of which contact a complaint is, and how far its surfaces lie apart."""
+    """Pair two surfaces; an error names the contact and the distance of its surfaces."""
     from scipy.spatial import cKDTree
 
     try:

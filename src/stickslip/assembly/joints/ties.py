@@ -21,18 +21,18 @@ TINY = 1e-12  # weights of partners below are rounding
 
 @dataclass(frozen=True, eq=False)
 class Ties:
-    """What follows what, on the N dofs of all parts.
+    """Ties between the N dofs of all parts.
 
     Parameters
     ----------
     followers
-        (m,) dofs that follow.
+        (m,) dependent dofs.
     weights
-        (m, N) CSR: each as a sum of dofs that do not follow.
+        (m, N) CSR: each dependent dof as a weighted sum of independent ones.
     low, high
-        Dofs tied from sector to sector: those of this sector's `high` follow `low` of the next.
+        Dofs tied from sector to sector: `high` of this sector follows `low` of the next one.
     onward
-        (high, low) CSR weights of the latter.
+        (high, low) CSR weights of these ties.
     """
 
     followers: IntArray
@@ -42,19 +42,19 @@ class Ties:
     onward: Matrix
 
     def matrix(self, index: IntArray) -> tuple[Matrix, IntArray]:
-        """Return the tie of some of the dofs, and which of them stay.
+        """Return the tie of some of the dofs, and which of them are independent.
 
         Parameters
         ----------
         index
-            (n,) dofs in the order of coordinates, -1 for modal ones; those that a follower needs are among them.
+            (n,) dofs in the order of coordinates, -1 for modal ones. They include all dofs that a dependent one follows.
 
         Returns
         -------
         tie
-            (n, m) CSR from the coordinates that stay to all of `index`.
+            (n, m) CSR from the independent coordinates to all of `index`.
         stays
-            (m,) positions in `index`.
+            (m,) positions of the independent coordinates in `index`.
         """
         follows = np.isin(index, self.followers)
         stays = np.flatnonzero(~follows)
@@ -71,12 +71,12 @@ class Ties:
 
 
 def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> Ties:
-    """Find what the joins of a model tie.
+    """Return the ties of the joins of a model.
 
     Raises
     ------
     InputError
-        Naming the join, if surfaces do not meet, a node follows twice or in a circle, or a follower is clamped.
+        If surfaces do not meet, a node follows twice or in a circle, or a dependent node is clamped. The message names the join.
     """
     n = places.n
     rows: dict[int, Matrix] = {}

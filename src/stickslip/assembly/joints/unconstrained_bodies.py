@@ -26,16 +26,16 @@ STEEP = 1e3  # friction coefficient taken for a law that names none
 
 @dataclass(frozen=True, eq=False)
 class Loose:
-    """A body of a part that nothing of the part itself holds.
+    """Body of a part without supports in the part.
 
     Parameters
     ----------
     part
-        Its name.
+        Name of the part.
     dofs
-        (m,) among those of all parts.
+        (m,) dofs of the body, among those of all parts.
     motions
-        (m, f) its free motions, the largest entry of each one.
+        (m, f) free motions of the body, the largest entry of each being 1.
     """
 
     part: str
@@ -44,12 +44,12 @@ class Loose:
 
 
 def refuse_unheld(model: Model) -> None:
-    """Refuse a model of which a body is free although all contacts stick.
+    """Refuse a model with a body that is free although all contacts stick.
 
     Raises
     ------
     InputError
-        Naming the part and its free motions.
+        If there is such a body. The message names the part and its free motions.
     """
     found = unheld(model, np.ones(len(model.pairs.names), dtype=bool))
     if found:
@@ -57,7 +57,7 @@ def refuse_unheld(model: Model) -> None:
 
 
 def unheld(model: Model, holds: BoolArray) -> list[InputError]:
-    """Return a complaint about each part that is free to move where some contact points (p,) hold and the others are open."""
+    """Return an error for each part that can move freely while the contact points `holds` (p,) stick and the others are open."""
     bodies = _loose(model)
     columns = _columns(bodies)
     free = _free(model, bodies, holds)
@@ -73,12 +73,12 @@ def unheld(model: Model, holds: BoolArray) -> list[InputError]:
 
 
 def held_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that are free at rest, or once all sliders slip, where contact points (p,) are pressed at rest."""
+    """Warn of parts that are free at rest or once all sliders slip; `pressed` (p,) are the contact points pressed at rest."""
     return (*open_warnings(model, pressed), *sliding_warnings(model, pressed))
 
 
 def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that are free to move at rest, where the static loads press some contact points (p,) and the others are open."""
+    """Warn of parts that are free at rest; `pressed` (p,) are the contact points pressed by the static loads, the others are open."""
     if np.all(pressed):
         return ()
     return tuple(
@@ -87,7 +87,7 @@ def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
 
 
 def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that sliders alone hold where contact points (p,) are pressed at rest: once all slip, nothing does."""
+    """Warn of parts that only sliders hold and that are free once all slip; `pressed` (p,) are the contact points pressed at rest."""
     slides = np.array([law_name(law) in SLIDERS for law in model.pairs.laws], dtype=bool)
     if not slides.any():
         return ()
@@ -101,7 +101,7 @@ def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
 
 
 def free_motions(model: Model, holds: BoolArray) -> FloatArray:
-    """Return the (N, f) motions of the dofs of all parts that strain nothing where some contact points (p,) hold."""
+    """Return the (N, f) motions of all dofs without any strain while the contact points `holds` (p,) stick."""
     bodies = _loose(model)
     return _moves(model, bodies) @ _free(model, bodies, holds)
 
@@ -233,7 +233,7 @@ def refuse_pulled(model: Model, static: Mapping[str, FloatArray]) -> None:
     Raises
     ------
     InputError
-        Naming the load that does most work, and the parts that come off.
+        If there is no equilibrium. The message names the load that does most work, and the parts that come off.
     """
     loaded = {key: force for key, force in static.items() if np.any(force)}
     if not loaded:

@@ -33,9 +33,9 @@ def place_of(
     turn
         Angle in rad about `axis`.
     axis
-        Of the turn.
+        Axis of the rotation.
     move
-        In m.
+        Translation, m.
     """
     flip = np.eye(3)
     if mirror is not None:
@@ -55,9 +55,9 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
     Parameters
     ----------
     part
-        What is copied; a copy of a copy is one of the first.
+        Part to copy; a copy of a copy refers to the original.
     place
-        Where the copy stands, relative to `part`.
+        Position of the copy relative to `part`.
     **others
         Further fields of `Part` that differ.
 
@@ -94,7 +94,7 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
 
 
 def placed_body(part: Part, place: Place) -> Part:
-    """Return a rigid part whose body axes are put in `place`: a part of its own, no copy."""
+    """Return a rigid part with its body axes moved to `place`: an independent part, no copy."""
     assert part.body is not None
     surfaces = {name: _moved_points(points, place) for name, points in part.surfaces.items()}
     return rigid_part(part.body.moved(place.turn, place.move), surfaces)

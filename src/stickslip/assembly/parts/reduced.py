@@ -27,18 +27,18 @@ REMEMBERED = 4  # reductions of a part that are kept in memory
 
 @dataclass(frozen=True)
 class Spin:
-    """How a model turns.
+    """Rotation of a model.
 
     Parameters
     ----------
     speed
-        In rad/s.
+        Rotor speed, rad/s.
     tangent, coriolis
         As in `RotatingSolid.at_speed`.
     axis
-        That rigid bodies turn about; solids have their own.
+        Axis of rotation of rigid bodies; solids have their own axis.
     like
-        Speeds in rad/s whose modes those of reductions are to be near to, see `Model.modes_like`; empty: any.
+        Reference speeds of the reduction, rad/s, see `Model.modes_like`; empty: none.
     """
 
     speed: float = 0.0
@@ -49,7 +49,7 @@ class Spin:
 
     @property
     def references(self) -> tuple["Spin", ...]:
-        """How it turns where its modes are known; empty: here."""
+        """Rotations at the reference speeds `like`; empty: the modes are those of this rotation."""
         if self.like in ((), (self.speed,)):
             return ()
         return tuple(replace(self, speed=speed, like=()) for speed in self.like)
@@ -57,16 +57,16 @@ class Spin:
 
 @dataclass(frozen=True, eq=False)
 class Steady:
-    """What the displacement of steady rotation of a part obeys.
+    """Conditions of the displacement of a part in steady rotation.
 
     Parameters
     ----------
     tie
-        That of its cyclic faces; None for none.
+        Tie of the cyclic faces; None without such faces.
     unit
-        (n,) the displacement itself at 1 rad/s in m s², where joined parts share in it; None: that of the part alone.
+        (n,) displacement over the square of the speed, m s², solved together with the joined parts; None: that of the part alone.
     carried
-        (n,) of a part that contacts alone hold: what they have to carry at 1 rad/s, N s²; None where it is held.
+        (n,) force over the square of the speed, N s², that contacts carry where they alone hold the part; None for a supported part.
     """
 
     tie: Matrix | None = None
@@ -85,23 +85,23 @@ ALONE = Steady()
 
 
 def steady_of(part: Part, tie: Matrix | None) -> Steady:
-    """Return what the displacement of steady rotation of a part by itself obeys; of a free one that in balance with its inertia."""
+    """Return the conditions of steady rotation of a part alone; a free part is in balance with its inertia forces."""
     relief = None if part.solid is None else inertia_relief(part.solid, tie)
     return Steady(tie) if relief is None else Steady(tie, *relief)
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedPart:
-    """A part on few coordinates.
+    """Reduced part.
 
     Parameters
     ----------
     structure
-        Kept dofs, then modal coordinates; without the way back unless `with_ways_back` asks for it.
+        Matrices on the kept dofs, followed by modal coordinates; with `basis` only for the store `with_ways_back`.
     kept
-        (k,) dofs of the part that the first coordinates are.
+        (k,) dofs of the part that are the first coordinates.
     steady
-        (n,) static load that leads to the displacement of steady rotation, N; zeros at rest.
+        (n,) static load of steady rotation, N; zeros at rest.
     """
 
     structure: Structure
@@ -110,12 +110,12 @@ class ReducedPart:
 
 
 def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Keep nothing: the store of a model that no study has."""
+    """Compute the arrays without keeping them: the store of a model outside a study."""
     return make()
 
 
 def with_ways_back(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Keep nothing either: the store that asks reductions for their way back to all dofs."""
+    """Compute the arrays without keeping them. Reductions with this store also return their `basis`, the map to all dofs."""
     return make()
 
 
@@ -144,7 +144,7 @@ def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
 
 
 def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:
-    """Return the (n,) load on a part's dofs, at a speed, under which it comes to the displacement of steady rotation."""
+    """Return the (n,) load on a part's dofs that causes the displacement of steady rotation at a speed, N."""
     if part.solid is None or spin.speed == 0.0:
         return np.zeros(part.structure.n)
     load = np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
@@ -152,7 +152,7 @@ def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALO
 
 
 def damped(name: str, part: Part, structure: Structure) -> Structure:
-    """Return a structure of a part with the damping that follows from its matrices."""
+    """Return a structure of a part with the damping from the part's matrices."""
     if part.damping is None:
         return structure
     try:
@@ -163,7 +163,7 @@ def damped(name: str, part: Part, structure: Structure) -> Structure:
 
 
 def whole_nodes(table: Dofs, dofs: IntArray) -> IntArray:
-    """Return the dofs of all nodes of which one dof is among `dofs`, in rising order."""
+    """Return all dofs of the nodes that have a dof among `dofs`, in rising order."""
     numbers = np.unique(table.node[dofs])
     rows = node_rows(table, numbers[numbers >= 0])
     return np.union1d(dofs, rows[rows >= 0])
@@ -181,20 +181,20 @@ def reduced_parts(
     Parameters
     ----------
     parts
-        By name.
+        Name -> part.
     kept
-        Dofs of each part that stay physical.
+        Name -> dofs of the part that stay physical.
     spin
-        At what speed.
+        Rotation of the model.
     rest
-        What the displacements of steady rotation obey.
+        Name -> conditions of the displacement in steady rotation.
     store
-        Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+        Cache of reductions, as in `assemble`.
 
     Raises
     ------
     InputError
-        If a part has fewer dofs than modes are asked of it.
+        If a part has fewer dofs than requested modes.
     SingularError
         If a part is free to move although its kept dofs are fixed.
     """
@@ -251,7 +251,7 @@ def _packed(made: ReducedPart) -> dict[str, Any]:
 
 
 def forget(memo: dict[Any, Any], kind: type, most: int) -> None:
-    """Leave `most` values of a kind in memory: the last ones."""
+    """Drop all but the last `most` values of a kind from memory."""
     for key in [key for key, value in memo.items() if isinstance(value, kind)][:-most]:
         del memo[key]
 
@@ -310,7 +310,7 @@ def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
 
 
 def unpacked(values: Mapping[str, Any], full: Structure, kept: IntArray) -> tuple[Structure, Matrix]:
-    """Return both from the arrays: the table of its dofs and its sets follow from the full structure."""
+    """Return a reduced structure and its load of steady rotation from the arrays of `packed`; dofs and sets follow from `full`."""
     mass, loss = np.asarray(values["mass"]), values.get("loss")
     dofs, sets = (with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size), surviving_sets(full, kept))
     own = mass, values["damping"], values["stiffness"]

@@ -28,18 +28,18 @@ Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s
 
 @dataclass(frozen=True, eq=False)
 class Deviation:
-    """A deviation of sectors.
+    """Deviation of the matrices of sectors from the tuned ones.
 
     Parameters
     ----------
     rows
-        (r, N) CSR on the dofs of all parts: shares of a sector's motion that it acts on.
+        (r, N) CSR on the dofs of all parts: components of a sector's motion on which the deviation acts.
     factors
-        (n_s, r) stiffness that each share has beyond the tuned one; None where shares are many and `change` tells it all.
+        (n_s, r) additional stiffness of each component; None where components are many and `change` alone applies.
     change
-        From the couplings (n_s, r, m) of these rows with all coordinates to what the matrices of the wheel change by.
+        Couplings (n_s, r, m) of these rows with all coordinates -> changes of the matrices of the wheel.
     behind
-        (r, N) CSR: what the motion of the sector before adds to each share; None: nothing.
+        (r, N) CSR contribution of the previous sector to each component; None: no contribution.
     """
 
     rows: Matrix
@@ -54,7 +54,7 @@ def deviations(model: Model) -> list[Deviation]:
     Raises
     ------
     InputError
-        If a name is none, or a part that is to stand in a sector has other dofs.
+        If a name is unknown, or the replacement of a part has other dofs.
     """
     here = model.mistuning
     assert here is not None
@@ -64,18 +64,18 @@ def deviations(model: Model) -> list[Deviation]:
 
 @dataclass(frozen=True, eq=False)
 class Blade:
-    """A blade held where it meets the rest of its part, in its own sector and in those beside it.
+    """Blade, fixed at its boundary with the rest of the part and with the neighbouring sectors.
 
     Parameters
     ----------
     stiffness, mass
-        (b, b) of its own dofs.
+        (b, b) matrices of the blade's own dofs.
     rows
-        (b, N) CSR: the forces on them by the motion of the whole part, on the dofs of all parts.
+        (b, N) CSR from the dofs of all parts to the forces on the blade's own dofs.
     whole
-        Whether it is the whole part, which nothing holds.
+        Whether the blade is the whole part, without a fixed boundary.
     behind
-        (b, N) CSR: the forces on them by the motion of the sector before, whose high face they are; None: no dof lies on a face.
+        (b, N) CSR from the previous sector, whose high face has these dofs, to the same forces; None: no dof lies on a face.
     """
 
     stiffness: Matrix
@@ -86,7 +86,7 @@ class Blade:
 
 
 def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> Blade:
-    """Return the blade that a name ``part`` or ``part.set`` means, `beyond` a radius in m; `place` is the key that has it."""
+    """Return the blade of a name ``part`` or ``part.set``, `beyond` a radius in m; `place` is the study key, for messages."""
     head, _, rest = of.partition(".")
     part = model.places.part_of(head, place)
     structure = at_speed(head, part, model.spin(model.speed), model.steady[head])
@@ -138,7 +138,7 @@ def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> I
 
 
 def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
-    """Return squares (r,) of the circular frequencies and shapes (b, r) of the lowest modes of a blade by itself, rigid ones left out."""
+    """Return squared circular frequencies (r,) and shapes (b, r) of the lowest elastic modes of a blade alone."""
     b = blade.stiffness.shape[0]
     every = int(np.count_nonzero(blade.mass.diagonal()))
     structure = Structure(blade.mass, scipy.sparse.csr_array((b, b)), blade.stiffness, numbered_dofs(b))
@@ -154,7 +154,7 @@ def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
 
 
 def blade_alone_hz(model: Model, of: str, number: int, place: str, beyond: float | None = None) -> FloatArray:
-    """Return the lowest natural frequencies (r,) of a blade by itself in Hz."""
+    """Return the lowest natural frequencies (r,) of a blade alone, Hz."""
     squares, _ = blade_alone(blade_of(model, of, place, beyond), number)
     return np.asarray(np.sqrt(squares) / HZ)
 

@@ -30,17 +30,16 @@ class OverSpeed:
     Parameters
     ----------
     assembled
-        At the highest speed, its system that of the whole line.
+        Model assembled at the highest speed, with the system of the whole engine-order line.
     line
-        What vibrates.
+        Reduced matrices over the speed.
     error
-        Relative difference, in squares of frequencies and in the static load, between the polynomials and the model at a speed in the
-        middle between two of theirs.
+        Relative error of the polynomials in squared frequencies and static load, at speeds midway between their nodes.
     static_force
         (k, p, 3) contact forces under the static loads alone at the speeds of the line, N.
     common
-        Whether what the modes of three speeds span is kept at all speeds, because at some speed one that is left out would take the
-        place of one kept.
+        Whether the reduction keeps the span of the modes of three speeds at all speeds. It does so where a mode outside the basis would
+        replace a kept one at some speed.
     """
 
     assembled: Assembled
@@ -51,7 +50,7 @@ class OverSpeed:
 
 
 def with_engine_order(model: Model, order: int) -> Model:
-    """Return a model whose harmonic loads all have an engine order, each in its own harmonic; of a single structure the model itself."""
+    """Return a model with an engine order for every harmonic load, which keeps its harmonic; a single structure is returned unchanged."""
     if model.sectors == 1:
         return model
     loads = {
@@ -73,22 +72,22 @@ def over_speed(
     Parameters
     ----------
     model
-        Its own speed is of no meaning here.
+        Model; its own speed is not used.
     engine_order
-        Of the frequency of the first harmonic, from 1: of a wheel that of the loads.
+        Engine order of the first harmonic, from 1; on a wheel the engine order of the loads.
     speeds
-        Lowest and highest, rad/s, the lowest above zero.
+        Lowest and highest speed, rad/s, above zero.
     harmonics
         Highest harmonic of the response.
     store
         As in `assemble`.
     tolerance
-        Of the error below which no more speeds are taken; they are 17 at most.
+        Error at which no more speeds are added. At most 17 speeds are taken.
 
     Raises
     ------
     InputError
-        If there is no such engine order, or the model is mistuned or reduced to different coordinates at different speeds.
+        If the engine order is invalid, or the model is mistuned or has different reduced coordinates at different speeds.
     """
     if not 0.0 < speeds[0] < speeds[1]:
         raise input_error("run_up", f"goes from {speeds[0]:g} to {speeds[1]:g} rad/s", "Give growing speeds above 0.")

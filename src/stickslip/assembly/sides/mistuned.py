@@ -55,7 +55,7 @@ RELATIVE = {
 
 
 def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
-    """Return a wheel with all its sectors as solvers see it; see `assemble`."""
+    """Assemble a wheel with all its sectors; see `assemble`."""
     assert model.mistuning is not None
     alike, n = replace(model, mistuning=None), model.sectors
     tuned = assemble_tuned(alike, harmonics, store)
@@ -125,7 +125,7 @@ def _of_sector(name: str, sector: int) -> str:
 
 
 def listed(labels: Sequence[str]) -> str:
-    """Return labels as text; those of three and more sectors in a row as ``tip[0].x to tip[23].x``."""
+    """Return labels as text; three and more consecutive sectors become ``tip[0].x to tip[23].x``."""
     sectors: dict[tuple[str, str], list[int | None]] = {}
     for label in labels:
         head, _, rest = label.partition("[")
@@ -157,20 +157,20 @@ def _peak(what: Asked, model: Model, names: tuple[str, ...]) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class AllSectors:
-    """All sectors of a wheel, reduced.
+    """Reduced wheel with all its sectors.
 
     Parameters
     ----------
     model
-        Of one of them.
+        Model of one sector.
     sector
-        The tuned wheel by all its waves; coordinates of the others mean what those of sector 0 do.
+        Tuned wheel by all its waves. All sectors have the same coordinates.
     side
-        The wheel.
+        Linear part of the wheel.
     gaps
-        (3 p n_s, n) CSR, sector by sector.
+        (3 p n_s, n) CSR gaps from the coordinates, sector by sector.
     fluid
-        (n, n) stiffness that the frozen aerodynamic force takes from the wheel; None for none.
+        (n, n) stiffness by which the frozen aerodynamic force changes the wheel; None without a fluid.
     """
 
     model: Model
@@ -185,20 +185,23 @@ class AllSectors:
         return self.side.n // self.model.sectors
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
-        """Return the coordinates of dofs of the parts in all sectors, sector by sector; `place` is the key that asks."""
+        """Return the coordinates of dofs of the parts in all sectors, sector by sector; `place` is the study key, for messages."""
         at = self.model.coordinates
         own = self.sector.of_dofs(at.of_dofs(dofs, self.model.places.dofs, place), place)
         return np.asarray((np.arange(self.model.sectors)[:, None] * self.size + own).ravel())
 
     def expand(self, q: Matrix) -> Matrix:
-        """Return the (n_s, N) motion of all dofs of each sector, on the axes of sector 0 turned to it, from all coordinates (n,); only with ways back."""
+        """Return the (n_s, N) motion of all dofs of each sector, in the sector's own axes, from all coordinates (n,).
+
+        The wheel must have been reduced with the store `with_ways_back`.
+        """
         n, at = self.model.sectors, self.model.coordinates
         waves = np.fft.fft(q.reshape(n, self.size), axis=0)
         every = [at.untied(self.sector.expand(own, k)) for k, own in enumerate(waves)]
         return np.asarray(np.fft.ifft(np.array(every), axis=0))
 
     def linear(self, order: int) -> Linear:
-        """Return the wheel as the linear side of a model under an engine order."""
+        """Return the wheel as the linear part of a model under an engine order."""
         n = self.model.sectors
 
         def load(force: Matrix, harmonic: int) -> Matrix:
@@ -217,7 +220,7 @@ class AllSectors:
 
 
 def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
-    """Reduce all waves of a wheel, return to its sectors, and add what these differ by."""
+    """Reduce all waves of a wheel, transform them to sectors, and add the deviations of the sectors."""
     kept, _ = physical(model, what.kept)
     changes = deviations(model)
     behind = [c.behind for c in changes if c.behind is not None]
@@ -358,7 +361,7 @@ def _laws(model: Model) -> tuple[ContactLaw, ...]:
 
 
 def changed(law: ContactLaw, key: str, one: ContactMistuning, value: float) -> ContactLaw:
-    """Return the law of a contact point of which a quantity deviates; `key` is that of the deviation."""
+    """Return the law of a contact point with a deviating quantity; `key` is the study key of the deviation."""
     if one.quantity == "gap":
         spot = Contact(between=("", ""), law=law, gap=value)
         try:

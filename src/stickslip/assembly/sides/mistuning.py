@@ -16,7 +16,7 @@ LARGEST = 0.5  # relative deviation of a frequency or a stiffness; beyond, a bla
 
 
 def pattern(sectors: int, distribution: Distribution, standard_deviation: float, seed: int) -> FloatArray:
-    """Return random deviations (n_s,) with a mean of zero in distribution; the same for the same seed.
+    """Return random deviations (n_s,) from a distribution with zero mean; the same for the same seed.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ def pattern(sectors: int, distribution: Distribution, standard_deviation: float,
     distribution
         ``normal``, or ``uniform`` between plus and minus √3 standard deviations.
     standard_deviation
-        Of the distribution.
+        Standard deviation of the distribution.
     seed
-        Any whole number from 0 on.
+        Seed, an integer from 0.
     """
     draw = np.random.default_rng(seed)
     if distribution == "normal":
@@ -40,22 +40,22 @@ def pattern(sectors: int, distribution: Distribution, standard_deviation: float,
 class BladeMistuning:
     """Blades whose natural frequencies differ while their shapes stay.
 
-    The stiffness that changes is that of the blade held where it meets the rest of its part and its neighbours: its static deformation by that rest
-    does not change, and all its frequencies alone change by the deviations.
+    The deviation changes the stiffness of the blade fixed at its boundary with the rest of the part and with its neighbours. The static
+    deformation by that boundary stays the same, and all frequencies of the blade alone change by the deviation.
 
     Parameters
     ----------
     of
         ``part`` or ``part.set``: the dofs of the blade.
     deviations
-        (n_s,) relative deviation of each blade, sector 0 first; (n_s, r) of each of its lowest r modes alone.
+        (n_s,) relative deviation of each blade, sector 0 first; or (n_s, r) of each of its lowest r modes.
     modes
-        None: all that the blade does deforms it (nominal-mode subspace). A number: its lowest modes alone carry the deviation
-        (component-mode subspace).
+        None: the deviation acts on every deformation of the blade (nominal-mode subspace). A number: it acts on so many of its lowest
+        modes (component-mode subspace).
     quantity
-        What deviates: ``frequency`` or ``stiffness``.
+        Deviating quantity: ``frequency`` or ``stiffness``.
     beyond_radius
-        Only what lies farther than that from the axis of rotation, m; None: all of `of`.
+        Smallest distance of the blade's nodes from the axis of rotation, m; None: all nodes of `of`.
     """
 
     of: str
@@ -101,12 +101,12 @@ class ContactMistuning:
     Parameters
     ----------
     contact
-        Name of the model's contact; that of sector n lies in sector n, or between n and n + 1.
+        Name of the model's contact. The contact of sector n lies in sector n, or between n and n + 1.
     quantity
-        ``friction_coefficient``, ``slip_limit``, ``stiffness`` (all of them alike) or ``preload``: of these `values` are relative deviations; ``gap``:
-        `values` are clearances in m, added to what the contact has.
+        ``friction_coefficient``, ``slip_limit``, ``stiffness`` (all stiffnesses alike) or ``preload``: `values` are relative deviations.
+        ``gap``: `values` are clearances in m, added to the clearance of the contact.
     values
-        (n_s,) of each sector.
+        (n_s,) deviation of each sector.
     """
 
     contact: str
@@ -138,16 +138,16 @@ class ContactMistuning:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OwnSector:
-    """A sector with another part: a damaged or a repaired blade.
+    """Sector with a different part, such as a damaged or a repaired blade.
 
     Parameters
     ----------
     sector
-        Its number, from 0.
+        Number of the sector, from 0.
     part
-        Name of the model's part.
+        Name of the replaced part of the model.
     by
-        What stands there instead: a part with the same dofs, such as the same mesh with nodes moved or of another material.
+        Replacement with the same dofs, such as the same mesh with moved nodes or of another material.
     """
 
     sector: int
@@ -157,12 +157,12 @@ class OwnSector:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Mistuning:
-    """How the sectors of a wheel differ.
+    """Differences between the sectors of a wheel.
 
     Parameters
     ----------
     blades, contacts, own
-        By name.
+        Deviating blades, contacts and parts by name.
     """
 
     blades: Mapping[str, BladeMistuning] = field(default_factory=dict)
@@ -171,7 +171,7 @@ class Mistuning:
 
     @property
     def patterns(self) -> dict[str, FloatArray]:
-        """(n_s,) what each sector deviates by, by name; of blades with deviations of several modes one a mode."""
+        """Name -> (n_s,) deviation of each sector; blades with deviations of several modes have one entry for each mode."""
         found: dict[str, FloatArray] = {}
         for name, one in self.blades.items():
             if one.deviations.ndim == 1:
@@ -183,7 +183,7 @@ class Mistuning:
         return found | {name + gap * (one.quantity == "gap"): one.values for name, one in self.contacts.items()}
 
     def require(self, sectors: int) -> None:
-        """Refuse deviations of another number of blades than `sectors`, sectors that are not there, and two parts in one place."""
+        """Refuse deviations of another number of blades than `sectors`, unknown sectors, and two replacements of one part."""
         values = {name: one.deviations for name, one in self.blades.items()}
         values |= {name: one.values for name, one in self.contacts.items()}
         for name, own in values.items():

@@ -18,21 +18,21 @@ def is_staged(joins: Mapping[str, Join]) -> bool:
 
 
 def stages_of(places: Places, joins: Mapping[str, Join], contacts: Collection[str], speed: float) -> Multistage | None:
-    """Return the wheels of a model whose joins couple several; None where none does.
+    """Return the wheels of a model whose joins couple several; None for a model of one wheel.
 
     Parameters
     ----------
     places
-        Of its parts.
+        Dofs and names of the parts.
     joins, contacts
-        Of the model; names of the contacts.
+        Joins of the model, and names of its contacts.
     speed
-        In rad/s; zero where none changes it.
+        Rotor speed, rad/s; zero for models that do not depend on it.
 
     Raises
     ------
     InputError
-        If something else joins or touches the parts, a part is no sector or on no flange, or the flanges do not fit.
+        If the parts have other joins or contacts, a part is no sector or has no flange, or the flanges do not fit.
     """
     if not is_staged(joins):
         return None

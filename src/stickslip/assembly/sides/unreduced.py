@@ -20,7 +20,7 @@ INSTEAD = "take [forced_response], which solves for all dofs"
 
 
 def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
-    """Return a structure whose parts are kept whole as it is where it has too many dofs to be condensed; `gaps` are those of its contacts."""
+    """Return an unreduced structure with too many dofs for condensation as `Unreduced`; `gaps` (3 p, n) are those of its contacts."""
     if structure.is_complex or not scipy.sparse.issparse(structure.stiffness):
         return structure
     interior = structure.n - np.unique(gaps.nonzero()[1]).size
@@ -28,7 +28,7 @@ def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
 
 
 def kept_whole(model: Model) -> int:
-    """Return how many dofs a model not yet assembled keeps because nothing is condensed, about; 0 where something is."""
+    """Return about how many dofs an uncondensed model has, before it is assembled; 0 for a model that is condensed."""
     dofs, interior = _dofs(model)
     return dofs if interior > LARGEST_INTERIOR else 0
 
@@ -48,12 +48,12 @@ def _dofs(model: Model) -> tuple[int, int]:
 
 
 def refuse_rigid(model: Model, side: LinearSide) -> None:
-    """Refuse rigid contacts of a model of which nothing is condensed.
+    """Refuse rigid contacts of an uncondensed model.
 
     Raises
     ------
     InputError
-        That names the contact.
+        If a contact is rigid. The message names it.
     """
     rigid = [n for n, one in model.contacts.items() if isinstance(one.law, Rigid)]
     if rigid and not side.reduced:
@@ -65,12 +65,12 @@ def refuse_rigid(model: Model, side: LinearSide) -> None:
 
 
 def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
-    """Refuse a model of which nothing would be condensed, before it is assembled.
+    """Refuse a model that would not be condensed, before it is assembled.
 
     Raises
     ------
     InputError
-        That names `analysis`, and what to do `instead`.
+        If the model would not be condensed. The message names the `analysis` and the remedy `instead`.
     """
     dofs, interior = _dofs(model)
     if interior <= LARGEST_INTERIOR:
@@ -83,7 +83,7 @@ def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
 
 
 def unreduced_line(model: Assembled) -> tuple[str, ...]:
-    """Return how a model is solved of which nothing is condensed; nothing of others."""
+    """Return a line about the solution of an uncondensed model; nothing for a condensed one."""
     if model.system.structure.reduced:
         return ()
     text = (

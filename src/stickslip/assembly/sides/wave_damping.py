@@ -15,23 +15,23 @@ JOINED = 1e-12  # of the largest entry: what leads from part to part
 
 @dataclass(frozen=True)
 class DampingOfParts:
-    """Damping by modes of parts that nothing but contacts leads between.
+    """Modal damping of parts that are connected by contacts only.
 
     Parameters
     ----------
     parts
-        Name and damping of each part; None: the part has no damping by modes.
+        Name and damping of each part; None: the part has no modal damping.
     """
 
     parts: tuple[tuple[str, Damping | None], ...]
 
     def of_modes(self, moving: Structure) -> Structure:
-        """Return a wave of all parts whose modes are damped as each part says.
+        """Return a wave of all parts with the modal damping of each part.
 
         Raises
         ------
         InputError
-            If something else than contacts leads from part to part.
+            If parts are connected by more than contacts.
         """
         owner = np.array(moving.dofs.part)
         damping = _dense(moving.damping).astype(complex if moving.is_complex else float)

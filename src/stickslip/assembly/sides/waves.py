@@ -50,22 +50,22 @@ def reduced_sector(
     more: Sequence[int] = (),
     flow: Flow | None = None,
 ) -> ReducedSector:
-    """Reduce the waves that an engine order excites, and put the aerodynamic force on them.
+    """Reduce the waves that an engine order excites, and add the aerodynamic force.
 
     Parameters
     ----------
     model
-        Of a sector.
+        Model of a sector.
     order
         Engine order and highest harmonic.
     kept, stay
-        Dofs of all parts that stay physical, and those that have to be coordinates of their own: outputs, rigid bodies.
+        Dofs of all parts that stay physical, and those that must each be a coordinate: outputs, rigid bodies.
     store
         As in `assemble`.
     more
         Further wave numbers.
     flow
-        The aerodynamic force on the model; None for nothing.
+        Aerodynamic force on the model; None without a fluid.
     """
     numbers = sorted({*wave_numbers(model.sectors, *order), *more})
     found = sector_waves(model, numbers, kept, store, flow=flow)
@@ -78,22 +78,22 @@ def reduced_sector(
 
 @dataclass(frozen=True, eq=False)
 class SectorWaves:
-    """Waves of a wheel, reduced.
+    """Reduced waves of a wheel.
 
     Parameters
     ----------
     sector
-        What was reduced.
+        The unreduced sector.
     kept
-        (k,) its dofs that the first coordinates of the waves are.
+        (k,) dofs of the sector that are the first coordinates of the waves.
     waves
-        Wave number -> structure without its way back, and what `reduced_wave` projected on it.
+        Wave number -> structure without `basis`, and the loads that `reduced_wave` projected on it.
     forces
-        Wave number -> aerodynamic force on it, which the structures do not hold; empty: none.
+        Wave number -> aerodynamic force, which the structure does not include; empty without a fluid.
     fields
         Wave number -> (n, l) loads of `Model.spread`.
     bases
-        Wave number -> (n_sector, n) way back to the sector's dofs; None unless `with_ways_back` asks for it.
+        Wave number -> (n_sector, n) map to the sector's dofs; None unless the store is `with_ways_back`.
     """
 
     sector: CyclicSector
@@ -121,12 +121,12 @@ def sector_waves(
     rows: Matrix | None = None,
     flow: Flow | None = None,
 ) -> SectorWaves:
-    """Reduce waves of a sector, all to as many coordinates.
+    """Reduce waves of a sector, all to the same number of coordinates.
 
     Parameters
     ----------
     model
-        Of a sector.
+        Model of a sector.
     numbers
         Wave numbers.
     kept
@@ -134,9 +134,9 @@ def sector_waves(
     store
         As in `assemble`.
     rows
-        (r, N) CSR operator on the dofs of all parts: the loads of its rows stand beside that of steady rotation, one a column.
+        (r, N) CSR operator on the dofs of all parts. Each row adds a load, as a column after that of steady rotation.
     flow
-        The aerodynamic force on the model; None for nothing.
+        Aerodynamic force on the model; None without a fluid.
     """
     at, here = model.coordinates, model.neighbours
     assert here is not None
@@ -307,7 +307,7 @@ def _one_of(ways: Mapping[str, Any]) -> Reduction:
 
 
 def damping_by_modes(parts: Mapping[str, Part], *, reduced: bool) -> Damping | DampingOfParts | None:
-    """Return the damping by modes of the waves of a sector; None for none."""
+    """Return the modal damping of the waves of a sector; None without modal damping."""
     found = [part.damping if part.damping and part.damping.is_modal else None for part in parts.values()]
     for name, own in zip(parts, found, strict=True):
         if own != found[0]:

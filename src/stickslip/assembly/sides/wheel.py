@@ -30,20 +30,20 @@ IN_SPACE = 2  # directions in which a node moves; fewer: coordinates that no tur
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """How the parts of a sector meet those of its neighbours.
+    """Cyclic faces between the parts of neighbouring sectors.
 
     Parameters
     ----------
     turn
         Number of sectors and axis.
     low, high
-        Dofs of all parts: those of `high` follow those of `low`.
+        Dofs of all parts on the low and high faces; `high` follows `low`.
     weights
-        (high, low) CSR as in `CyclicSector`; None: they are partners, in the same order.
+        (high, low) CSR as in `CyclicSector`; None: dofs in the same position are partners.
     ties
-        Part -> tie of its static displacement, which all sectors have alike.
+        Part -> tie of its static displacement, which is the same in all sectors.
     warnings
-        What the user should know.
+        Warnings for the user.
     """
 
     turn: Turn
@@ -54,7 +54,7 @@ class Neighbours:
     warnings: tuple[str, ...]
 
     def sector(self, structure: Structure, at: Coordinates) -> CyclicSector:
-        """Return the sector, given its structure on coordinates that hold all partners or none of a pair."""
+        """Return the cyclic sector of a structure; its coordinates include both partners of a pair of dofs, or neither."""
         untied = np.full(max(int(at.ids.max(initial=-1)), *self.low, *self.high, 0) + 1, -1)
         known = at.stays[at.ids[at.stays] >= 0]
         untied[at.ids[known]] = np.flatnonzero(at.ids[at.stays] >= 0)
@@ -83,7 +83,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
     Raises
     ------
     InputError
-        If parts belong to wheels of different sizes, faces do not match, or sets are not there.
+        If parts have different numbers of sectors, faces do not match, or sets do not exist.
     """
     counts = {name: part.sectors for name, part in parts.items() if part.sectors > 1}
     if not counts:
@@ -109,7 +109,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
 
 
 def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
-    """Return the neighbours with what joins tie from sector to sector."""
+    """Return the cyclic faces together with the ties of joins from sector to sector."""
     if found is None or not ties.high.size:
         return found
     both = (found.low, found.high, found.weights), (ties.low, ties.high, ties.onward)
@@ -154,7 +154,7 @@ def _refuse_others(parts: Mapping[str, Part], counts: Mapping[str, int]) -> None
 
 
 def faces_of(name: str, part: Part) -> CyclicSector | None:
-    """Return the sector that a part is; None where it has no faces."""
+    """Return the cyclic sector of a part; None without cyclic faces."""
     here = [face in part.structure.sets for face in part.faces]
     if not any(here) and part.faces == Part.faces:
         return None
@@ -175,7 +175,7 @@ def _in_space(structure: Structure, members: IntArray) -> bool:
 
 
 def partners(sector: CyclicSector) -> IntArray:
-    """Return each dof of a sector, those of the high face replaced by their partners on the low one; -1 where it follows several."""
+    """Return all dofs of a sector, with those of the high face replaced by their partners on the low face; -1 for several partners."""
     place = np.arange(sector.structure.n)
     high, low, weights = sector.following
     place[high] = -1
@@ -185,14 +185,14 @@ def partners(sector: CyclicSector) -> IntArray:
 
 
 def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
-    """Return the dofs that some dofs of a sector move with, in rising order: themselves, or those of the low face that they follow."""
+    """Return the independent dofs behind `dofs` of a sector, in rising order: the dofs themselves, or their partners on the low face."""
     high, low, weights = sector.following
     followed = weights[np.isin(high, dofs)].nonzero()[1]
     return np.union1d(np.setdiff1d(dofs, high), low[followed])
 
 
 def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix]:
-    """Return the (n, b) matrices from dofs that do not follow to what they move in their own sector, and in the one before it."""
+    """Return (n, b) matrices from independent dofs to the motion in their own sector, and in the previous one."""
     tie = sector.tie[:, np.searchsorted(sector.independent, dofs)]
     high = np.zeros(sector.structure.n)
     high[sector.high] = 1.0
@@ -203,28 +203,28 @@ def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix
 
 @dataclass(frozen=True, eq=False)
 class ReducedSector:
-    """The waves of a wheel, reduced, on coordinates that mean the same to its contacts.
+    """Reduced waves of a wheel, on coordinates with the same gaps in every wave.
 
     Parameters
     ----------
     sector
-        What was reduced.
+        The unreduced sector.
     kept
-        (k,) its dofs that the first coordinates of reduced waves are.
+        (k,) dofs of the sector that are the first coordinates of the reduced waves.
     ways
         Wave number -> (n0, n) from the coordinates to those of the reduced wave.
     waves
-        Wave number -> reduced wave and load of steady rotation, as `reduced_wave` made them.
+        Wave number -> reduced wave and load of steady rotation, from `reduced_wave`.
     wheel
-        The same in these coordinates, without their way back.
+        The waves in the common coordinates, without `basis`.
     gaps
-        (3 p, n) CSR.
+        (3 p, n) CSR gaps from the coordinates.
     steady
-        (n,) load of steady rotation.
+        (n,) load of steady rotation, N.
     fields
-        Wave number -> (n, l) loads of `Model.spread` on its coordinates; empty: there are none.
+        Wave number -> (n, l) loads of `Model.spread` on its coordinates; empty without such loads.
     bases
-        Wave number -> way back, as of `SectorWaves`.
+        Wave number -> map to the sector's dofs, as in `SectorWaves`.
     """
 
     sector: CyclicSector
@@ -238,16 +238,16 @@ class ReducedSector:
     bases: Mapping[int, Matrix] = field(default_factory=dict)
 
     def expand(self, q: Matrix, wave_number: int) -> Matrix:
-        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave of which there is the way back."""
+        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave that has an entry in `bases`."""
         k = wave_number % self.sector.sectors
         return np.asarray(self.bases[k] @ (self.ways[k] @ q))
 
     def field(self, index: int, wave_number: int) -> Matrix:
-        """Return the (n,) load on the coordinates of a wave of one that was projected with it."""
+        """Return the (n,) load number `index` of `fields` on the coordinates of a wave."""
         return np.asarray(self.fields[wave_number % self.sector.sectors][:, index])
 
     def load(self, force: Matrix, wave_number: int) -> Matrix:
-        """Return the (n,) load on the coordinates of a wave of a load (n_sector,) on kept dofs."""
+        """Return a load (n_sector,) on kept dofs as one (n,) on the coordinates of a wave."""
         k = wave_number % self.sector.sectors
         on_wave = self.sector.wave_tie(k).conj().T @ force
         own = np.zeros(self.ways[k].shape[0], dtype=on_wave.dtype)
@@ -255,14 +255,14 @@ class ReducedSector:
         return np.asarray(self.ways[k].conj().T @ own)
 
     def on_wave(self, operator: Matrix, k: int) -> Matrix:
-        """Return an operator (m, n_sector) on kept dofs as one on the coordinates of the reduced wave as it was made."""
+        """Return an operator (m, n_sector) on kept dofs as one (m, n0) on the original coordinates of a reduced wave."""
         moved = scipy.sparse.csr_array(operator @ self.sector.wave_tie(k))
         own = moved[:, np.searchsorted(self.sector.independent, self.kept)].tocoo()
         shape = (own.shape[0], self.waves[k][0].n)
         return scipy.sparse.csr_array((own.data, (own.row, own.col)), shape=shape)
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
-        """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
+        """Return the coordinates of dofs of the sector; `place` is the study key, for messages."""
         here = partners(self.sector)[dofs]
         behind = dofs[here != dofs]
         if behind.size and (place == "output.points" or np.any(here < 0)):
@@ -287,10 +287,10 @@ def reduced_wave(
     steady: Matrix,
     others: Sequence[Matrix] = (),
 ) -> tuple[Structure, Matrix]:
-    """Return a wave, its first coordinates the kept dofs, and the load of steady rotation, or several, on it.
+    """Return a reduced wave, whose first coordinates are the kept dofs, and the loads of steady rotation on it.
 
-    It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are those that its modes at
-    other speeds ask for, see `on_modes_of_others`.
+    `how` has the reduction and the modal damping; None: no reduction, no damping. Modal coordinates follow the modes at the
+    reference speeds, see `on_modes_of_others`.
     """
     moving = _with_way_back(sector, kept, k, how, others)
     load = moving.project(steady)
@@ -341,20 +341,20 @@ def wheel_of(
     pairs: Pairs,
     stay: tuple[IntArray, IntArray],
 ) -> ReducedSector:
-    """Put the waves together, in gaps where these do not depend on each other and no coordinate that has to stay is touched.
+    """Combine reduced waves to a wheel. Gaps become coordinates where they are independent and act on no dof of `stay`.
 
     Parameters
     ----------
     sector, kept
-        What was reduced, and the dofs kept.
+        Unreduced sector, and its kept dofs.
     waves
-        Wave number -> what `reduced_wave` returned.
+        Wave number -> result of `reduced_wave`.
     order
         Engine order and highest harmonic.
     pairs
         Contacts, on the dofs of the sector.
     stay
-        Dofs that have to stay coordinates: outputs, in the phase of this sector, and rigid bodies.
+        Dofs that must stay coordinates: outputs, in the phase of this sector, and rigid bodies.
     """
     place = np.searchsorted(sector.independent, kept)
     shown = picked(stay[0], sector.structure.n)

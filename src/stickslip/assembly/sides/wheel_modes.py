@@ -21,12 +21,12 @@ NO_PLACES = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class WheelModes:
-    """Modes of all sectors together, lowest first; rigid ones are left out.
+    """Elastic modes of all sectors together, lowest first.
 
     Parameters
     ----------
     frequencies_hz
-        (r,).
+        (r,) natural frequencies, Hz.
     sector_share, wave_share
         (r, n_s) share of the kinetic energy in each sector, and in each wave number.
     """
@@ -42,9 +42,9 @@ def wheel_modes(model: Model, number: int, contacts: ContactsAs = "static", stor
     Parameters
     ----------
     model
-        With mistuning; in still fluid.
+        Model with mistuning; the fluid is neglected.
     number
-        How many; the reduced wheel's at most.
+        Number of modes, at most those of the reduced wheel.
     contacts
         As in `holding_points`.
     store
@@ -63,9 +63,9 @@ def wheel_in_flow(model: Model, number: int, contacts: ContactsAs = "static", st
     Parameters
     ----------
     model
-        With mistuning and aerodynamics, whose frozen form counts.
+        Model with mistuning and aerodynamics in its frozen form.
     number
-        How many; their shapes are combinations of half as many more modes in still fluid.
+        Number of modes. Their shapes are combinations of 1.5 times as many modes in still fluid.
     contacts, store
         As in `wheel_modes`.
     """
