@@ -10,24 +10,27 @@ from evidence.figures.timing import LEAST
 
 HEAD = """# The figures of Gastaldi and Berruti
 
-Do the statements of Gastaldi and Berruti about their figures hold for an open case? **{tally}, of {count} statements.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
+For readers of Gastaldi & Berruti {{cite}}`gastaldi2017`, who show the Jacobian Alert on two blades with a damper: which of their statements about their figures hold for an open case of the same kind?
 
-Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make pages NAME=figures` draws the counterparts of their figures for this
-package's own two blades. It judges every statement of the paper about its figures on the case that tests it, and writes numbers, verdicts and reasons.
+- **{tally}, of {count} statements.**
+- **Does not hold**: {failing}. The last column of the table says why.
+- **Undecided**: {undecided}.
+- **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz) are tested on {first}.
+- **Figures 9 to 11** ({mode}, {second_hertz[0]:g} to {second_hertz[1]:g} Hz) are tested on {second}.
+- **Not tested**: figures 2, 3 and 8 are sketches and photographs; the measured curves of figures 9 and 10 belong to the paper's test rig.
+- **What it does not show.** The paper leaves dimensions, masses and damping open. A search chose both cases so that they show part of its findings (`make pages NAME=reconstruction`, {{doc}}`second_damper`). A row that was a goal of this search shows that such a case exists; it is no test of the paper.
 
-- **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz): {first}.
-- **Figures 9 to 11** ({mode}, {second_hertz[0]:g} to {second_hertz[1]:g} Hz): {second}.
+`make pages NAME=figures` draws the figures, judges the statements and writes this page.
+"""
+METHOD = """## How it is judged
 
-Both are on the meshes of these studies. The paper leaves dimensions, masses and damping open. A search chose both cases so that they show part of its findings (`make pages NAME=reconstruction`, {{doc}}`second_damper`). A row that was a goal of this search shows that such a case exists; it is no test of the paper. The alert is the
-published rule (`jacobian_alert`, threshold 5 %), not this package's default, and the harmonics of the repeats are the published five. Time integration is shooting with {steps} steps a period, begun at the balance with five
-harmonics, and plain integration where shooting fails. The paper compares with it at {paper:g}; here it is {in_time}. A motion is given up after {patience} periods there.
+*Holds* and *does not hold* compare the numbers of a row; the reason why a statement does not hold is computed, too. *Not tested*: the case lacks the subject of the statement, and the row says what is missing.
+*Undecided*: the limit lies within the spread of the times, counts and times disagree, or the paper can be read in two ways that differ. A statement that the paper makes twice is one row. Errors in its own arithmetic are in {{doc}}`misprints`.
 
-**How it is judged.** *Holds* and *does not hold* compare the numbers of a row; the reason why a statement does not hold is computed, too. *Not tested*: the case lacks the subject of the statement, and the row says what is missing.
-*Undecided*: the limit lies within the spread of the times, counts and times disagree, or the paper can be read in two ways that differ. Costs are counts, which are the same in every run, and CPU times of one core ({seconds:.0f} s for the
-whole command), medians of {repeats} interleaved repeats with their quartiles, at least {least:.0f} % to either side, since medians of whole runs differ by as much on a busy machine. A statement that the paper makes twice is one row. Errors in its own arithmetic are in {{doc}}`misprints`.
-
-Numbers for two blades at the same ratio differ from page to page. Here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost`
-and {{doc}}`strategies` give theirs.
+- **Cases.** Both are on the meshes of their studies. The alert is the published rule (`jacobian_alert`, threshold 5 %), not this package's default, and the harmonics of the repeats are the published five.
+- **Time integration** is shooting with {steps} steps a period, begun at the balance with five harmonics, and plain integration where shooting fails. The paper compares with it at {paper:g}; here it is {in_time}. A motion is given up after {patience} periods there.
+- **Costs** are counts, which are the same in every run, and CPU times of one core ({seconds:.0f} s for the whole command), medians of {repeats} interleaved repeats with their quartiles, at least {least:.0f} % to either side, since medians of whole runs differ by as much on a busy machine.
+- **Other pages.** Numbers for two blades at the same ratio differ from page to page. Here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost` and {{doc}}`strategies` give theirs.
 """
 
 CAPTIONS = (
@@ -85,25 +88,27 @@ def page(evidence: Evidence, rows: Sequence[Statement], cases: tuple[str, str], 
         CPU time of the command.
     """
     plan, second = evidence.plan, evidence.second_plan
-    head = HEAD.format(
-        first=cases[0],
-        second=cases[1],
-        hertz=plan.hertz,
-        second_hertz=second.hertz,
-        mode=second.mode,
-        steps=STEPS,
-        patience=PATIENCE,
-        seconds=seconds,
-        repeats=plan.repeats,
-        least=100 * LEAST,
-        few=plan.timing_frequencies,
-        timing=plan.timing_hertz,
-        paper=plan.time_ratios[0],
-        in_time=which(evidence),
-        tally=tally(rows),
-        count=len(rows),
-    )
-    parts = [head, "## Statements\n", table(rows), "## Figures\n"]
+    words = {
+        "first": cases[0],
+        "second": cases[1],
+        "hertz": plan.hertz,
+        "second_hertz": second.hertz,
+        "mode": second.mode,
+        "steps": STEPS,
+        "patience": PATIENCE,
+        "seconds": seconds,
+        "repeats": plan.repeats,
+        "least": 100 * LEAST,
+        "few": plan.timing_frequencies,
+        "timing": plan.timing_hertz,
+        "paper": plan.time_ratios[0],
+        "in_time": which(evidence),
+        "tally": tally(rows),
+        "count": len(rows),
+        "failing": _named(rows, "does not hold"),
+        "undecided": _named(rows, "undecided"),
+    }
+    parts = [HEAD.format(**words), "## Statements\n", table(rows), METHOD.format(**words), "## Figures\n"]
     parts += [f"![{text.split('.')[0]}](images/{name}.png)\n\n{text}\n" for name, text in CAPTIONS]
     parts += ["## What was not found\n", lost(evidence)]
     return "\n".join(parts)
@@ -118,6 +123,11 @@ def table(rows: Sequence[Statement]) -> str:
         cells = (name, row.place, row.claim, row.number, row.own, verdict, why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _named(rows: Sequence[Statement], verdict: str) -> str:
+    """Return the numbers of the statements with a verdict."""
+    return ", ".join(name for name, row in numbered(rows) if row.verdict == verdict) or "none"
 
 
 def lost(evidence: Evidence) -> str:
