@@ -1,4 +1,4 @@
-"""The three doors of the documentation: what they show runs as it stands, on models that are made small."""
+"""The three pages to start from: what they show runs as it stands, on models that are made small."""
 
 import re
 import shutil
