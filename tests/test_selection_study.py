@@ -332,9 +332,10 @@ def test_what_cannot_be_is_refused_with_a_remedy(base: Study, name: str) -> None
     ("harmonics", "message"),
     [
         ({"low": [3]}, "load.shaker.harmonic: 1 is not kept by harmonics.low = [3]. Add it there, or leave that out."),
+        ({"high": [3, 5]}, "load.shaker.harmonic: 1 is not kept by harmonics.high = [3, 5]. Add it there."),
         ({"alert_over": ["tip1.x", "L1.9.x"]}, "'L1.9.x'"),
     ],
-    ids=["force left out", "no such label"],
+    ids=["force left out", "force left out of all", "no such label"],
 )
 def test_what_does_not_fit_the_model_is_refused_with_a_remedy(
     base: Study, harmonics: dict[str, object], message: str
