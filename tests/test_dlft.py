@@ -13,8 +13,7 @@ from evidence.models.rigid_beams import rubbing_beams
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
-from stickslip.contact.rigid import weighted_products
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb, weighted_products
 from stickslip.errors import InputError
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dlft import dynamic_lagrangian

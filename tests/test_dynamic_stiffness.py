@@ -16,8 +16,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.harmonic_set import harmonics_of
-from stickslip.harmonic.spectral import ModeTerms, Poles
-from stickslip.harmonic.state_space import StateSpace
+from stickslip.harmonic.spectral import ModeTerms, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
 from stickslip.harmonic.travelling import LARGE, condensed_once
 from stickslip.model.matrices import lumped

@@ -8,8 +8,7 @@ import numpy as np
 
 from evidence.validation.compare import Record, bound, digits, record
 from stickslip.arrays import ComplexArray
-from stickslip.contact.compiled import compile_contacts
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator, compile_contacts
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex

@@ -9,8 +9,7 @@ import numpy as np
 from evidence.judges.planar_contact import Contact, judged
 from evidence.validation.compare import Record, bound, record
 from stickslip.arrays import FloatArray
-from stickslip.contact.compiled import compile_contacts
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator, compile_contacts
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 

@@ -13,7 +13,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store
 from stickslip.column import column
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.response.equilibrium import pressed_by
 from stickslip.response.parameter import Discretisation

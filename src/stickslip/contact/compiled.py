@@ -1,16 +1,22 @@
-"""Contact laws as arrays, the input of the evaluators."""
+"""Contact laws as arrays, the input of the evaluators, and the names of these."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.element import element
-from stickslip.contact.evaluators import Evaluator, check_evaluator
 from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear, PlanarFriction
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
+
+Evaluator = Literal["intervals", "march", "events"]
+
+
+def check_evaluator(evaluator: str) -> None:
+    """Refuse an unknown evaluator."""
+    check_choice("evaluator", evaluator, get_args(Evaluator), "'events' has no sampling error.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.cache import njit
-from stickslip.contact.compiled import CompiledContacts, checked_weights, compile_contacts
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import CompiledContacts, Evaluator, checked_weights, compile_contacts
 from stickslip.contact.law import PAIRS, ContactLaw, Rigid, softened
 from stickslip.errors import input_error
 

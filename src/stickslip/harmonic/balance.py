@@ -9,8 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
-from stickslip.contact.compiled import CompiledContacts
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import CompiledContacts, Evaluator
 from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.errors import check_choice, input_error

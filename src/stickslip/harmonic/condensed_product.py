@@ -16,8 +16,7 @@ from stickslip.contact.interface import SparseRows
 from stickslip.harmonic.factors import with_contacts
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.harmonic_set import Harmonics, real_rows
-from stickslip.harmonic.spectral import Blocks, Interior
-from stickslip.harmonic.state_space import StateSpace
+from stickslip.harmonic.spectral import Blocks, Interior, StateSpace
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
 Lossy = tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]  # products with K, C, M and structural damping

@@ -12,13 +12,12 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.contact.compiled import CompiledContacts, compile_contacts
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
 from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.contact.intervals import prefix_sums
 from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS, Rigid
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.rigid import RigidPeriod, project
+from stickslip.contact.laws.rigid_coulomb import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, check_retained, harmonic_balance

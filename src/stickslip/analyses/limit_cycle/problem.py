@@ -17,7 +17,7 @@ from stickslip.analyses.vibrating import (
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.parameter import Discretisation

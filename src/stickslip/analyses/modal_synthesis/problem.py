@@ -22,7 +22,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import REACH

@@ -20,7 +20,7 @@ from stickslip.analyses.vibrating import (
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation

@@ -16,7 +16,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.contact.initial_sliders import starts_of
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.judging import REACH

@@ -14,7 +14,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import judging_set

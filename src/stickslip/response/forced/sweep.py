@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.evaluators import Evaluator, check_evaluator
+from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of, multiples
 from stickslip.harmonic.selection import strategy_named

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.contact.interface import add_contact_jacobian
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from stickslip.contact.evaluators import Evaluator
+from stickslip.contact.compiled import Evaluator
 from stickslip.response.forced.sweep import Rescue
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.aero import AeroTable
