@@ -1,1 +1,1 @@
-"""All motions of a load: table, problem, records, verdicts."""
+"""All motions under a load: table, problem, records, verdicts."""

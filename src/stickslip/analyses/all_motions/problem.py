@@ -30,13 +30,13 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled; its first output is the one whose amplitude is told.
+        The assembled model; amplitudes are those of the first output.
     search
-        How.
+        Options of the search.
     facts
-        What the result says of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -46,12 +46,12 @@ class Question:
 
     @property
     def problem(self) -> ForcedProblem:
-        """What is solved."""
+        """The problem of the sweep."""
         return search_problem(self.model.system, self.model.load, self.search)
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves; whatever can be refused is, before anything long is computed.
+    """Return the problem of a job; raise all refusals before any long computation.
 
     Raises
     ------

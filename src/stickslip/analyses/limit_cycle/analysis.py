@@ -1,4 +1,4 @@
-"""Motions that nothing drives: unstable waves that friction bounds, where it does, and whether the machine stays there."""
+"""Limit cycles: unstable waves bounded by friction, and the stability of the resulting motion."""
 
 from functools import partial
 

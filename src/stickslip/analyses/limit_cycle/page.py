@@ -1,4 +1,4 @@
-"""Limit cycles: damping and frequency over the amplitude, stability, and the wave that wins in time."""
+"""Limit cycles on the page: damping and frequency over the amplitude, stability, and the dominant wave in time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Cycles(Node):
 
     @cached_property
     def found(self) -> LimitCycles:
-        """What was found."""
+        """The record of the case."""
         known: LimitCycles = record_of(LimitCycles, self.data)
         return known
 
@@ -61,7 +61,7 @@ def _with_cycles(branch: CycleBranch, motions: FloatArray, at_cycles: Sequence[f
 
 
 def damping(view: Cycles) -> Plot | None:
-    """Show the damping that each amplitude has; limit cycles are its zeros."""
+    """Draw damping over amplitude; limit cycles are its zeros."""
     found = view.found
     if not found.branches:
         return None
@@ -73,7 +73,7 @@ def damping(view: Cycles) -> Plot | None:
 
 
 def frequencies(view: Cycles) -> Plot | None:
-    """Show the frequency of the motions."""
+    """Draw the frequency of the motions over amplitude."""
     found = view.found
     if not found.branches:
         return None
@@ -89,7 +89,7 @@ def frequencies(view: Cycles) -> Plot | None:
 
 
 def waves_in_time(view: Cycles) -> Plot | None:
-    """Show what becomes of all unstable waves together."""
+    """Draw the amplitudes of all waves in time after a mixed start of all unstable waves."""
     time, amplitude = view.found.time, view.found.wave_amplitude
     if time is None or amplitude is None or not amplitude.size:
         return None
@@ -120,7 +120,7 @@ def waves_in_time(view: Cycles) -> Plot | None:
 
 
 def cycle_table(view: Cycles) -> Table | Words:
-    """Return the limit cycles, and the modes that have none."""
+    """Return a table of limit cycles, and of modes without any."""
     found = view.found
     if not found.branches:
         told = f"No mode that was looked at grows with contacts stuck: the least damping ratio is {number(100 * found.least_damping)} %."
@@ -226,7 +226,7 @@ def _caption(found: LimitCycles) -> str:
 
 
 def linear_table(view: Cycles) -> Table | None:
-    """Return the damping of all modes that were looked at, contacts stuck."""
+    """Return a table of frequency and damping of the modes with contacts stuck."""
     waves, hertz, ratio = view.found.linear_wave, view.found.linear_frequency_hz, view.found.linear_damping_ratio
     if waves is None or hertz is None or ratio is None:
         return None

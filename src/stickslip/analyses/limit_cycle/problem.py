@@ -1,4 +1,4 @@
-"""The problem of a job: the model, the waves and modes asked for, and the unstable ones."""
+"""The problem of a job: model, waves, modes, and the choice of unstable ones."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,17 +35,17 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled, without harmonic loads, a wheel with all its waves; the first output is the one whose amplitude is given.
+        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes are those of the first output.
     asked
-        The table.
+        The table [limit_cycle].
     evaluator
-        Of the contact forces.
+        Evaluator of the contact forces.
     in_time
-        Whether motions in time are compared.
+        Whether limit cycles are compared with time integration.
     facts
-        What results say of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -57,7 +57,7 @@ class Question:
 
     @property
     def waves(self) -> tuple[int, ...]:
-        """Wave numbers that are looked at; one of `NO_WAVE` for a single structure."""
+        """Wave numbers to examine; only `NO_WAVE` for a single structure."""
         if self.model.system.structure.wheel is None:
             return (NO_WAVE,)
         if self.asked.wave_numbers is not None:
@@ -65,14 +65,14 @@ class Question:
         return tuple(range(self.model.sectors))
 
     def modes(self, wave: int) -> list[StuckMode]:
-        """Return the modes of a wave that are looked at."""
+        """Return the modes of a wave to examine, with contacts stuck."""
         blades = self.model.blades
         every = MODES if blades is None else MODES * blades.sectors
         count = max([every, *(self.asked.modes or [])])
         return modes_of(self.model, count, wave)
 
     def followed(self, modes: list[StuckMode]) -> list[StuckMode]:
-        """Return those of some modes of a wave whose amplitude is followed: those that are named, or that grow."""
+        """Return the modes to follow over amplitude: the requested ones, or else the unstable ones."""
         if self.asked.modes is not None:
             return [m for m in modes if m.number in self.asked.modes]
         named = self.asked.wave_numbers is not None and not any(m.unstable for m in modes)
@@ -80,17 +80,17 @@ class Question:
 
     @property
     def discretisation(self) -> Discretisation:
-        """Of the curve over the amplitude."""
+        """Discretisation of the curve over amplitude."""
         return represented(self.asked.harmonics, self.evaluator)
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves.
+    """Return the problem of a job.
 
     Raises
     ------
     InputError
-        If a wave number is none of the wheel, or the model cannot be assembled.
+        If the wheel lacks a wave number, or the model cannot be assembled.
     """
     asked: LimitCycleTable = case.settings.limit_cycle
     refuse_waves("limit_cycle", asked.wave_numbers, model)

@@ -1,4 +1,4 @@
-"""What is found of limit cycles: a branch for each mode of each wave, its cycles, and all of a case."""
+"""Records of limit cycles: a branch for each mode of each wave, its cycles, and the record of a case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,8 +21,8 @@ class Cycle:
     Attributes
     ----------
     coefficients
-        (harmonics + 1, n, 2) amplitudes of all coordinates, real and imaginary, m. A job keeps them; a result holds those that other
-        programs need.
+        (harmonics + 1, n, 2) amplitudes of all coordinates, real and imaginary, m. A job keeps them; a result holds retained coordinates
+        and outputs.
     """
 
     amplitude: float = column("m", "its amplitude")
@@ -44,13 +44,13 @@ class Cycle:
 
     @property
     def attracting(self) -> bool:
-        """Whether motions of its own wave come to it."""
+        """Whether neighbouring motions of the same wave approach it."""
         return self.slope > 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CycleBranch:
-    """A mode of a wave: its damping over the amplitude, and its limit cycles."""
+    """A mode of a wave: damping over amplitude, and its limit cycles."""
 
     wave_number: int = column("1", "wave number of the modes followed; -1 for a single structure")
     nodal_diameter: int = column("1", "its nodal diameters; -1 for a single structure", default=NO_WAVE)
@@ -79,13 +79,13 @@ class CycleBranch:
 
     @property
     def unbounded(self) -> bool:
-        """Whether the mode grows at every amplitude that was looked at."""
+        """Whether the mode grows at every amplitude examined."""
         return self.ratio < 0.0 and not self.largest_damping_ratio > 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LimitCycles(KeptMotions):
-    """All that is found of a case."""
+    """Record of a case."""
 
     output: str = column("1", "output whose amplitude is given", default="")
     linear_wave: IntArray | None = column(
@@ -116,12 +116,12 @@ class LimitCycles(KeptMotions):
 
     @property
     def least_damping(self) -> float:
-        """The least damping ratio of the modes that were looked at, contacts stuck."""
+        """Smallest damping ratio of the modes examined, contacts stuck."""
         return float("nan") if self.linear_damping_ratio is None else float(np.nanmin(self.linear_damping_ratio))
 
 
 def answer(solved: Solved) -> LimitCycles:
-    """Return what the job of a case has found, from its branches and its notes."""
+    """Return the record of a case from the branches and notes of its job."""
     notes, model = solved.notes, solved.notes.get("model", {})
     branches: Sequence[CycleBranch] = solved.records
     found: dict[str, Any] = {"output": str(model.get("output", ""))}

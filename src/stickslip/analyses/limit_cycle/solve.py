@@ -1,4 +1,4 @@
-"""Solves one mode of one wave: its damping over the amplitude, its limit cycles, and their stability."""
+"""Solution for one mode of one wave: damping over amplitude, limit cycles, and their stability."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -34,7 +34,7 @@ MODEL, LINEAR, COORDINATES = "model", "linear", "coordinates"  # names of notes
 
 
 def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iterator[CycleBranch]:
-    """Yield what is found of each mode that is followed and not done."""
+    """Yield the branches of unfinished modes."""
     modes = {wave: question.modes(wave) for wave in question.waves}
     notes.put(MODEL, dict(question.facts) | {"output": question.model.output_labels[0]})
     notes.put(LINEAR, _linear(modes))
@@ -60,7 +60,7 @@ def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iter
 
 
 def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
-    """Return what is found of a mode."""
+    """Return the branch of a mode."""
     system = as_wave(question.model.system, wave)
     try:
         problem = self_excited_motions(system, question.model.load, mode, coordinate(system), question.discretisation)

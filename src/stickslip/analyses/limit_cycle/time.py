@@ -1,4 +1,4 @@
-"""Motions in time beside limit cycles: whether a stable one is kept, and which of several unstable waves wins."""
+"""Time integration of limit cycles: whether a stable cycle is kept, and which of several unstable waves dominates."""
 
 import json
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ SHARE = 0.3  # of the attracting cycle of each wave, with which waves begin that
 
 
 def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
-    """Return amplitude (m) and frequency (rad/s) that time integration goes to from beside each attracting cycle; NaN of others."""
+    """Return amplitude (m) and frequency (rad/s) reached by time integration from a start near each attracting cycle; NaN for the others."""
     amplitude, omega = np.full((2, len(branch.cycles)), np.nan)
     said = ""
     for i, cycle in enumerate(branch.cycles):
@@ -63,7 +63,7 @@ def _unconfirmed(cycle: Cycle, marched: Marched) -> str:
 
 
 def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
-    """Return what becomes of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
+    """Return the result of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
     there = [b for b in branches if b.wave_number != NO_WAVE and (b.ratio < 0.0 or b.attracting)]
     own = {"waves": np.array([b.wave_number for b in there], dtype=np.int64)}
     nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}
@@ -116,12 +116,12 @@ def _beginnings(question: Question, branches: Sequence[CycleBranch]) -> list[tup
 
 
 def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
-    """Return what is marched, and the peak output of each sector.
+    """Return the model for time integration, and the peak output of each sector.
 
     Raises
     ------
     InputError
-        If it is too large.
+        If the model is too large.
     """
     side = system.structure
     at = coordinate(system)

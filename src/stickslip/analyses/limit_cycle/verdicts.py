@@ -16,7 +16,7 @@ MORE = "Raise limit_cycle.most_harmonics."
 
 
 def case_verdicts(label: str, found: LimitCycles) -> list[Verdict]:
-    """Return what is to be thought of a case."""
+    """Return the verdicts on a case."""
     if found.linear_damping_ratio is None:
         return []
     if not found.branches:
@@ -145,7 +145,7 @@ def _of_time(label: str, what: str, cycle: Cycle) -> list[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the limit cycles of each case."""
+    """Return the terminal tables: the limit cycles of each case."""
     return tuple(table for case, head in told_apart(data) for table in _tables(record_of(LimitCycles, case), head))
 
 
@@ -182,5 +182,5 @@ def _tables(found: LimitCycles, head: str) -> list[TextTable]:
 
 
 def grows(cycle: Cycle) -> str:
-    """Return which wave grows beside an unstable cycle, to be put behind that word."""
+    """Return the wave that grows at an unstable cycle, as a text behind that word."""
     return f", wave {cycle.growing_wave}" if cycle.growing_wave >= 0 and cycle.stability == "unstable" else ""

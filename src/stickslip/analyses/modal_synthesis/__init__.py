@@ -1,1 +1,1 @@
-"""Forced responses of one nonlinear mode: the rooms of the analysis `modal_synthesis`."""
+"""Forced responses from one nonlinear mode: table, problem, records, verdicts."""

@@ -43,15 +43,15 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled; the first output is the one whose amplitude is told.
+        The assembled model; amplitudes are those of the first output.
     asked
-        The table.
+        The table [modal_synthesis].
     evaluator
-        Of the contact forces.
+        Evaluator of the contact forces.
     facts
-        What results say of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -62,33 +62,33 @@ class Question:
 
     @property
     def dof(self) -> int:
-        """The coordinate of the first output."""
+        """Coordinate of the first output."""
         return coordinate(self.model.system)
 
     @property
     def rest(self) -> HarmonicLoad:
-        """The static load alone."""
+        """The static loads alone."""
         return HarmonicLoad(self.model.load.static)
 
     @property
     def mode(self) -> StuckMode | None:
-        """The mode that answers; None where there is no such mode."""
+        """The mode of the synthesis; None if it does not exist."""
         every = modes_of(self.model, self.asked.mode)
         return next((m for m in every if m.number == self.asked.mode), None)
 
     @property
     def discretisation(self) -> Discretisation:
-        """Of the nonlinear mode, with the fewest harmonics."""
+        """Discretisation of the nonlinear mode with the fewest harmonics."""
         return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:
-        """Over which amplitudes the nonlinear mode is followed."""
+        """Range and number of amplitudes of the nonlinear mode."""
         return sweep_of(self.asked)
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves.
+    """Return the problem of a job.
 
     Raises
     ------

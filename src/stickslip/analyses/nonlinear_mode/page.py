@@ -33,13 +33,13 @@ class Modes(Node):
 
     @cached_property
     def found(self) -> NonlinearModes:
-        """What was found."""
+        """The record of the case."""
         known: NonlinearModes = record_of(NonlinearModes, self.data)
         return known
 
 
 def frequencies(view: Modes) -> Plot | None:
-    """Show the frequency over the amplitude."""
+    """Draw the frequency over the amplitude."""
     figure = _over_amplitude(view, [branch.frequency_hz for branch in view.found.branches])
     if figure is None:
         return None
@@ -49,7 +49,7 @@ def frequencies(view: Modes) -> Plot | None:
 
 
 def damping(view: Modes) -> Plot | None:
-    """Show the damping ratio over the amplitude."""
+    """Draw the damping ratio over the amplitude."""
     ratios = [branch.damping_ratio for branch in view.found.branches]
     figure = _over_amplitude(view, [100.0 * ratio for ratio in ratios])
     if figure is None:
@@ -61,7 +61,7 @@ def damping(view: Modes) -> Plot | None:
 
 
 def energies(view: Modes) -> list[Plot]:
-    """Show frequency and damping ratio over the energy."""
+    """Draw frequency and damping ratio over the energy."""
     found, branches = [], view.found.branches
     for own, title, key, caption in (
         ([b.frequency_hz for b in branches], "frequency (Hz)", "energy", _ENERGY),
@@ -81,7 +81,7 @@ def energies(view: Modes) -> list[Plot]:
 
 
 def table(view: Modes) -> Table:
-    """Return the modes: where they begin, how much they damp, how they end."""
+    """Return a table of the modes: start, largest damping, and reason of the end."""
     head = [
         "mode",
         "Hz, stuck",
@@ -111,7 +111,7 @@ def _row(branch: ModeBranch) -> list[str]:
 
 
 def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
-    """Draw backbones over frequency responses: the peaks lie on them as long as the modes stand alone."""
+    """Draw backbones over frequency responses; peaks lie on them as long as no other mode takes part."""
     modes, response = nodes.get(NAME), nodes.get("forced_response")
     if not isinstance(modes, Modes) or not isinstance(response, Response):
         return None

@@ -38,17 +38,17 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled, without harmonic loads, a wheel with all its waves; the first output is the one whose amplitude is told.
+        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes are those of the first output.
     asked
-        The table.
+        The table [nonlinear_mode].
     waves
-        Wave numbers that are looked at; one of `NO_WAVE` for a single structure.
+        Wave numbers to examine; only `NO_WAVE` for a single structure.
     evaluator
-        Of the contact forces.
+        Evaluator of the contact forces.
     facts
-        What results say of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -59,29 +59,29 @@ class Question:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def followed(self, wave: int) -> list[StuckMode]:
-        """Return the modes of a wave that are followed."""
+        """Return the modes of a wave to follow."""
         every = modes_of(self.model, max(self.asked.modes), wave)
         return [m for m in every if m.number in self.asked.modes]
 
     @property
     def dof(self) -> int:
-        """The coordinate of the first output."""
+        """Coordinate of the first output."""
         return coordinate(self.model.system)
 
     @property
     def discretisation(self) -> Discretisation:
-        """With the fewest harmonics."""
+        """Discretisation with the fewest harmonics."""
         return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:
-        """Over which amplitudes."""
+        """Range and number of amplitudes."""
         asked = self.asked
         return replace(sweep_of(asked), to_gross_slip=asked.to_gross_slip, concept=asked.concept)
 
 
 def sweep_of(asked: NonlinearModeTable | ModalSynthesisTable) -> ModeSweep:
-    """Return over which amplitudes a table follows a nonlinear mode."""
+    """Return range and number of amplitudes of a nonlinear mode from its table."""
     given = asked.amplitude_mm
     return ModeSweep(
         span=None if given is None else (1e-3 * given[0], 1e-3 * given[1]),
@@ -92,12 +92,12 @@ def sweep_of(asked: NonlinearModeTable | ModalSynthesisTable) -> ModeSweep:
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves.
+    """Return the problem of a job.
 
     Raises
     ------
     InputError
-        If a wave number is none of the wheel, a mode is none of a wave, a contact is rigid, no contact slips or opens and there are no amplitudes, or the model
+        If a wave number or mode is unknown, a contact is rigid, no contact slips or opens and there are no amplitudes, or the model
         cannot be assembled.
     """
     asked: NonlinearModeTable = case.settings.nonlinear_mode

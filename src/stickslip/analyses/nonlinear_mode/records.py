@@ -1,4 +1,4 @@
-"""Journal records of nonlinear modes, the modes made of them, and all of a case."""
+"""Journal records of nonlinear modes, the modes assembled from them, and the record of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,28 +29,28 @@ def _nothing() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ModeRecord:
-    """What was found in one solve on the way along a nonlinear mode, or how the mode ended.
+    """Result of one solve along a nonlinear mode, or the end of the mode.
 
     Parameters
     ----------
     wave_number, mode
-        -1 for a single structure; from 1, by frequency with contacts stuck.
+        Wave number, -1 for a single structure; number of the mode from 1, by frequency with contacts stuck.
     kind
-        As of `stickslip.response.continuation.branch.Followed`, or ``end``.
+        As in `stickslip.response.continuation.branch.Followed`, or ``end``.
     index, level, seconds, bound
-        As of `Followed`, and of its judgement.
+        As in `Followed` and its judgement.
     x, p, tangent, step, orientation, bend
-        Of its point, with all digits: an interrupted run goes on from them.
+        State of the continuation at the point with all digits; an interrupted run continues from it.
     status, iterations, residual_norm
-        How the solver ended.
+        Outcome of the solver.
     amplitude, omega, ratio, modal_amplitude, energy, slipping, open_for, change
-        Of the motion, as of `ModePoint`; NaN of what is no point of the mode.
+        Properties of the motion as in `ModePoint`; NaN if it is no point of the mode.
     motion
-        (order + 1, n, 2) displacement of all coordinates, real and imaginary, m; empty of what is no point of the mode.
+        (order + 1, n, 2) displacement of all coordinates, real and imaginary, m; empty if it is no point of the mode.
     order
         Highest harmonic.
     mode_omega, mode_ratio, tolerance, end, problem
-        Of the end, as of `ModeBranch`.
+        Properties of the end, as in `ModeBranch`.
     """
 
     wave_number: int
@@ -87,7 +87,7 @@ class ModeRecord:
 
     @property
     def followed(self) -> Followed:
-        """What was found, as it was on the way."""
+        """The point as the continuation stored it."""
         kind: Kind = self.kind  # type: ignore[assignment]  # any but that of the end
         solution = Solution(self.x, self.status, self.iterations, self.residual_norm, 0.0, 0.0)
         point = Point(self.x, self.p, self.tangent, self.step, solution, self.orientation, bend=self.bend)
@@ -95,7 +95,7 @@ class ModeRecord:
 
 
 def mode_record(wave_number: int, mode: StuckMode, way: ModeWay, found: Followed) -> ModeRecord:
-    """Return what is kept of what was found on the way along a mode of a wave."""
+    """Return the journal record of a point along a mode of a wave."""
     point, solution = found.point, found.point.solution
     return ModeRecord(
         wave_number,
@@ -139,13 +139,13 @@ def _motion(way: ModeWay, found: Followed) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModeBranch:
-    """A nonlinear mode of a wave; along its points NaN where none was found.
+    """A nonlinear mode of a wave; NaN at points without a solution.
 
     Attributes
     ----------
     motions
-        (points, harmonics, n, 2) displacement of all coordinates, real and imaginary, m; NaN where none was found. A result holds those
-        that other programs need.
+        (points, harmonics, n, 2) displacement of all coordinates, real and imaginary, m; NaN without a solution. A result holds retained
+        coordinates and outputs.
     """
 
     wave_number: int = column("1", "wave number of the modes; -1 for a single structure")
@@ -190,13 +190,13 @@ class ModeBranch:
 
     @property
     def known(self) -> BoolArray:
-        """Which entries along its points are points: in a result shorter modes are filled up."""
+        """Mask of the valid points; results pad shorter modes."""
         return np.asarray(self.status >= 0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearModes(KeptMotions):
-    """All that is found of a case."""
+    """Record of a case."""
 
     output: str = column("1", "output whose amplitude is told", default="")
     branches: tuple[ModeBranch, ...] = rows("branch")
@@ -213,7 +213,7 @@ class NonlinearModes(KeptMotions):
 
 
 def answer(solved: Solved) -> NonlinearModes:
-    """Return what the job of a case has found, from its records and its notes."""
+    """Return the record of a case from the records and notes of its job."""
     notes, model = solved.notes, solved.notes.get("model", {})
     output = str(model.get("output", ""))
     branches = branches_of(solved.records, int(model.get("sectors", 1)))
@@ -225,7 +225,7 @@ def answer(solved: Solved) -> NonlinearModes:
 
 
 def branches_of(records: Sequence[ModeRecord], sectors: int) -> tuple[ModeBranch, ...]:
-    """Return the modes whose ends are among the records."""
+    """Return the finished modes, whose ends are among the records."""
     ways = [list(group) for _, group in groupby(records, lambda r: (r.wave_number, r.mode))]
     return tuple(_branch(way, last, sectors) for *way, last in ways if last.kind == END)
 

@@ -1,4 +1,4 @@
-"""Follows the modes of each wave."""
+"""Solution for the modes of each wave."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,7 +15,7 @@ from stickslip.units import HZ
 
 
 def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Iterator[ModeRecord]:
-    """Yield what is found on the way along each mode, and its end, of that what is not done."""
+    """Yield the missing points of each mode, and its end."""
     notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
     known = known_coordinates(question.model)
     notes.put("coordinates", known | {"concept": question.asked.concept})
@@ -33,7 +33,7 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
 
 
 def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]) -> Iterator[ModeRecord]:
-    """Yield what is found along a mode and not done, and its end."""
+    """Yield the missing points of one mode, and its end."""
     end, problem = "", ""
     every = [r.followed for r in done]
     try:

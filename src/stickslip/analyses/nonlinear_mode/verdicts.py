@@ -18,7 +18,7 @@ LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
 
 
 def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
-    """Return what is to be thought of a case."""
+    """Return the verdicts on a case."""
     each = [_of_branch(label, branch) for branch in found.branches]
     sound = [b for b, own in zip(found.branches, each, strict=True) if all(v.level == "trusted" for v in own)]
     verdicts = [v for own in each for v in own]
@@ -101,7 +101,7 @@ def _of_harmonics(label: str, branch: ModeBranch) -> list[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the modes of each case."""
+    """Return the terminal tables: the modes of each case."""
     every = ((record_of(NonlinearModes, case), head) for case, head in told_apart(data))
     return tuple(_table(found, head) for found, head in every if found.branches)
 

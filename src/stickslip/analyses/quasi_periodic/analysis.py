@@ -1,4 +1,4 @@
-"""Motions with two frequencies: two loads, or a forced motion and a second tone that grows by itself."""
+"""Motions with two frequencies: two loads, or a forced motion and a self-excited second tone."""
 
 from functools import partial
 

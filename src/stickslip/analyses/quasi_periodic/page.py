@@ -1,4 +1,4 @@
-"""Motions with two frequencies: envelopes, and the combined frequencies that they are made of."""
+"""Motions with two frequencies on the page: envelopes, and their combined frequencies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,23 +27,23 @@ class TwoTonesView(Node):
 
     @cached_property
     def found(self) -> QuasiPeriodic:
-        """What was found."""
+        """The record of the case."""
         known: QuasiPeriodic = record_of(QuasiPeriodic, self.data)
         return known
 
     @property
     def name(self) -> str:
-        """Of the output that is drawn."""
+        """Label of the output shown."""
         return str(self.found.output_name[0])
 
     @property
     def there(self) -> list[TwoFrequencies]:
-        """The motions that were found, with a second frequency."""
+        """The motions found that have a second frequency."""
         return [point for point in self.found.points if np.isfinite(point.second)]
 
     @property
     def drawn(self) -> list[TwoFrequencies]:
-        """Some of them, evenly taken."""
+        """An even selection of them."""
         there = self.there
         few = np.unique(np.linspace(0, len(there) - 1, min(SHOWN, len(there))).round().astype(int))
         return [there[i] for i in few] if there else []
@@ -60,7 +60,7 @@ def _known(every: Sequence[FloatArray]) -> FloatArray:
 
 
 def envelopes(view: TwoTonesView) -> Plot | None:
-    """Show how far the amplitude goes up and down over the first frequency."""
+    """Draw largest and smallest amplitude over the first frequency."""
     points = view.found.points
     if len(points) < 2:
         return None
@@ -90,7 +90,7 @@ def envelopes(view: TwoTonesView) -> Plot | None:
 
 
 def over_phase(view: TwoTonesView) -> Plot | None:
-    """Show the amplitude over the phase of the second frequency."""
+    """Draw the amplitude over the phase of the second frequency."""
     if not view.drawn:
         return None
     figure = go.Figure()
@@ -115,7 +115,7 @@ def over_phase(view: TwoTonesView) -> Plot | None:
 
 
 def combined(view: TwoTonesView) -> Plot | None:
-    """Show the amplitudes of the combined frequencies."""
+    """Draw the amplitudes of the combined frequencies."""
     if not view.drawn:
         return None
     figure = go.Figure()
@@ -144,7 +144,7 @@ def combined(view: TwoTonesView) -> Plot | None:
 
 
 def motions(view: TwoTonesView) -> Table:
-    """Return a row a motion."""
+    """Return a table with one row a motion."""
     points = view.found.points
     timed = any(point.time_largest is not None for point in points)
     head = [

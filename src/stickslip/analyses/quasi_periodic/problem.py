@@ -1,4 +1,4 @@
-"""The problem of a job: the model, its loads sorted by frequency, and where a second tone may begin."""
+"""The problem of a job: model, loads sorted by frequency, and candidates for a second tone."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,19 +38,20 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled, a wheel with all its waves; the first output is the one that is drawn.
+        The assembled model; a wheel has all its waves. The first output is the one shown.
     asked
-        The table.
+        The table [quasi_periodic].
     first, second
-        Loads of either frequency; the static one is that of `first`.
+        Loads of either frequency; the static load belongs to `first`.
     second_of
-        Frequency of the second loads: rad/s, or None and a ratio; both None: nothing acts with it.
+        Frequency of the second loads, rad/s, or None and its ratio to the first; both None for a self-excited tone.
     waves
-        Engine orders of the first and second loads of a tuned wheel; None: a single structure. The second is that of a tone where nothing acts.
+        Engine orders of the first and second loads of a tuned wheel; None for a single structure. For a self-excited tone the second is its
+        wave.
     facts
-        What results say of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -64,24 +65,24 @@ class Question:
 
     @property
     def driven(self) -> bool:
-        """Whether the second frequency is that of a load."""
+        """Whether a load has the second frequency."""
         return self.second_of != (None, None)
 
     @property
     def in_time(self) -> bool:
-        """Whether motions are compared with time integration: as asked, or where that is soon done."""
+        """Whether motions are compared with time integration: as requested, or if that is short."""
         if self.asked.in_time is not None:
             return self.asked.in_time
         each = MARCHED * seconds_in_time(self.model.system)
         return self.waves is None and len(self.asked.first_hz) * each < SOON
 
     def second_frequency(self, omega: float) -> float:
-        """Return the frequency of the second loads beside a first one, rad/s."""
+        """Return the frequency of the second loads for a first frequency, rad/s."""
         own, ratio = self.second_of
         return own if own is not None else (ratio or 1.0) * omega
 
     def problem(self) -> TwoTones:
-        """Return what is solved, with the fewest harmonics."""
+        """Return the problem with the fewest harmonics."""
         return two_tones(
             self.model.system,
             self.first,
@@ -92,7 +93,7 @@ class Question:
         )
 
     def growing(self) -> list[tuple[int, StuckMode]]:
-        """Return the modes that grow with contacts stuck, with their wave numbers (0 for a single structure), the fastest first."""
+        """Return the unstable modes with contacts stuck and their wave numbers (0 for a single structure), the fastest growing first."""
         side, chosen = self.model.system.structure, self.asked.second_wave
         waves: Sequence[int] = [0]
         if side.wheel is not None:
@@ -102,7 +103,7 @@ class Question:
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves.
+    """Return the problem of a job.
 
     Raises
     ------
@@ -224,5 +225,5 @@ def _of(assembled: Assembled, loads: Mapping[str, Load], keys: Mapping[str, int]
 
 
 def hertz(omega: float) -> str:
-    """Write a frequency."""
+    """Write a frequency in Hz."""
     return f"{omega / HZ:.5g} Hz"

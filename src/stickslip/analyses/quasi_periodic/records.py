@@ -1,4 +1,4 @@
-"""Motions with two frequencies: one at each first frequency, and all of a case."""
+"""Records of motions with two frequencies: one for each first frequency, and the record of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -17,12 +17,12 @@ NOT_FOUND = "not found"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TwoFrequencies:
-    """A motion with two frequencies, or why there is none; NaN of what was not found or not asked for.
+    """A motion with two frequencies, or the reason why there is none; NaN for values not found or not requested.
 
     Attributes
     ----------
     unknowns
-        (K, n_retained, 2) real and imaginary part of the retained coordinates, where the next one begins, m.
+        (K, n_retained, 2) real and imaginary part of the retained coordinates, m; the next motion starts from them.
     """
 
     first: float = column("Hz", "first frequency", "first_hz", per=HZ)
@@ -65,13 +65,13 @@ class TwoFrequencies:
 
     @property
     def solved(self) -> bool:
-        """Whether there is a motion."""
+        """Whether a motion was found."""
         return self.kind != NOT_FOUND
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class QuasiPeriodic:
-    """All that is found of a case."""
+    """Record of a case."""
 
     output_name: Any = column("1", "output", along="output", default=None)
     accuracy: float | None = column("1", "accuracy that is asked for, of the same measure as left_out", default=None)
@@ -79,7 +79,7 @@ class QuasiPeriodic:
 
 
 def answer(solved: Solved) -> QuasiPeriodic:
-    """Return what the job of a case has found, from its motions and its notes."""
+    """Return the record of a case from the motions and notes of its job."""
     model = solved.notes.get("model", {})
     return QuasiPeriodic(
         output_name=np.array([str(name) for name in np.atleast_1d(model.get("output", []))], dtype=str),

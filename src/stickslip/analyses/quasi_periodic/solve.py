@@ -1,4 +1,4 @@
-"""Solves one first frequency after the other, each begun from the motion before."""
+"""Solution for one first frequency after the other; each starts from the motion before."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ FAILED = (StickslipError, FloatingPointError, np.linalg.LinAlgError)
 
 
 def solve(question: Question, done: Sequence[TwoFrequencies], notes: Notes) -> Iterator[TwoFrequencies]:
-    """Yield the motions that are not done."""
+    """Yield the missing motions."""
     own = {"output": list(question.model.output_labels)}
     asked = {"accuracy": 0.01 * question.asked.accuracy_percent}
     notes.put("model", dict(question.facts) | own | asked)
@@ -44,7 +44,7 @@ def solve(question: Question, done: Sequence[TwoFrequencies], notes: Notes) -> I
 
 
 def at_frequency(question: Question, omega: float, before: TwoFrequencies | None) -> TwoFrequencies:
-    """Return the motion at a first frequency, rad/s; `before`: one at another, to begin from."""
+    """Return the motion at a first frequency, rad/s; `before` is the motion at another one, the initial guess."""
     try:
         problem, motion, kind, why, unknown = _found(question, omega, before)
         if motion is None or not motion.converged:

@@ -1,4 +1,4 @@
-"""Time integration beside motions with two frequencies."""
+"""Time integration of motions with two frequencies."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ LONG = 20  # such repetitions at most
 def compared(
     question: Question, problem: TwoTones, motion: TorusMotion, kind: str
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Return largest and least amplitude (outputs,) in time, and the difference of two loads from the balance; None for one tone alone."""
+    """Return largest and smallest amplitude (outputs,) in time, and the difference from the balance (NaN for a self-excited tone); None for one tone."""
     if kind == "two loads":
         return _two_loads(question, problem, motion)
     if kind != "second tone":

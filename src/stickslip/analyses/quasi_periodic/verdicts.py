@@ -17,7 +17,7 @@ SLIP = 5e-3  # rad a turn, the same
 
 
 def case_verdicts(label: str, case: QuasiPeriodic) -> list[Verdict]:
-    """Return what is to be thought of a case."""
+    """Return the verdicts on a case."""
     asked = LARGE if case.accuracy is None else case.accuracy
     found = [v for point in case.points for v in _of_point(label, point, asked)]
     if case.points and not found:
@@ -94,7 +94,7 @@ def _unexamined(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the motions of each case."""
+    """Return the terminal tables: the motions of each case."""
     every = ((record_of(QuasiPeriodic, case), head) for case, head in told_apart(data))
     return tuple(_table(found, head) for found, head in every if found.points)
 

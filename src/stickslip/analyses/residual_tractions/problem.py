@@ -38,17 +38,17 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     model
-        Assembled; the first output is the one whose amplitude is bounded.
+        The assembled model; bounds are those of the first output.
     asked
-        The table.
+        The table [residual_tractions].
     evaluator
-        Of the contact forces.
+        Evaluator of the contact forces.
     excitation
         Amplitude of the harmonic force, N; NaN for none.
     facts
-        What results say of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -60,23 +60,23 @@ class Question:
 
     @property
     def omegas(self) -> FloatArray:
-        """Frequencies at which bounds are computed, rad/s."""
+        """Frequencies of the bounds, rad/s."""
         first, last = self.asked.frequency_hz
         return np.asarray(HZ * np.linspace(first, last, self.asked.points))
 
     @property
     def discretisation(self) -> Discretisation:
-        """Of the motions."""
+        """Discretisation of the motions."""
         return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def search(self) -> TractionSearch:
-        """How hard extremes are looked for."""
+        """Effort of the search for extremes."""
         return TractionSearch(starts=self.asked.starts, seed=self.asked.seed)
 
 
 def cost_of(model: Model, asked: ResidualTractionsTable) -> Estimate:
-    """Return what a case is estimated to cost."""
+    """Return the estimated cost of a case."""
     first, last = asked.frequency_hz
     sweep = Sweep(
         omega_range=(HZ * first, HZ * last),
@@ -95,7 +95,7 @@ def cost_of(model: Model, asked: ResidualTractionsTable) -> Estimate:
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves.
+    """Return the problem of a job.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The problem of a job of the resonances, picklable."""
+"""The problem of a job of resonance peaks, picklable."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -32,18 +32,18 @@ FACTORS = get_args(LoadName)  # on loads, which are no keys
 
 @dataclass(frozen=True, eq=False)
 class OfKey:
-    """The system of each value of a key; what a resonance takes as its parameter.
+    """The system as a function of a study key, for use as the parameter of a resonance.
 
     Parameters
     ----------
     at
-        Makes the model.
+        Function that makes the model.
     key
         The key.
     harmonics
-        For which there are to be matrices.
+        Highest harmonic of the matrices.
     store
-        Keeps what is expensive.
+        Cache for expensive parts of the model.
     """
 
     at: Callable[[str, float], Model]
@@ -52,7 +52,7 @@ class OfKey:
     store: Store
 
     def __call__(self, value: float) -> tuple[System, HarmonicLoad]:
-        """Return system and load, the output whose peak counts first."""
+        """Return system and load, with the output of the peak first."""
         model = peak_first(assemble(self.at(self.key, value), self.harmonics, self.store))
         return model.system, model.load
 
@@ -64,17 +64,17 @@ class Question:
     Parameters
     ----------
     label
-        Of the case.
+        Label of the case.
     asked
-        The table.
+        The table [resonance].
     search
-        What is followed.
+        Search of the peaks.
     output
         Name of the output.
     facts
-        What the result says of the model.
+        Facts about the model for the result.
     warnings
-        Of the model.
+        Warnings of the model.
     """
 
     label: str
@@ -86,12 +86,12 @@ class Question:
 
 
 def more_than(harmonics: int) -> int:
-    """Return the highest harmonic of what the highest peak is held against: all of its judging set are below."""
+    """Return the highest harmonic of the reference for the highest peak; it covers the peak's judging set."""
     return judging_set(range(harmonics + 1))[-1]
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves; whatever can be refused is, before anything long is computed.
+    """Return the problem of a job; raise all refusals before any long computation.
 
     Raises
     ------

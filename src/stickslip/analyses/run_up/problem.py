@@ -39,36 +39,36 @@ class RunUpPoint(ForcedPoint):
     Attributes
     ----------
     engine_order
-        Whose it is; the speed is the frequency over it.
+        Engine order of the point; the speed is the frequency divided by it.
     """
 
     engine_order: int = 0
 
 
 def of_order(point: ForcedPoint, engine_order: int) -> RunUpPoint:
-    """Return a point of a forced response as one along an engine order."""
+    """Return a point of a forced response as a point along an engine order."""
     own = {f.name: getattr(point, f.name) for f in fields(ForcedPoint)}
     return RunUpPoint(**own, engine_order=engine_order)
 
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """One engine order.
+    """The response along one engine order.
 
     Parameters
     ----------
     model
-        Its system is that of all speeds.
+        The assembled model, whose system covers all speeds.
     sweep
         How the response is computed.
     error
-        Of the polynomials between speeds, see `OverSpeed`.
+        Error of the polynomials between speeds, see `OverSpeed`.
     static_force
         (k, p, 3) static contact forces at the speeds of the line, N.
     coriolis
         Whether Coriolis forces are in the damping.
     common
-        Whether modes of several speeds are kept at all, see `OverSpeed`.
+        Whether modes of several speeds are retained, see `OverSpeed`.
     """
 
     model: Assembled
@@ -80,26 +80,26 @@ class Along:
 
     @property
     def line(self) -> SpeedLine:
-        """What vibrates."""
+        """The linear side along the engine order."""
         return cast("SpeedLine", self.model.system.structure)
 
     @property
     def order(self) -> int:
-        """The engine order of the first harmonic."""
+        """Engine order of the first harmonic."""
         return self.line.engine_order
 
     @property
     def wave_number(self) -> int:
-        """Of the first harmonic; 0 for a single structure."""
+        """Wave number of the first harmonic; 0 for a single structure."""
         return excited_wave(self.order, self.model.sectors)
 
     @cached_property
     def problem(self) -> ForcedProblem:
-        """What is solved."""
+        """The problem of the sweep."""
         return forced_problem(self.model.system, self.model.load, self.sweep)
 
     def frequencies(self, speeds: FloatArray, n_modes: int, stuck: bool) -> FloatArray:
-        """Return (s, n_modes) natural frequencies in Hz, contacts open or all stuck; NaN where there are not as many."""
+        """Return (s, n_modes) natural frequencies, Hz, with contacts open or all stuck; NaN for missing modes."""
         system = self.model.system
         found = np.full((len(speeds), n_modes), np.nan)
         for i, speed in enumerate(speeds):
@@ -130,17 +130,17 @@ class Question:
     Parameters
     ----------
     label
-        Of the case; empty for a study without [vary].
+        Label of the case; empty for a study without [vary].
     lines
-        One an engine order.
+        One response for each engine order.
     modes
-        Natural frequencies shown.
+        Number of natural frequencies shown.
     rates
-        Of fast run-ups, rpm/s.
+        Rates of fast run-ups, rpm/s.
     limit
-        Change that more harmonics may make before there is a warning, a fraction.
+        Change by more harmonics above which there is a warning, a fraction.
     facts
-        What the result says of the model.
+        Facts about the model for the result.
     """
 
     label: str
@@ -156,7 +156,7 @@ class Question:
 
 
 def question_of(case: Case, model: Model) -> Question:
-    """Return what a job solves; whatever can be refused is, before anything long is computed."""
+    """Return the problem of a job; raise all refusals before any long computation."""
     settings = case.settings
     table: RunUpTable = settings.run_up
     lines = []
