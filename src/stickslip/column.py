@@ -1,4 +1,4 @@
-"""What a field of a record says of itself: unit, meaning, and the dimensions under which a result stores it.
+"""Description of a record's field: unit, meaning, and the dimensions under which a result stores it.
 
 A record is a dataclass that a solver yields or an analysis answers with. `stickslip.analyses.columns` makes the variables of a result
 from records, and records from the variables.
@@ -10,20 +10,20 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Column:
-    """How a field is stored.
+    """How a field is stored in a result.
 
     Parameters
     ----------
     unit
-        Of the stored variable, such as ``Hz``.
+        Unit of the stored variable, such as ``Hz``.
     meaning
-        Its description in the result and in the documentation.
+        Description of the variable in the result and in the documentation.
     name
-        Of the variable behind the prefix of its rows; empty: the name of the field.
+        Name of the variable, after the prefix of its rows; empty: the name of the field.
     per
-        Value of the unit in the unit of the field: 2π for a field in rad/s that is stored in Hz.
+        Value of the stored unit in the unit of the field: 2π for a field in rad/s that is stored in Hz.
     along
-        Own dimensions of the field, behind that of its rows.
+        Dimensions of the field itself, after the dimension of its rows.
     """
 
     unit: str
@@ -35,17 +35,17 @@ class Column:
 
 @dataclass(frozen=True)
 class Rows:
-    """How a field that holds a tuple of records is stored: one behind the other along a dimension.
+    """How a field with a tuple of records is stored: the records one after another along a dimension.
 
     Parameters
     ----------
     dim
-        The dimension.
+        Name of the dimension.
     prefix
-        Of the names of the variables.
+        Prefix of the variable names.
     owner
-        Meaning of the variable ``prefix + dimension of the owner``, the index of the record that holds a row; empty where the rows
-        belong to the case itself.
+        Meaning of the variable ``prefix + dimension of the owner``, the index of the record that contains a row; empty if the rows belong
+        to the case itself.
     """
 
     dim: str

@@ -1,4 +1,4 @@
-"""Variables of a result from the records of a case, and the records from the variables (`stickslip.column` describes the fields)."""
+"""Conversion between the record of a case and the variables of a result (`stickslip.column` describes the fields)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -16,7 +16,7 @@ FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # where the records
 
 
 def variables(record: Any) -> dict[str, xr.Variable]:
-    """Return the variables of the record of a case; a field that is None, or empty, has none."""
+    """Return the variables of the record of a case; fields that are None or empty have none."""
     kind = type(record)
     found = {c.name or name: _stored(c, (), getattr(record, name)) for name, c in columns_of(kind).items()}
     for name, inner in rows_of(kind).items():
@@ -25,15 +25,15 @@ def variables(record: Any) -> dict[str, xr.Variable]:
 
 
 def record_of(kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable]) -> Any:
-    """Return the record of a case of a result: the inverse of `variables`, but for what fills up arrays of different lengths.
+    """Return the record of a case of a result, the inverse of `variables`; arrays of rows keep their padding.
 
     Parameters
     ----------
     kind
         Class of the record.
     case
-        The variables of the case, or its dataset, in which single numbers and texts may be attributes. What neither has is NaN, −1, an
-        empty text, or the default of its field.
+        Variables of the case, or its dataset, in which single numbers and texts may be attributes. Missing values are NaN, −1, an empty
+        text, or the default of the field.
     """
     values = {name: _value(c.name or name, c, kind, name, case) for name, c in columns_of(kind).items()}
     for name, inner in rows_of(kind).items():

@@ -67,7 +67,7 @@ class Plot:
     title
         Its heading.
     caption
-        What to see, in words and numbers taken from the data.
+        Sentences on what the figure shows, with numbers from the data.
     figure
         The figure.
     case_captions

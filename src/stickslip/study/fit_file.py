@@ -19,7 +19,7 @@ _OPTIONS = {
 
 
 def fit_file(path: Path, **options: Any) -> LoopFit:
-    """Fit a contact to the loops of a file; `options` are those of `fit_loops`.
+    """Fit a contact to the loops of a file; `options` are arguments of `fit_loops`.
 
     Raises
     ------

@@ -157,7 +157,7 @@ def read_curve(path: Path) -> MeasuredCurve:
     Raises
     ------
     InputError
-        Naming the file, the column and what to do.
+        Naming the file, the column and a remedy.
     """
     columns = read_columns(path)
     hz = columns.required("frequency", {"hz": 1.0})

@@ -17,7 +17,7 @@ MOST_ROWS = 40  # of modes on the screen
 
 
 def solved(question: Question) -> dict[str, Any]:
-    """Return the modes of the wheel as named arrays; the number of modes a blade is that of a wave."""
+    """Return the modes of the wheel as named arrays, as many a blade as the table asks for a wave."""
     model = question.model
     found = wheel_modes(model, question.n_modes * model.sectors, question.contacts)
     return {"mistuned_hz": found.frequencies_hz, "sector_share": found.sector_share, "wave_share": found.wave_share}

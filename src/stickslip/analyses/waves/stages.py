@@ -49,7 +49,7 @@ class StagesQuestion:
 
 
 def stages_question(model: Model, diameters: Sequence[int] | None, n_modes: int) -> StagesQuestion:
-    """Return the inputs after a check of the nodal diameters; None of them means all that vibrate independently."""
+    """Return the inputs after a check of the nodal diameters; None: all diameters that vibrate independently."""
     assembly = model.stages
     assert assembly is not None
     unknown = sorted(set(diameters or ()) - set(assembly.harmonics))

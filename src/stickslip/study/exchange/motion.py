@@ -100,7 +100,7 @@ def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
     Raises
     ------
     InputError
-        If the model is not that of the result.
+        If the model does not belong to the result.
     """
     whole, fields = expanded(chosen, model.undriven if chosen.free else model)
     sectors = whole.sectors if wheel or not whole.alike else 1

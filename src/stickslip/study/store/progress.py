@@ -22,7 +22,7 @@ _JOB = ContextVar("job", default="")
 
 
 class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
-    """The user stopped a run; what is finished is kept."""
+    """The user stopped a run; finished records are stored."""
 
 
 def advance(fraction: float, text: str) -> None:

@@ -29,7 +29,7 @@ PATIENCE = 15  # seconds for a scheduler to answer, and for its first worker
 
 
 class InProcess(Executor):
-    """An executor without processes: `submit` returns when the work is done, and raises what the work raises."""
+    """An executor without processes: `submit` returns when the work is done, and raises its exceptions."""
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
         """Do the work on copies of its arguments, as a worker process would."""

@@ -1,4 +1,4 @@
-"""The records of a forced response: what a job finds of a case, each number with dimensions, unit and meaning.
+"""The records of a forced response: all results of a job, each number with dimensions, unit and meaning.
 
 Complex numbers have a trailing dimension ``part = (re, im)``, flags are small integers, texts are variable-length strings: no
 compound types, no booleans, nothing that needs this package to be read.
@@ -24,7 +24,7 @@ MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutra
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaseNumbers:
-    """The peak of a case, and what it took to find it."""
+    """The peak of a case, and the work to find it."""
 
     excitation_n: float = column("N", "amplitude of the largest harmonic force, NaN without one", along="case")
     lowest_hz: float = column("Hz", "lowest frequency asked for", along="case")
@@ -158,7 +158,7 @@ class PeakPeriod:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Attempts:
-    """All solutions, and the first solutions that an alert was asked about."""
+    """All solutions, and the first solutions judged by an alert."""
 
     attempt_case: IntArray | None = column("1", "case of a solution", along="attempt", default=None)
     attempt_frequency_hz: FloatArray = column("Hz", "frequency of a solution", along="attempt")
@@ -211,7 +211,7 @@ class ModelFacts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class KnownVerdicts:
-    """Verdicts that only the job can give, which has the model."""
+    """Verdicts that need the model; the job stores them."""
 
     known_verdicts: str = column("1", "what only the model knew, verdicts as JSON", along="case")
 
@@ -227,7 +227,7 @@ class Verdicts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointStability:
-    """Stability of each point."""
+    """Stability of each point of the response."""
 
     motion_stability: IntArray = column("1", "whether disturbances of the point's motion die", along="point")
     motion_stability_basis: IntArray = column(
@@ -257,7 +257,7 @@ class ExaminedRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OtherMotions:
-    """Motions beside those of the response."""
+    """Motions beside the response, at the same frequencies."""
 
     another_case: IntArray | None = column(
         "1", "case of a motion beside that of the response", along="another", default=None
@@ -273,7 +273,7 @@ class OtherMotions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionsInTime:
-    """Motions in time where no periodic motion stands for the response."""
+    """Motions in time at points without a valid periodic solution."""
 
     not_periodic_case: IntArray | None = column(
         "1", "case of a motion in time where no balance stands for it", along="not_periodic", default=None
@@ -305,7 +305,7 @@ class MotionsInTime:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BifurcationRows:
-    """Bifurcations on the branch, and the branches that leave there."""
+    """Bifurcations of the branch, and the side branches."""
 
     bifurcations_limits: str = column(
         "1", "where bifurcations are not seen, and what looking for them took, in words", along="case"
@@ -388,7 +388,7 @@ class TimeChecks:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MoreHarmonics:
-    """How far more harmonics would change the accepted solutions (``--verify-harmonics``)."""
+    """Predicted change of the accepted solutions by more harmonics (``--verify-harmonics``)."""
 
     reference_worst_percent: float = column("percent", "largest such change", along="case")
     reference_worst_hz: float = column("Hz", "where it is", along="case")
@@ -403,14 +403,14 @@ class MoreHarmonics:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PhysicsVerdicts:
-    """Verdicts on the physics of a case, which only the job can give."""
+    """Verdicts on the physics of a case, which need the model."""
 
     physics_verdicts: str = column("1", "what the modes say of the physics of the case, verdicts as JSON", along="case")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionAtPeak:
-    """Size of the motion at the peak, beside the limits of linear kinematics."""
+    """Size of the motion at the peak, and the limits of linear kinematics."""
 
     peak_rotation_rad: float = column(
         "rad",
@@ -470,7 +470,7 @@ class StiffnessChange:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Blades:
-    """A mistuned wheel beside the tuned one."""
+    """A mistuned wheel compared with the tuned one."""
 
     largest_blade: int = column("1", "sector of the blade with the largest amplitude", along="case")
     tuned_peak_amplitude: float = column("m", "largest amplitude of the wheel with all sectors alike", along="case")
@@ -530,12 +530,12 @@ COLUMNS: Mapping[str, Column] = {name: own for kind in KINDS for name, own in co
 
 
 def stored(record: Any) -> dict[str, Any]:
-    """Return the fields of a record that hold something, by the names of their variables."""
+    """Return the nonempty fields of a record by the names of their variables."""
     return {name: value for name, value in vars(record).items() if value is not None}
 
 
 def flags(name: str) -> dict[str, IntArray | str]:
-    """Return the attributes that say what the numbers of a variable mean, none where they are no flags."""
+    """Return the netCDF attributes that explain coded values; none for a variable without codes."""
     meanings = {
         "status": {s.name.lower(): int(s) for s in Status},
         "attempt_status": {s.name.lower(): int(s) for s in Status},

@@ -208,7 +208,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
 
 
 def contact_stiffness(case: Curve) -> Iterator[Finding]:
-    """Note a peak that changes by more than `DECIDED` with contacts 10 % softer; its accuracy is that of the contact stiffness."""
+    """Note a peak that changes by more than `DECIDED` with contacts 10 % softer; it is only as accurate as the contact stiffness."""
     if abs(SOFTER * case.number("stiffness_peak_slope")) > DECIDED:
         yield Finding(
             "trusted",
