@@ -46,7 +46,7 @@ def as_tables(model: Model, name: str, keys: Mapping[str, Any]) -> dict[str, Any
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON and TOML have it, of a long list its ends."""
+    """Return a value as JSON and TOML hold it; long lists are shortened to their ends."""
     if isinstance(value, str | int | float | None):
         return value
     found = np.asarray(value, dtype=object if isinstance(value, list | tuple) else None).tolist()
@@ -54,7 +54,7 @@ def _plain(value: Any) -> Any:
 
 
 def _values(given: Any, *, per_area: bool = False) -> dict[str, Any]:
-    """Return what a dataclass of quantities holds beside its defaults, by the keys of a study file."""
+    """Return the values of a dataclass of quantities that differ from their defaults, by keys of a study file."""
     found = {}
     for entry in fields(given):
         known, value = quantity_of(entry), getattr(given, entry.name)
@@ -107,7 +107,7 @@ def _load(load: Load) -> dict[str, Any]:
 
 
 def _along(direction: tuple[float, float, float]) -> Any:
-    """Return the axis of a direction along one, else its components."""
+    """Return the axis parallel to a direction, or else its components."""
     for axis, unit in zip("xyz", np.eye(3), strict=True):
         for sign in (1, -1):
             if np.allclose(direction, sign * unit):

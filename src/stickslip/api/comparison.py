@@ -151,7 +151,7 @@ def _opened(given: Compared) -> Result | MeasuredCurve:
 
 
 def _names(compared: Sequence[Compared]) -> list[str]:
-    """Return names by folder, file or title: as much of the path as tells them apart."""
+    """Return unique names from folders, files or titles, with as much of the path as needed."""
     found = []
     for own in compared:
         if isinstance(own, Result):

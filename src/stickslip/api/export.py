@@ -91,7 +91,7 @@ def _place(path: Path | None, name: str, folder: Path | None) -> Path:
 
 
 def _model(tree: xr.DataTree, path: Path | None, home: Path | None, case: int) -> Model:
-    """Return the model of a case by the study's text in the result."""
+    """Return the model of a case, built from the study's text in the result."""
     text = str(tree.attrs.get("study_toml", ""))
     if not text:
         remedy = "Give the model that was asked: result.export(..., of=model)."

@@ -163,7 +163,7 @@ class Screen(logging.Handler):
             self._progress.update(self._tasks[job], completed=fraction, state=state)
 
     def _plain(self, job: str, fraction: float, text: str) -> None:
-        """Write some of the states of a job: without `verbose` no more than one a minute."""
+        """Print some of the states of a job, without `verbose` at most one a minute."""
         if not self._verbose:
             if monotonic() - self._told.get(job, monotonic()) > BETWEEN:
                 self._told[job] = monotonic()
@@ -175,7 +175,7 @@ class Screen(logging.Handler):
             self._line(text if step == 0 else f"  {job} {100 * fraction:.0f} %: {text}")
 
     def _done(self, job: str) -> None:
-        """Leave the line of a job that is done."""
+        """Print the line of a finished job."""
         seconds = monotonic() - self._begun.get(job, monotonic())
         told = f"{job}: {self._sums.get(job, DONE)} ({seconds:.0f} s)"
         if self._progress is not None and job in self._tasks:

@@ -23,13 +23,13 @@ from stickslip.study.run import run_study
 
 @dataclass(frozen=True, eq=False)
 class _Elsewhere(Content):
-    """A study whose results go to a folder anywhere."""
+    """A study with a results folder outside its own."""
 
     place: Path = Path()
 
     @property
     def folder(self) -> Path:
-        """Where results go."""
+        """Folder of the results."""
         return self.place
 
 

@@ -111,7 +111,7 @@ class Placing:
 
 
 def _slim(drawn: Any) -> Any:
-    """Return what plotly draws with its 64-bit numbers as 32-bit ones, seven digits: half the page."""
+    """Return a plotly figure with its 64-bit numbers as 32-bit ones (seven digits), which halves the page."""
     if isinstance(drawn, list):
         return [_slim(each) for each in drawn]
     if not isinstance(drawn, dict):

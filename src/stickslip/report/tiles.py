@@ -52,7 +52,7 @@ def patches(position: FloatArray, frame: FloatArray, area: FloatArray, members: 
 
 
 def _edges(position: FloatArray, frame: FloatArray) -> list[tuple[FloatArray, float]]:
-    """Return the half-spaces ``a x + b <= 0`` that a flat face is inside of, by the hull of its points; none of a curved face or a line."""
+    """Return the half-spaces ``a x + b <= 0`` of a flat face from the hull of its points; none for a curved face or a line."""
     if len(position) <= _CORNERS_OF_LINE or np.abs(frame[:, :, 2] @ frame[0, :, 2]).min() < _FLAT:
         return []
     plane = frame[0, :, :2]
@@ -64,7 +64,7 @@ def _edges(position: FloatArray, frame: FloatArray) -> list[tuple[FloatArray, fl
 
 
 def _cut(corners: FloatArray, bounds: Sequence[tuple[FloatArray, float]]) -> FloatArray:
-    """Leave of a convex patch what is within all bounds ``a x <= b``."""
+    """Clip a convex patch by bounds ``a x <= b``."""
     for a, b in bounds:
         beyond = corners @ a - b
         if not np.any(beyond > 0):

@@ -48,7 +48,7 @@ def check_study(study: Study) -> tuple[str, ...]:
 
 
 def _tell(label: str, lines: list[str]) -> None:
-    """Tell lines, under the label of their case where the study has several."""
+    """Log lines, preceded by the label of their case if the study has several."""
     if label and lines:
         LOG.info(label)
     for line in lines:
@@ -56,7 +56,7 @@ def _tell(label: str, lines: list[str]) -> None:
 
 
 def _free(model: Model) -> list[str]:
-    """Say which parts nothing holds, though all contacts stick; an analysis that cannot do with that refuses it by itself."""
+    """Name the parts that are free although all contacts stick; analyses that cannot handle this refuse it themselves."""
     if model.stages is not None:
         return []
     return [f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))]

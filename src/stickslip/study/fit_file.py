@@ -84,7 +84,7 @@ def _line(key: str, value: float, deviation: float) -> str:
 
 
 def _value(value: float, deviation: float, unit: str, least: float = math.nan) -> str:
-    """Return ``1.234 ± 0.012 N``; what is not told with what it certainly reaches."""
+    """Return ``1.234 ± 0.012 N``; for an undetermined value its certain lower bound."""
     if math.isnan(value):
         bound = f", at least {least:.4g} {unit}".rstrip() if math.isfinite(least) else ""
         return UNTOLD + bound
@@ -92,7 +92,7 @@ def _value(value: float, deviation: float, unit: str, least: float = math.nan) -
 
 
 def _rounded(value: float, deviation: float) -> str:
-    """Write a value with the digits that its standard deviation leaves, two of them uncertain."""
+    """Write a value with two uncertain digits by its standard deviation."""
     digits = 6
     if 0 < deviation < abs(value):
         digits = min(math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation)) + 2, 10)

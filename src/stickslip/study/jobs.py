@@ -202,7 +202,7 @@ def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Pat
 
 @contextmanager
 def _sender(hands: Hands, folder: Path) -> Iterator[Callable[[Order], Future[Any]]]:
-    """Give what submits a job."""
+    """Yield the function that submits a job."""
     if hands.cell is not None:
         yield lambda order: hands.pool.submit(_watched_here, order, hands)
     elif not hands.far:
@@ -228,7 +228,7 @@ def _gone(why: str) -> StickslipError:
 
 
 def _ended(future: Future[Any], order: Order, lost: dict[Path, Loss], *, far: bool) -> bool:
-    """Raise what a job raised, and hand on what it said; say whether it has ended, which one whose worker was lost has not."""
+    """Raise the exception of a job and log its lines; return whether it has ended, which is false after the loss of its worker."""
     if not far:
         future.result()
         return True

@@ -108,7 +108,7 @@ class Book:
                     self._judge(asked, Solved(task.case, *self.solved[task.sealed]))
 
     def _judge(self, asked: Analysis, solved: Solved) -> None:
-        """Tell what is to be thought of a case; where that holds for another one, too, it is told of all together."""
+        """Log the verdicts on a case; a verdict equal to that of an earlier case is logged later, for all cases together."""
         if ASIDE in solved.notes:
             self._tell([_unsolved(solved, ASIDE)])
             return
@@ -131,13 +131,13 @@ class Book:
         self.nodes[asked.name] = node.assign_attrs(own)
 
     def _put_together(self) -> None:
-        """Make the nodes of the analyses of which jobs have been sealed since."""
+        """Make the nodes of the analyses with newly sealed jobs."""
         for asked, own in self.apart.values():
             self.enter(asked, [Solved(t.case, *self.solved[t.sealed]) for t in own])
         self.apart.clear()
 
     def _tell(self, found: Iterable[Verdict]) -> None:
-        """Tell verdicts that have not been told."""
+        """Log verdicts that have not been logged."""
         for verdict in found:
             if verdict.told and verdict.sentence not in self.told:
                 self.told.add(verdict.sentence)
@@ -145,7 +145,7 @@ class Book:
 
     @property
     def _names(self) -> list[str]:
-        """Names of the nodes, in an order that does not depend on which job ended first."""
+        """Names of the nodes in an order independent of the jobs' ends."""
         return sorted(self.nodes, key=[*ANALYSES, *self.nodes].index)
 
     def tree(self, *, complete: bool) -> xr.DataTree:
@@ -174,7 +174,7 @@ class Book:
 
 
 def _judged(asked: Analysis, solved: Sequence[Solved]) -> tuple[xr.Dataset, tuple[Verdict, ...]]:
-    """Return the dataset of cases, and what is to be thought of them."""
+    """Return the dataset of cases, and the verdicts on them."""
     node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
     unsolved = [_unsolved(s, UNSOLVED) for s in solved if UNSOLVED in s.notes]
     return node, (*unsolved, *asked.verdicts(node))

@@ -206,7 +206,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
 
 
 def _refuse_result_of_another(study: Study) -> None:
-    """Refuse to replace the result of a study file of another name, unless that one was renamed or removed."""
+    """Refuse to overwrite the result of another study file, unless that file was renamed or removed."""
     target, home, name = (study.folder / RESULT, study.path.resolve().parent, as_text(study.path.name))
     other = str(attributes_there(target).get("study_file", name))
     if other == name:
@@ -223,7 +223,7 @@ def _refuse_result_of_another(study: Study) -> None:
 
 
 def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:
-    """Return what writes while jobs are left, and no more than a tenth of the time: results of many cases take a while."""
+    """Return a function that writes while jobs are left, for at most a tenth of the time, since results of many cases take long."""
     due = 0.0
 
     def wrote(left: int) -> None:
@@ -237,7 +237,7 @@ def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:
 
 
 def _longest_first(tasks: Iterable[Task]) -> list[Task]:
-    """Return tasks in the order of how long they may take: those that no linear answer does, and the more the harder they are driven."""
+    """Return tasks with the longest first: nonlinear before linear ones, and the harder a case is driven the earlier."""
     return sorted(tasks, key=lambda t: (t.analysis.linear, -t.case.drive))
 
 
@@ -247,14 +247,14 @@ def _limits(task: Task) -> Limits:
 
 
 def _order(study: Study, task: Task, place: Place) -> Order:
-    """Return the job of a task, as it is given to whoever does it."""
+    """Return the job of a task for a worker."""
     job = Job(_label(task.analysis, task.case), _inputs(study, task))
     owner = "" if place.shard is None else new_owner()
     return Order(task.analysis, job, task.sealed, task.case.checks, _limits(task), owner)
 
 
 def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]:
-    """Return what jobs are given to; those with limits and those of a shard run in a process of their own even one at a time."""
+    """Return the executor of the jobs; jobs with limits and those of a shard run in a process of their own even one at a time."""
     limits = [_limits(task) for task in tasks]
     for one in limits:
         check_memory_limit(one)
@@ -268,7 +268,7 @@ def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]
 def _tasks(
     study: Study, asked: Sequence[Analysis], cases: Sequence[Case], checks: frozenset[str], versions: Mapping[str, str]
 ) -> list[Task]:
-    """Return every case of every analysis of the study; only those asked for are to have the checks."""
+    """Return every case of every analysis of the study; only requested analyses get the checks."""
     found = []
     for own in asked_for(study):
         wanted = checks & frozenset(own.checks) if own in asked else frozenset()
@@ -277,7 +277,7 @@ def _tasks(
 
 
 def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]) -> Task:
-    """Name the file of a job by all that its numbers depend on."""
+    """Return a task; the name of its file is the hash of everything its numbers depend on."""
     layout = [f.name for f in fields(asked.record)]
     model = case.digest_at_rest if asked.linear else case.digest
     parts = [asked.name, asked.key(case), model, versions, layout]
@@ -303,7 +303,7 @@ def _inputs(study: Study, task: Task) -> Any:
 
 
 def _check_files(tasks: Iterable[Task]) -> None:
-    """Refuse damaged files of jobs that are to go on, before anything else is computed."""
+    """Refuse damaged files of unfinished jobs before any computation."""
     for task in tasks:
         at_work_file = file_at_work(task.sealed)
         if task.sealed.exists():
@@ -319,7 +319,7 @@ def _label(asked: Analysis, case: Case) -> str:
 
 
 def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:
-    """Return the meshes of the parts of the first case that is built, for pictures; none where nothing can write them."""
+    """Return the meshes of the parts of the first case, for drawings; none without meshio."""
     if find_spec("meshio") is None:
         return {}
     for case in cases:

@@ -164,7 +164,7 @@ def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
 
 
 def _gist(text: str) -> str:
-    """Return what a sentence says before its first number."""
+    """Return a sentence up to its first number."""
     return _NUMBER.split(text, maxsplit=1)[0]
 
 

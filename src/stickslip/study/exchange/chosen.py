@@ -128,7 +128,7 @@ def _analysis(tree: xr.DataTree, wanted: str) -> str:
 
 
 def _refuse_unused(name: str, *, number: int, hz: float | None, amplitude_mm: float | None) -> None:
-    """Refuse what picks a point of another analysis."""
+    """Refuse arguments that select a point of another analysis."""
     beside = {
         "hz": hz is not None and name != FORCED,
         "number": number != 0 and name == FORCED,
@@ -232,7 +232,7 @@ def _cycle(own: xr.Dataset, label: str, number: int, _amplitude_mm: float | None
 
 
 def _free(one: xr.Dataset, own: xr.Dataset, name: str, told: str, label: str, at: tuple[float, float, int]) -> Chosen:
-    """Return a motion that nothing drives, by its frequency, damping ratio and wave number."""
+    """Return a free motion from its frequency, damping ratio and wave number."""
     hz, ratio, wave = at
     retained, labels = _known(one["retained_displacement"].values, own["retained_label"].values)
     reported, outputs = _known(one["output_displacement"].values, own["output_label"].values)
@@ -264,7 +264,7 @@ def _require_number(own: xr.Dataset, dim: str, name: str, number: int) -> None:
 
 
 def _known(values: FloatArray, labels: FloatArray) -> tuple[ComplexArray, tuple[str, ...]]:
-    """Return the motion (H+1, n) of what a case has, harmonics that it has not as zero, and the names."""
+    """Return names and motion (H+1, n) of the stored coordinates; missing harmonics are zero."""
     there = np.isfinite(values).any(axis=(0, 2))
     own = np.nan_to_num(values[:, there])
     names = tuple(str(label) for label in np.asarray(labels)[there])

@@ -118,7 +118,7 @@ def _signal(coefficients: ComplexArray, samples: int) -> FloatArray:
 
 
 def _ahead(signal: Matrix, share: float) -> Matrix:
-    """Return a signal (..., s) that is ahead by a share of the period: between samples by the line, states by the sample before."""
+    """Return a signal (..., s) shifted forward by a fraction of the period; linear between samples, states from the sample before."""
     samples = signal.shape[-1]
     whole, rest = divmod(share % 1.0 * samples, 1.0)
     first = np.roll(signal, -int(whole), axis=-1)

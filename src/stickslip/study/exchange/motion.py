@@ -146,7 +146,7 @@ def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
 
 
 def _coordinates(chosen: Chosen, whole: Everywhere) -> tuple[IntArray, IntArray]:
-    """Return the coordinates beside those that contacts retain, and the order of those of the result."""
+    """Return the coordinates not retained by contacts, and the order of the result's coordinates."""
     names = whole.system.structure.dofs.labels
     known = {label: k for k, label in enumerate(chosen.labels)}
     retained = [int(i) for i in whole.system.retained]
@@ -160,7 +160,7 @@ def _coordinates(chosen: Chosen, whole: Everywhere) -> tuple[IntArray, IntArray]
 
 
 def _felt(chosen: Chosen) -> Felt:
-    """Return what vibrates as a motion feels it."""
+    """Return the function that gives the linear side of a motion: unchanged, with mass damping, or decaying."""
     if chosen.decays:
         return lambda side: DecayingStiffness(side, chosen.decays)
     if chosen.rate:
@@ -169,7 +169,7 @@ def _felt(chosen: Chosen) -> Felt:
 
 
 def _of_sector(whole: Everywhere, fields: ComplexArray, sector: int) -> ComplexArray:
-    """Return the (H+1, N) motion of a sector, on the axes of the first one turned to it."""
+    """Return the motion (H+1, N) of a sector, in the axes of the first sector turned to it."""
     if not whole.alike:
         return np.asarray(fields[sector])
     phases = np.array([whole.phase(h, sector) for h in range(fields.shape[1])])
@@ -177,7 +177,7 @@ def _of_sector(whole: Everywhere, fields: ComplexArray, sector: int) -> ComplexA
 
 
 def _turned(nodes: Nodes, field: ComplexArray, sector: int, axis: Axis, angle: float) -> Body:
-    """Return the nodes of a part in a sector, and how they move."""
+    """Return nodes and motion of a part in a sector."""
     if sector == 0:
         return Body(nodes, 0, nodes.of(field))
     moved = replace(nodes, points=axis.turned(nodes.points, angle))

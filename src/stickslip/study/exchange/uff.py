@@ -147,7 +147,7 @@ def in_order(data: xr.Dataset, mine: BoolArray) -> IntArray:
 
 
 def _numbers(motion: Motion) -> Mapping[tuple[int, str, int], int]:
-    """Return the number in the file of each node by sector, part and own number."""
+    """Return the file's number of each node, by sector, part and own number."""
     found: dict[tuple[int, str, int], int] = {}
     for body, numbers in zip(motion.bodies, numbers_of(motion)[0], strict=True):
         own = zip(body.nodes.numbers, numbers, strict=True)

@@ -74,7 +74,7 @@ def _harmonics(motion: Motion, mean: FloatArray) -> dict[str, FloatArray]:
 
 
 def _each(motion: Motion, values: Sequence[Any]) -> IntArray:
-    """Return a number for each node by the value of its body; texts count in the order in which they come."""
+    """Return one number a node from a value of its body; texts are numbered in their order."""
     known = {value: k for k, value in enumerate(dict.fromkeys(values))}
     own = [known[v] if isinstance(v, str) else int(v) for v in values]
     return np.repeat(own, [len(b.nodes.points) for b in motion.bodies])
@@ -109,7 +109,7 @@ def _write(
 
 
 def _collection(path: Path, files: Sequence[Path], times: FloatArray) -> Path:
-    """Write the list of files and their times that ParaView opens as one; return it."""
+    """Write the collection file with names and times for ParaView; return its path."""
     rows = "".join(
         f'    <DataSet timestep="{time:.17g}" part="0" file="{file.name}"/>\n'
         for file, time in zip(files, times, strict=True)

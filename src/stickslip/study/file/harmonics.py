@@ -165,7 +165,7 @@ def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
 
 
 def _of_samples(table: Harmonics, highest: int) -> Iterator[PydanticCustomError]:
-    """Refuse too few samples by the key that the file has: ``samples``, or the one that asks for the highest harmonic."""
+    """Refuse too few samples under the key in the file: ``samples``, or the key of the highest harmonic."""
     fewest = SAMPLES_A_HARMONIC * highest
     if table.samples >= fewest:
         return

@@ -65,7 +65,7 @@ def table_keys(name: str) -> list[Keys]:
 
 
 def _table_of(schema: Mapping[str, Any], word: str) -> str:
-    """Say which table a word is a kind of, or which table may be meant."""
+    """Name the table to which a kind belongs, or a table with a similar name."""
     if word in list(ALL_LAWS):
         return f"It is a law of contacts: 'stickslip keys contact.{word}'."
     for table, entry in schema["properties"].items():
@@ -76,7 +76,7 @@ def _table_of(schema: Mapping[str, Any], word: str) -> str:
 
 
 def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
-    """Return the keys that all contacts have, and with a law those of it."""
+    """Return the keys common to all contacts, followed by the keys of a law."""
     every = {n: {**keys_of(n, per_area=True), **keys_of(n, per_area=False)} for n in ALL_LAWS}
     if law and law not in every:
         raise input_error(f"contact.{law}", "is no law", did_you_mean(law, list(every)))
@@ -94,7 +94,7 @@ def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
 
 
 def _kinds(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the kinds of a table by the word that chooses each, empty where there is one."""
+    """Yield the kinds of a table with the word that selects each; empty if there is only one."""
     for node in _nodes(schema, entry):
         words = [str(own["const"]) for own in node["properties"].values() if "const" in own]
         yield words[0] if words else "", node

@@ -55,7 +55,7 @@ def told(
 
 
 def _unknown_first(model: type[BaseModel], every: Sequence[ErrorDetails]) -> list[ErrorDetails]:
-    """Return unknown keys before what is missing, and leave out a missing key that one of them is a slip of."""
+    """Return unknown keys before missing ones, without a missing key that is the correct spelling of an unknown one."""
     unknown = [one for one in every if one["type"] == "extra_forbidden"]
     rest = [one for one in every if one["type"] != "extra_forbidden"]
     spots = [spot_at(model, _path(one)) for one in unknown]
@@ -73,18 +73,18 @@ def _path(details: ErrorDetails) -> list[str | int]:
 
 
 def _place(model: type[BaseModel], details: ErrorDetails) -> tuple[str, ...]:
-    """Return the keys that lead to what is wrong."""
+    """Return the keys that lead to an error."""
     own = details.get("ctx", {}).get("key", "") if details["type"] == "stickslip" else ""
     return (*spot_at(model, _path(details)).keys, *filter(None, [own]))
 
 
 def _known(spot: Spot) -> list[str]:
-    """Return the keys of the table that holds a place."""
+    """Return the keys of the table at a place."""
     return [] if spot.owner is None else list(spot.owner.model_fields)
 
 
 def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
-    """Yield the errors that a validator of ours has found, or the one of pydantic."""
+    """Yield the errors raised by a validator of this package, or else the error of pydantic."""
     yield details
     for context in details.get("ctx", {}).get("others", ()):
         yield {**details, "ctx": context}
@@ -123,7 +123,7 @@ def spot_at(model: type[BaseModel], path: Sequence[str | int]) -> Spot:
 
 
 def _opened(here: Any, part: str | int) -> tuple[Any, type[BaseModel] | bool | None]:
-    """Return the annotation below `here` at `part`, and the table that holds it; None in its place if `part` names an alternative."""
+    """Return the annotation under the part of a path, and the table that holds it; None instead of the annotation if the part is the tag of a union."""
     tagged = alternatives(here)
     if part in tagged:
         return tagged[str(part)], None
@@ -183,7 +183,7 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
 
 
 def _one_of(word: str, known: list[str], about: str) -> str:
-    """Return the word that was meant, or all that are known with what they mean, where the list alone is not that."""
+    """Return the word probably meant, or all known words with their meanings if the list alone is not enough."""
     remedy = did_you_mean(word, known)
     listed = about == NO_ABOUT or about.endswith(", ".join(known))
     return remedy if listed or not remedy.startswith("Known: ") else f"{remedy} It means: {about}."

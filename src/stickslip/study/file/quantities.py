@@ -177,7 +177,7 @@ def _in_si(value: Any, q: Quantity, hint: Any) -> Any:
 
 
 def _about(q: Quantity, per_area: bool) -> str:
-    """Return what a key means: the quantity, its unit, its range."""
+    """Return the description of a key: quantity, unit, range."""
     unit = q.key_of("", per_area=per_area).removeprefix(q.key).removeprefix("_")
     texts = [q.about + (f" in {IN_WORDS.get(unit, unit)}" if unit else ""), _range(q)]
     return ", ".join(filter(None, texts))

@@ -48,7 +48,7 @@ class Section(BaseModel):
 
 
 def _beyond(key: str, value: object) -> Iterator[tuple[str, float]]:
-    """Yield numbers beyond all quantities, with their places; tables within look at their own."""
+    """Yield implausibly large numbers with their places; nested tables check their own."""
     if isinstance(value, list | tuple):
         for i, entry in enumerate(value):
             yield from _beyond(f"{key}[{i}]", entry)

@@ -110,7 +110,7 @@ def _case(path: Path, raw: Mapping[str, Any], values: Mapping[str, Any]) -> Tabl
 
 
 def _check_version(path: Path, found: object) -> None:
-    """Refuse another version of the layout before its keys are judged by this one's."""
+    """Refuse a file of another layout version before checking its keys."""
     if found is None or (found == VERSION and isinstance(found, int)):
         return
     older = found == 1

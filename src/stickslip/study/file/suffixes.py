@@ -87,7 +87,7 @@ def unit_of(ending: str) -> Unit | None:
 
 
 def _split(key: str) -> Iterator[tuple[str, Unit]]:
-    """Yield the ways to read a key as a name and a unit, the longest unit first; at last without one."""
+    """Yield the possible splits of a key into name and unit, the longest unit first; last without a unit."""
     words = key.split("_")
     for k in range(1, len(words)):
         unit = unit_of("_".join(words[k:]))
@@ -124,7 +124,7 @@ def meant_key(word: str, known: Sequence[str]) -> str:
 
 
 def _in_another_unit(word: str, known: Sequence[str]) -> tuple[str, Unit, Unit] | None:
-    """Return the known key that says the same in another unit, with the unit given and its own."""
+    """Return the known key of the same name in another unit, with the given unit and its own."""
     for name, given in _split(word):
         for key in known:
             for other, meant in _split(key):
@@ -134,7 +134,7 @@ def _in_another_unit(word: str, known: Sequence[str]) -> tuple[str, Unit, Unit] 
 
 
 def _converted(given: Unit, meant: Unit, value: object) -> str:
-    """Say what a value, or one unit, is in another unit; nothing where a key has none of its own."""
+    """Return a value, or one unit, in another unit; empty for a key without a unit."""
     if not given.symbol:
         return ""
     factor = given.size / meant.size

@@ -104,7 +104,7 @@ def _text(value: Any) -> str:
 def _flat(
     place: str, table: Mapping[str, Any], errors: list[InputError], above: str = ""
 ) -> Iterator[tuple[str, list[Any]]]:
-    """Yield the keys of nested tables, joined by dots, and their lists; what is no list goes to the errors."""
+    """Yield the keys of nested tables, joined by dots, with their lists; other values become errors."""
     for name, value in table.items():
         key = f"{above}{name}"
         if isinstance(value, dict):
@@ -140,7 +140,7 @@ def _wrong(
 
 
 def _unknown(place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[InputError]:
-    """Return the complaint about a key that the file cannot have."""
+    """Return the error about an unknown key."""
     content: Any = raw
     here: Any = model
     for i, name in enumerate(key.split(".")):
@@ -152,7 +152,7 @@ def _unknown(place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel
 
 
 def _below(here: Any, content: Any, name: str) -> tuple[list[str], Any]:
-    """Return the keys that a table may have, and the annotation of one of them."""
+    """Return the keys allowed in a table, and the annotation of one of them."""
     for one in plain(here) if not alternatives(here) else _chosen(here, content):
         if isinstance(one, type) and issubclass(one, BaseModel):
             field = one.model_fields.get(name)
@@ -163,7 +163,7 @@ def _below(here: Any, content: Any, name: str) -> tuple[list[str], Any]:
 
 
 def _chosen(here: Any, content: Any) -> list[Any]:
-    """Return the alternative that a table of the file is."""
+    """Return the member of a union that fits a table of the file."""
     tagged = alternatives(here)
     if not isinstance(content, Mapping):
         return []

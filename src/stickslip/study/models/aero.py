@@ -110,7 +110,7 @@ def _columns(path: Path) -> MeasuredColumns:
 
 
 def _from_toml(path: Path) -> MeasuredColumns:
-    """Return the columns of a TOML file: keys with lists of the same length."""
+    """Return the columns of a TOML file: keys with lists of equal length."""
     _, raw = read_toml(path)
     sizes = {key: len(value) if isinstance(value, list) else -1 for key, value in raw.items()}
     for key, size in sizes.items():
@@ -169,7 +169,7 @@ def _check_names(columns: MeasuredColumns, table: AeroTable) -> None:
 
 
 def _between(columns: MeasuredColumns, table: AeroTable) -> tuple[list[Any], list[tuple[int, int]]]:
-    """Return the modes or points, and which of them feels and which moves in each row."""
+    """Return the modes or points, and for each row the one that moves and the one that the force acts on."""
     ends = BETWEEN[bool(table.points)]
     if ends[0] not in columns.names:
         if len(table.points) > 1:
@@ -235,7 +235,7 @@ def _influence(
 
 
 def _axis(columns: MeasuredColumns, name: str, unit: float) -> tuple[FloatArray, IntArray]:
-    """Return the different values of a column in SI, and which of them each row has."""
+    """Return the different values of a column in SI, and their index for each row."""
     if name not in columns.names:
         return np.zeros(0), np.zeros(len(columns.rows), dtype=np.int64)
     numbers = columns.numbers(name)
@@ -260,7 +260,7 @@ def _whole(columns: MeasuredColumns, name: str, least: int | None = None) -> Flo
 def _refuse_gaps(
     columns: MeasuredColumns, line: IntArray, who: str, once: FloatArray, speeds: FloatArray, frequencies: FloatArray
 ) -> None:
-    """Refuse a table that lacks a coefficient which it has at another speed, frequency or neighbour."""
+    """Refuse a table in which a coefficient is missing at a speed, frequency or neighbour that others have."""
     there = (line >= 0).any(axis=(0, 1, 2))  # pairs that are nowhere are zero
     gaps = np.argwhere((line < 0) & there)
     if not gaps.size:
@@ -278,7 +278,7 @@ def _refuse_gaps(
 
 
 def _refuse_numbers(columns: MeasuredColumns, who: str, once: FloatArray, sectors: int) -> None:
-    """Refuse neighbours that the wheel does not have or has once, and waves that lack others."""
+    """Refuse neighbours that the wheel lacks or has twice, and an incomplete set of waves."""
     place = f"{columns.path}: {who}"
     if who == "phase_angle_deg":
         if once.size == 1:

@@ -170,7 +170,7 @@ def _surfaces(tables: Tables) -> Iterator[InputError]:
 
 
 def _shapes_of_joins(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaint about shapes of joined surfaces where there are none."""
+    """Yield the error about interface modes in a study without joined surfaces."""
     count = None if tables.reduction is None else tables.reduction.interface_modes
     wheel = (sectors_of(tables) or 1) > 1
     if count is not None and (wheel or not tables.join):
@@ -194,7 +194,7 @@ def _no_sector(tables: Tables, place: str, word: str) -> Iterator[InputError]:
 
 
 def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> Iterator[InputError]:
-    """Yield the complaint about a name that no part has, as far as that is known without a mesh."""
+    """Yield the error about a name that no part has, if this is known without a mesh."""
     head, _, rest = word.removeprefix(NEXT).partition(".")
     if head not in tables.part:
         yield input_error(place, f"there is no part {head!r}", did_you_mean(head, list(tables.part)))
@@ -262,7 +262,7 @@ def _loads(tables: Tables) -> Iterator[InputError]:
 
 
 def _driven(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaints about harmonics that loads act in and the response does not keep."""
+    """Yield errors about harmonics of loads that the response does not keep."""
     if any(table.harmonic and table.engine_order is None for table in tables.load.values()):
         own = {name: table.harmonic for name, table in tables.load.items()}  # a wheel's are refused elsewhere
     else:
@@ -304,7 +304,7 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
 
 
 def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
-    """Return the directions in which a point is reported, as far as they are known without a mesh: of a single dof its own."""
+    """Return the directions in which a point is reported, if known without a mesh; for a single dof its own."""
     _, dot, last = point.on.rpartition(".")
     if dot and (last.lower() in COMPONENTS or is_numbered(last.lower())):
         return (last.lower(),)
@@ -312,7 +312,7 @@ def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
 
 
 def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
-    """Yield the complaints about analyses that lack what they need."""
+    """Yield errors about analyses with missing inputs."""
     asked: Any = tables
     # stages are asked for modes alone, and that is said by itself
     forced = None if staged(tables) else getattr(asked, "forced_response", None)
@@ -344,7 +344,7 @@ def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
 
 
 def _without_a_mesh(tables: Tables, home: Path) -> Iterator[InputError]:
-    """Yield the complaints about speeds where nothing turns that they change."""
+    """Yield errors about speeds in a model that no speed changes."""
     originals = [original(tables, name) for name in tables.part]
     if any(map(_turns, originals)):
         return
@@ -391,7 +391,7 @@ def without_areas(tables: Tables) -> Iterator[InputError]:
 
 
 def _told(table: Any, side: str) -> dict[str, Any]:
-    """Return what tells the areas of a side's points, by key; None where it is left out."""
+    """Return the keys that define the areas of a side's points, with their values; None if missing."""
     if isinstance(table, FlatCurved):
         return {key: getattr(table, key) for key in _FLAT_CURVED.get(side, ())}
     if isinstance(table, Cylinder):

@@ -44,7 +44,7 @@ def too_large(tables: Tables, home: Path) -> InputError | None:
 
 
 def _asks_for_waves(tables: Tables) -> bool:
-    """Whether modes of the waves of a sector are asked for."""
+    """Return whether modes of the waves of a sector are needed."""
     asked = any(getattr(tables, name, None) is not None for name in ("modes", "safe"))
     sectors: list[Any] = [getattr(table, "sectors", None) for table in tables.part.values()]
     return asked and any(count is not None and count > 1 for count in sectors)
@@ -62,7 +62,7 @@ def above(limits: Limits, what: str, memory: float, seconds: float) -> InputErro
 
 
 def _nodes(table: Any, home: Path) -> float:
-    """Return about how many nodes a part will have; a copy shares those of its original."""
+    """Estimate the number of nodes of a part; a copy shares those of its original."""
     if isinstance(table, PrismBlades):
         return blade_nodes(build(BladePair, table))
     if isinstance(table, Sector):
@@ -108,5 +108,5 @@ def file_nodes(path: Path) -> float:
 
 
 def _block(size: float, *lengths: float) -> float:
-    """Return about how many nodes a block has whose elements have a size: at least one across, and its faces have nodes, too."""
+    """Estimate the number of nodes of a block with a given element size, at least one element across, nodes on its faces included."""
     return NODES_A_CUBE * prod(max(length / size, 1.0) + 1.0 for length in lengths)

@@ -162,13 +162,13 @@ def with_companions(path: Path) -> list[Path]:
 
 
 def _words(key: str) -> dict[str, str]:
-    """Return the keys of the study for arguments of the readers."""
+    """Return the study's keys for the arguments of the readers."""
     words = {name: f"{key}.{name}" for name in ("units", "mesh", "mass", "nodes")}
     return words | {"plausible": f"{key}.plausible = false", "ignore": "", "use": _KEPT}
 
 
 def _sectors(key: str, table: FileModel, of_deck: int | None = None) -> int:
-    """Return the number of sectors: the deck's, which the study may repeat, or the study's."""
+    """Return the number of sectors from the deck, which the study may repeat, or from the study."""
     if of_deck is not None and table.sectors not in (None, of_deck):
         raise input_error(
             f"{key}.sectors",
@@ -244,12 +244,12 @@ def _from_archive(key: str, table: FileModel, path: Path, given: Material | None
 
 
 def _cyclic_pairs(key: str, mesh: SolidMesh, sectors: int, axis: Axis) -> SolidMesh:
-    """Return a mesh with the cyclic faces that its coupled pairs are, and with them the nodes on the axis.
+    """Return a mesh with cyclic faces from its coupled pairs, and the nodes on the axis.
 
     Raises
     ------
     InputError
-        If the pairs are no pitch apart: what they couple is not read.
+        If the pairs are not one pitch apart; such couplings are not supported.
     """
     from scipy.spatial import cKDTree
 
@@ -331,7 +331,7 @@ def _matrices(key: str, table: FileModel, files: Mapping[str, Path]) -> Structur
 
 
 def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
-    """Return the mesh with the nodes that are held in the set ``root`` alone."""
+    """Return the mesh with the clamped nodes in the set ``root`` only."""
     sets = dict(mesh.node_sets)
     held = set(sets.pop(ROOT, np.zeros(0, dtype=np.int64)).tolist())
     for i, name in enumerate(table.clamped):
@@ -342,7 +342,7 @@ def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
 
 
 def _faces(key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int) -> tuple[str, str]:
-    """Return the names of the sets that are the cyclic faces."""
+    """Return the names of the sets of the cyclic faces."""
     if table.cyclic == "none":
         if set(FACES) & set(sets):
             raise input_error(
@@ -373,7 +373,7 @@ def _no_face(place: str, sectors: int, sets: Iterable[str]) -> InputError:
 
 
 def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
-    """Return the set's name in the file, which may differ in capitals."""
+    """Return the name of a set as in the file, capitals aside."""
     found = alike(name, sets)
     if found is not None:
         return found

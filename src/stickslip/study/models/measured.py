@@ -123,7 +123,7 @@ def measured_peaks(file: StudyFile) -> MeasuredPeaks | None:
 
 
 def _varied_number(file: StudyFile) -> str:
-    """Return the varied key that optimisation curves are drawn over: the first whose values are different numbers."""
+    """Return the varied key of the optimisation curves: the first one with different numbers."""
     place, tables = f"{file.path}: measured", file.tables
     if any(key.startswith("measured.") for key in file.cases[0].values):
         raise input_error(place, "is varied", "Leave it out of [vary]: it is of all cases.")
@@ -153,7 +153,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _check_names(columns: MeasuredColumns, key: str, others: Sequence[str]) -> None:
-    """Refuse a file without the varied key, and columns that nobody would read."""
+    """Refuse a file without the varied key, or with unused columns."""
     place = f"{columns.path}: line 1"
     if key.lower() not in columns.names:
         near = did_you_mean(key, [*columns.names])
@@ -179,7 +179,7 @@ def _check_names(columns: MeasuredColumns, key: str, others: Sequence[str]) -> N
 
 
 def _quantity(columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[str, float]]) -> Quantity:
-    """Return a measured quantity with its error bars; NaN for all where the file has none."""
+    """Return a measured quantity with its error bars; NaN if the file lacks it."""
     unit, values = _column(columns, name, units)
     bars = {bar: _column(columns, f"{name}_{bar}", units) for bar in ERRORS}
     given = {bar: own for bar, own in bars.items() if own[0]}
@@ -201,7 +201,7 @@ def _quantity(columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[s
 
 
 def _column(columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, FloatArray]:
-    """Return the unit of a column and its numbers in it; no unit where there is no such column."""
+    """Return unit and numbers of a column; no unit if the column is missing."""
     found = [(unit, *columns.named(stem, names)) for unit, names in units.items()]
     there = [(unit, name, factor) for unit, name, factor in found if name]
     if len(there) > 1:
@@ -221,7 +221,7 @@ def _column(columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str
 
 
 def _others(columns: MeasuredColumns, keys: Sequence[str], cases: Sequence[TablesOfCase]) -> tuple[str, ...]:
-    """Return what the file says of the other varied keys, as labels of cases have it."""
+    """Return the other varied keys in the file with their values, as in labels of cases."""
     told: list[list[str]] = [[] for _ in columns.rows]
     for key in (k for k in keys if k.lower() in columns.names):
         known = {_text(case.values[key]): f"{key} = {_text(case.values[key])}" for case in cases}
@@ -263,12 +263,12 @@ def _refuse(columns: MeasuredColumns, found: MeasuredPeaks) -> None:
 def _with_forces(
     columns: MeasuredColumns, found: MeasuredPeaks, file: StudyFile, others: Sequence[str]
 ) -> MeasuredPeaks:
-    """Return the peaks with the force of the study where the file tells none.
+    """Return the peaks with the force of the study if the file has none.
 
     Raises
     ------
     InputError
-        If the force depends on keys that the file does not tell, or the study refuses a value.
+        If the force depends on keys missing in the file, or the study refuses a value.
     """
     force = found.excitation.copy()
     untold = [k for k in others if k.lower() not in columns.names]

@@ -82,7 +82,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
 
 
 def _require_speed(tables: Tables, parts: Mapping[str, Part]) -> None:
-    """Refuse a study that does not say at which speed it is where a file turns."""
+    """Refuse a study without a speed if one of its files rotates."""
     if "speed_rpm" in tables.rotation.model_fields_set:
         return
     for name, part in parts.items():
@@ -131,7 +131,7 @@ def _contact(parts: Mapping[str, Part], table: Any) -> Contact:
 
 
 def _acts(table: Any) -> Any:
-    """Return the direction of a contact that the motion of single dofs is where the study does not say; surfaces have normals."""
+    """Return the default direction of a contact between single dofs; surfaces have normals."""
     return "normal" if table.law in NORMAL_ALONE else "tangential"
 
 
@@ -141,7 +141,7 @@ def _between(parts: Mapping[str, Part], names: list[str]) -> tuple[str, str]:
 
 
 def _own_name(parts: Mapping[str, Part], name: str) -> str:
-    """Return the name of a surface as its file has it, whatever the capitals in the study."""
+    """Return the name of a surface as in its file, capitals aside."""
     ahead = NEXT if name.startswith(NEXT) else ""
     head, dot, rest = name.removeprefix(NEXT).partition(".")
     if name == GROUND or head not in parts or not rest:

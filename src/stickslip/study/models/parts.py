@@ -214,7 +214,7 @@ def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
 
 
 def _blades_at(tables: Tables, name: str) -> list[BladePair]:
-    """Return the geometry of blades that have nodes at the points of a part."""
+    """Return the geometry of the blades that have nodes at the points of a part."""
     return [
         build(BladePair, table)
         for table in tables.part.values()
@@ -223,7 +223,7 @@ def _blades_at(tables: Tables, name: str) -> list[BladePair]:
 
 
 def _owners(table: Any) -> list[str]:
-    """Return the parts that blades have nodes for."""
+    """Return the parts for which blades have nodes."""
     return list(dict.fromkeys(word.partition(".")[0] for word in table.nodes_at))
 
 
@@ -247,7 +247,7 @@ def digest(tables: Tables, name: str, home: Path) -> str:
 
 
 def _related(tables: Tables, name: str) -> list[str]:
-    """Return the parts whose tables a part depends on, itself first."""
+    """Return the parts on whose tables a part depends, the part itself first."""
     table: Any = tables.part[name]
     if isinstance(table, Copy):
         return [name, *_related(tables, table.of)]
@@ -273,14 +273,14 @@ def digest_of(path: Path) -> str:
 
 
 def _behind(table: Lumped) -> list[str]:
-    """Return the masses of the next sector that springs and dashpots lead to."""
+    """Return the masses that springs and dashpots connect to the next sector."""
     links = [*table.springs_n_per_m, *table.dashpots_n_s_per_m]
     ends = {end.removeprefix(NEXT) for link in links for end in link[:2] if str(end).startswith(NEXT)}
     return [name for name in table.labels if name in ends]
 
 
 def _links(links: list[list[Any]], labels: list[str]) -> FloatArray:
-    """Return the matrix of springs or dashpots between the masses of the labels."""
+    """Return the matrix of springs or dashpots between labelled masses."""
     matrix = np.zeros((len(labels), len(labels)))
     for first, second, value in links:
         column = np.zeros(len(labels))
@@ -292,7 +292,7 @@ def _links(links: list[list[Any]], labels: list[str]) -> FloatArray:
 
 
 def _body_points(name: str, surface: Surface) -> BodyPoints:
-    """Return the points of a body's surface, their frames made of normals and tangent."""
+    """Return the contact points of a body's surface, with frames from normals and tangent."""
     normals = surface.directions
     frames = []
     for normal in normals:

@@ -99,7 +99,7 @@ def _pressure(columns: MeasuredColumns, *, static: bool) -> ComplexArray:
 
 
 def _area(columns: MeasuredColumns) -> FloatArray | None:
-    """Return the (n, 3) vectors of the areas; None where the file has none."""
+    """Return (n, 3) area vectors; None if the file has none."""
     name, factor = columns.named("area", AREAS)
     normal = [n for n in NORMAL if n in columns.names]
     if not name and not normal:

@@ -52,7 +52,7 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
 
 
 def _own_refusals(tables: Tables, key: str, table: MistuningTable) -> Iterator[InputError]:
-    """Yield what is wrong with the part of a single sector."""
+    """Yield errors about the part of a single sector."""
     unknown = False
     for word in ("part", "by"):
         named = getattr(table, word)
@@ -85,13 +85,13 @@ def _own_refusals(tables: Tables, key: str, table: MistuningTable) -> Iterator[I
 
 
 def _elsewhere(old: Lumped, new: Lumped) -> bool:
-    """Whether a name that both have is that of another mass: masses are matched by their order."""
+    """Return whether a name common to both belongs to different masses; masses are matched by their order."""
     at = {name: i for i, name in enumerate(new.labels)}
     return any(at.get(name, i) != i for i, name in enumerate(old.labels))
 
 
 def _spare_refusals(tables: Tables) -> Iterator[InputError]:
-    """Yield the complaints about surfaces of parts that stand in single sectors alone."""
+    """Yield errors about surfaces of parts that occur in single sectors only."""
     spare = {one.by: one.part for one in tables.mistuning.values() if one.by and one.part}
     named = [
         *(

@@ -187,7 +187,7 @@ def read_study(path: Path) -> Study:
 
 
 def _drive(tables: Tables) -> float:
-    """Return the harmonic forces over the static ones; over 1 N where there is none."""
+    """Return the ratio of harmonic to static forces; without static forces relative to 1 N."""
     static, harmonic = 0.0, 0.0
     for load in tables.load.values():
         if load.harmonic == 0:

@@ -48,7 +48,7 @@ def decode(payload: bytes) -> dict[str, Any]:
 
 
 def _array(content: bytes) -> Any:
-    """Return an array as `numpy.savez` wrote it; `numpy.load` parses the description of each anew, which takes two thirds of its time."""
+    """Return an array as `numpy.savez` wrote it. `numpy.load` parses each header anew, which takes two thirds of its time."""
     end = HEADER + int.from_bytes(content[HEADER - 2 : HEADER], "little")
     shape, by_columns, dtype = _described(content[:end])
     if dtype.hasobject:
@@ -59,7 +59,7 @@ def _array(content: bytes) -> Any:
 
 @lru_cache(maxsize=512)
 def _described(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Return shape, whether columns stay together, and type of an array from what stands before it."""
+    """Return shape, memory order and type of an array from its header."""
     stream = io.BytesIO(header)
     if np.lib.format.read_magic(stream) != (1, 0):
         raise ValueError("an array with a description of more than 64 kB")
@@ -76,7 +76,7 @@ def encode_record(record: Any) -> bytes:
 
 
 def _flat(record: Any) -> dict[str, Any]:
-    """Return the fields of a record by name; those of the records that it holds as ``field/index/name`` beside their number."""
+    """Return the fields of a record by name; those of nested records as ``field/index/name``, with their number."""
     found: dict[str, Any] = {}
     for own in (f for f in fields(record) if f.init):
         value = getattr(record, own.name)
@@ -90,7 +90,7 @@ def _flat(record: Any) -> dict[str, Any]:
 
 
 def _row_type(kind: type[Any], name: str) -> type[Any] | None:
-    """Return the class of the records that a field holds, ``tuple[Class, ...]``; None where it holds none."""
+    """Return the record class of a field ``tuple[Class, ...]``; None for another field."""
     hint = _hints(kind)[name]  # type: ignore[arg-type]  # a class has a hash
     inner = get_args(hint)[0] if get_origin(hint) is tuple else None
     return inner if is_dataclass(inner) and isinstance(inner, type) else None

@@ -66,7 +66,7 @@ def clear(sealed: Path) -> None:
 
 
 def _copied(path: Path, own: Path, record: type) -> bool:
-    """Copy a file that may be written to meanwhile; say whether the copy is good."""
+    """Copy a file that may be written to meanwhile; return whether the copy is good."""
     copy = file_at_work(own.with_name(own.name.partition(".")[0]), new_owner())
     try:
         # SQLite undoes in the copy what was cut off in the original

@@ -100,7 +100,7 @@ def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] 
 
 
 def _refuse_strangers(folder: Path) -> None:
-    """Refuse links, folders and devices under names of ours: a run would write or delete through them."""
+    """Refuse links, folders and devices under names of run files: a run would write or delete through them."""
     inner = [folder / name for name in (JOBS, PARTS)]
     files = [path for pattern in (*OWN, *HELD) for path in _found(folder, pattern)]
     for path in [*inner, *files]:
@@ -115,7 +115,7 @@ def _refuse_strangers(folder: Path) -> None:
 
 
 def _refuse_long_path(folder: Path) -> None:
-    """Refuse a folder in which SQLite could not open the files of jobs, before anything is computed."""
+    """Refuse a folder whose path is too long for SQLite, before any computation."""
     length = len(os.fsencode(folder.absolute()))
     if length + LONGEST_NAME > LONGEST_PATH:
         raise input_error(
@@ -145,7 +145,7 @@ def _try_out(folder: Path) -> None:
 
 
 def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connection:
-    """Return what holds a file until it is closed or the process ends: SQLite locks files alike on all systems.
+    """Return a lock on a file, held until it is closed or the process ends. SQLite locks files alike on all systems.
 
     Shards share it, so that no other run begins meanwhile; where the folder's machine knows no locks, they do without.
 
@@ -154,7 +154,7 @@ def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connec
     InputError
         If another process holds it.
     sqlite3.DatabaseError
-        If it is no such file.
+        If it is not an SQLite file.
     """
     db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
     try:
@@ -172,7 +172,7 @@ def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connec
 
 
 def _found(folder: Path, pattern: str) -> Iterator[Path]:
-    """Yield the entries of a folder that a pattern names, also links that lead nowhere."""
+    """Yield the entries of a folder that match a pattern, broken links included."""
     if "*" in pattern:
         yield from folder.glob(pattern)
     elif os.path.lexists(folder / pattern):

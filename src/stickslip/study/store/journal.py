@@ -186,7 +186,7 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    """Open a file: without locks where nobody else writes to it, as not all shared folders have them."""
+    """Open a file, without locks if nobody else writes to it, since some shared folders have none."""
     name, alone = str(path), path.stem != _key(path)
     if alone:
         name = f"{path.absolute().as_uri()}?nolock=1"
@@ -195,7 +195,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 
 
 def _key(path: Path) -> str:
-    """Return what a job is called, whoever's file of it this is."""
+    """Return the key of a job from the name of any of its files."""
     return path.name.partition(".")[0]
 
 
@@ -204,7 +204,7 @@ def _mark(path: Path) -> str:
 
 
 def _check_mark(db: sqlite3.Connection, path: Path) -> None:
-    """Refuse the file of another job, or of another layout."""
+    """Refuse the file of another job or of another layout version."""
     row = db.execute("select value from meta where key = 'file'").fetchone()
     layout, _, key = str(row[0] if row else "").partition(":")
     if layout.isdecimal() and int(layout) != FORMAT and key == _key(path):
@@ -224,7 +224,7 @@ def _checksum(db: sqlite3.Connection) -> str:
 
 
 def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
-    """Return the records, none of which is missing: they are numbered without gaps, and the last number is kept apart."""
+    """Return the records after a check that none is missing: they are numbered without gaps, and the last number is stored separately."""
     rows = db.execute("select id, payload from record order by id").fetchall()
     last = db.execute("select seq from sqlite_sequence where name = 'record'").fetchone()
     if [number for number, _ in rows] != list(range(1, (last[0] if last else 0) + 1)):
@@ -244,7 +244,7 @@ def _note(db: sqlite3.Connection, name: str) -> dict[str, Any] | None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Turn what a damaged file or a full disk makes the libraries say into a refusal that names the file."""
+    """Turn errors of libraries about a damaged file or a full disk into an error that names the file."""
     try:
         yield
     except InputError:

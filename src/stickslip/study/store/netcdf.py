@@ -133,7 +133,7 @@ def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
 
 
 def _there(found: xr.Variable | xr.DataArray, dim: Hashable) -> BoolArray:
-    """Return where along a dimension a variable holds anything."""
+    """Return the positions along a dimension at which any variable has a value."""
     values = np.moveaxis(found.values, found.dims.index(dim), 0)
     kind = values.dtype.kind
     missing = np.isnan(values) if kind in "fc" else values == _MISSING[kind]

@@ -56,7 +56,7 @@ def _write(group: h5py.Group, node: xr.DataTree, known: Mapping[str, h5py.Datase
 
 
 def _dimension(group: h5py.Group, name: str, size: int, number: list[int]) -> h5py.Dataset:
-    """Make a dimension that has no variable."""
+    """Create a dimension without a variable."""
     made = group.create_dataset(name, (size,), ">f4")
     return _scale(made, f"{NO_VARIABLE}{size:10d}", number)
 
@@ -90,7 +90,7 @@ def _dataset(group: h5py.Group, name: str, v: xr.Variable) -> h5py.Dataset:
 
 
 def _attribute(of: h5py.HLObject, key: str, value: Any) -> None:
-    """Write an attribute as netCDF does: numbers as arrays of one dimension."""
+    """Write an attribute in the netCDF form: numbers as one-dimensional arrays."""
     if isinstance(value, str):
         of.attrs[key] = value
         return
@@ -136,12 +136,12 @@ def _values(one: h5py.Dataset) -> np.ndarray[Any, Any]:
 
 
 def _shown(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the attributes that a user knows."""
+    """Return the attributes without those internal to netCDF-4."""
     return {name: value for name, value in said.items() if name not in HIDDEN}
 
 
 def _said(of: h5py.HLObject) -> dict[str, Any]:
-    """Return the attributes but for references, a single number as it is."""
+    """Return the attributes without references; single numbers as scalars."""
     found: dict[str, Any] = {}
     for key in of.attrs:
         if key in REFERENCES:

@@ -42,7 +42,7 @@ def sum_up(text: str, line: str) -> None:
 
 
 def _of_job(record: logging.LogRecord) -> bool:
-    """Give a record the job that it is of."""
+    """Add the name of the running job to a record."""
     if not hasattr(record, "job"):
         record.job = _JOB.get()
     return True
@@ -101,10 +101,10 @@ def written_down(path: Path) -> Iterator[None]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log that stops the run when it cannot be written, where that of the library prints a traceback and goes on."""
+    """A log file that stops the run when it cannot be written; the standard library prints a traceback and continues."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Refuse a full disk; where a thread hands on what workers say, this process's next line does."""
+        """Raise an error on a full disk; in a thread that repeats lines of workers, the next line of this process raises it."""
         error = sys.exc_info()[1]
         if not isinstance(error, OSError):
             super().handleError(record)
@@ -113,6 +113,6 @@ class _LogFile(logging.FileHandler):
 
 
 def _line(record: logging.LogRecord) -> bool:
-    """Say whether a record is a line of its own, and give it its head."""
+    """Return whether a record is a line of its own, and add its beginning."""
     record.head = head(record)
     return not hasattr(record, "fraction")

@@ -129,7 +129,7 @@ def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: di
 
 
 def _refuse_stranger(token: Path, versions: dict[str, str], host: str) -> None:
-    """Refuse a machine that would give other numbers, or does not see the folder."""
+    """Refuse a machine with other library versions, or without access to the folder."""
     if not token.exists():
         raise StickslipError(
             f"the worker on {host} does not see {token.parent}. Put the study into a folder that all machines share, under the "
@@ -144,7 +144,7 @@ def _refuse_stranger(token: Path, versions: dict[str, str], host: str) -> None:
 
 
 def _over(token: Path) -> Callable[[], bool]:
-    """Return what says whether the run has ended: its token is gone, twice, as a shared folder may be slow."""
+    """Return a function that says whether the run has ended: its token is missing twice, since a shared folder may be slow."""
     looked, missed = [monotonic()], [0]
 
     def over() -> bool:
@@ -157,7 +157,7 @@ def _over(token: Path) -> Callable[[], bool]:
 
 
 def _keep(record: logging.LogRecord, lines: list[dict[str, Any]]) -> None:
-    """Keep a line for the way back; progress is of no use then."""
+    """Store a log line for the reply; progress records are dropped."""
     if not hasattr(record, "fraction"):
         more = {key: vars(record)[key] for key in OF_RECORDS if key in vars(record)}
         own = {"name": record.name, "levelno": record.levelno, "levelname": record.levelname}

@@ -133,7 +133,7 @@ class Cell:
                 process.stdin.close()
 
     def _look(self, number: int, seconds: float, limits: Limits, stopped: Callable[[], bool]) -> None:
-        """End the process where it has to be."""
+        """Terminate the process if a limit is exceeded or the run was stopped."""
         if stopped():
             self.close()
             raise Stopped("the run was stopped")
@@ -190,7 +190,7 @@ def blas_threads() -> dict[str, str]:
 
 
 def _how(code: int) -> str:
-    """Say in words how a process has ended."""
+    """Describe in words how a process has ended."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:
@@ -202,7 +202,7 @@ def _how(code: int) -> str:
 
 
 def _send(stream: IO[bytes] | None, message: bytes) -> None:
-    """Send a message; where the other end is gone, listening tells."""
+    """Send a message; a closed connection is noticed by the listener."""
     assert stream is not None
     with suppress(OSError):
         pickle.dump(message, stream)
@@ -210,7 +210,7 @@ def _send(stream: IO[bytes] | None, message: bytes) -> None:
 
 
 def _listen(stream: IO[bytes], said: "SimpleQueue[tuple[str, Any]]") -> None:
-    """Put what a process says into a queue, and last that it has ended."""
+    """Put the messages of a process into a queue, at last its end."""
     with stream, suppress(EOFError, OSError, pickle.UnpicklingError):
         while True:
             said.put(_understood(pickle.load(stream)))
@@ -267,7 +267,7 @@ def _prepared(told: dict[str, Any], modules: tuple[str, ...]) -> StickslipError 
 
 
 def _hear(stream: IO[bytes], heard: "SimpleQueue[bytes]") -> None:
-    """Put messages into a queue; end this process when the other end is gone."""
+    """Put messages into a queue; end this process when the connection closes."""
     with suppress(EOFError, OSError, pickle.UnpicklingError):
         while True:
             heard.put(pickle.load(stream))
@@ -275,7 +275,7 @@ def _hear(stream: IO[bytes], heard: "SimpleQueue[bytes]") -> None:
 
 
 def _speaker(out: IO[bytes]) -> Callable[[str, Any], None]:
-    """Return what sends messages, whole ones, from any thread."""
+    """Return a thread-safe function that sends whole messages."""
     lock = threading.Lock()
 
     def say(kind: str, content: Any) -> None:
@@ -291,7 +291,7 @@ def _speaker(out: IO[bytes]) -> Callable[[str, Any], None]:
 
 
 class _Lines(logging.Handler):
-    """Hands lines and progress of this process to the other end."""
+    """Sends log lines and progress of this process to the parent."""
 
     def __init__(self, say: Callable[[str, Any], None]) -> None:
         super().__init__()

@@ -163,7 +163,7 @@ def allocated(kind: str, address: str, workers: int) -> Iterator[Hands]:
 
 
 def _in_allocation(address: str, workers: int) -> int:
-    """Return how many jobs an allocation of SLURM takes at a time; refuse what could only hang."""
+    """Return the number of jobs that a SLURM allocation takes at a time; refuse an allocation in which jobs would hang."""
     if shutil.which("srun") is None:
         raise input_error("--executor slurm", "finds no srun here", "Run it where SLURM is.")
     if "SLURM_JOB_ID" not in os.environ:
@@ -186,7 +186,7 @@ def _in_allocation(address: str, workers: int) -> int:
 
 @contextmanager
 def _far(pool: Executor, room: int, trouble: Callable[[], str] = str) -> Iterator[Hands]:
-    """Give an executor whose jobs end by themselves when the run is over."""
+    """Yield an executor whose jobs end when the run is over."""
     one_blas_thread()  # jobs take as many as this process says
     try:
         yield Hands(pool, room, far=True, trouble=trouble)
@@ -196,7 +196,7 @@ def _far(pool: Executor, room: int, trouble: Callable[[], str] = str) -> Iterato
 
 @contextmanager
 def _bound(address: str) -> Iterator[None]:
-    """Let executorlib listen on one address: by itself it does on all of them, and what it hears is unpickled."""
+    """Make executorlib listen on one address only: by default it listens on all, and unpickles what it receives."""
     from executorlib.standalone.interactive.communication import SocketInterface
 
     before = SocketInterface.bind_to_random_port

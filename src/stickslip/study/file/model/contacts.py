@@ -195,7 +195,7 @@ def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
 
 
 def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
-    """Return the complaint about a key that is of another law, or of another share."""
+    """Return the error about a key that belongs to another law or to another `per`."""
     if key in keys_of(law, per_area=not area):
         ours, theirs = (list(keys_of(law, per_area=a)) for a in (area, not area))
         what = '"area"' if area else "one other than area"
@@ -210,7 +210,7 @@ def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
 
 
 def _columns() -> dict[str, Any]:
-    """Return the keys of all laws: each may be left out, and the law says which must not be."""
+    """Return the keys of all laws, all optional; the law decides which ones are required."""
     sliders = "how the sliders of iwan share stiffness and limit, a table with its kind"
     found: dict[str, Any] = {"population": (PopulationTable | None, Field(None, description=sliders))}
     for area in (False, True):

@@ -21,7 +21,7 @@ DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
 
 
 class _PlausibleMaterial(Section):
-    """Checks that numbers are those of a solid."""
+    """Checks that the numbers are plausible for a solid."""
 
     plausible: bool = Field(
         True,

@@ -147,7 +147,7 @@ class MistuningTable(Section):
                 yield custom_error("is given beside part", "A part of its own has no pattern.", key)
 
     def _idle(self) -> Iterator[PydanticCustomError]:
-        """Yield the complaints about keys that nothing would come of."""
+        """Yield errors about keys without any effect."""
         for key, needed in BESIDE.items():
             if key in self.model_fields_set and getattr(self, needed) is None:
                 yield custom_error(

@@ -277,7 +277,7 @@ KINDS: dict[str, type[Section]] = {**SHAPES, "file": FileModel, "of": Copy}
 
 
 def _kind(given: Any) -> str | None:
-    """Return which kind of part a table is."""
+    """Return the kind of a part's table."""
     if isinstance(given, dict):
         return next((key for key in ("file", "of") if key in given), given.get("shape"))
     return next((kind for kind, table in KINDS.items() if type(given) is table), None)
