@@ -26,7 +26,7 @@ def facts_of(model: Model, rpm: float) -> dict[str, Any]:
 
 
 def _in_words(model: Model, rpm: float) -> str:
-    """Say which effects of rotation are in the numbers."""
+    """Name the effects of rotation in the numbers."""
     if not model.rotates:
         return "matrices as read, unchanged by speed"
     if rpm == 0:

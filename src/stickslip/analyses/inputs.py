@@ -135,7 +135,7 @@ def _joined(each: list[str]) -> str:
 
 
 def _table(study: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return a table of the study, empty where it is missing or none."""
+    """Return a table of the study; empty if it is missing or no table."""
     found = study.get(name, {})
     return found if isinstance(found, dict) else {}
 
@@ -166,7 +166,7 @@ def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
 
 
 def _part(own: Mapping[str, Any]) -> str:
-    """Say what a part is made of, and how it is damped by itself."""
+    """Describe material and damping of a part."""
     kind = own.get("shape") or own.get("file") or own.get("of") or "matrices"
     words = ("damp", "dashpot", "sectors", "mass_kg", "material")
     rest = [told(k, v) for k, v in _flat(own) if k.startswith(words)]
@@ -174,7 +174,7 @@ def _part(own: Mapping[str, Any]) -> str:
 
 
 def _load(own: Mapping[str, Any]) -> str:
-    """Say where and how a load acts."""
+    """Describe place and direction of a load."""
     along = own.get("direction", "")
     along = f" along {_plain(along)}" if along else ""
     size = next((told(k, own[k]) for k in ("force_n", "pressure") if k in own), "")
@@ -187,7 +187,7 @@ def _load(own: Mapping[str, Any]) -> str:
 
 
 def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | None:
-    """Return a row a contact: what touches what, the values of its law, its points, and its force under the static loads."""
+    """Return a table with one row a contact: surfaces, values of its law, points, and static force."""
     written = {n: o for n, o in _table(study, "contact").items() if isinstance(o, dict)}
     known = dict(response.groups) if response and response.has("contact_law") else {}
     names = list(dict.fromkeys([*known, *written]))
@@ -212,7 +212,7 @@ def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | No
 
 
 def _names(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
-    """Say what each output is."""
+    """Describe each output."""
     node = next((n for n in nodes.values() if "output" in n.data.coords), None)
     if node is None:
         return None

@@ -60,7 +60,7 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
 
 
 def _views(section: Section, data: xr.Dataset) -> list[Any]:
-    """Return what a section draws: all cases at once, or one after the other; the first for all where they are alike."""
+    """Return the views of a section: all cases at once, or one after the other; equal cases share the first view."""
     if not section.by_case:
         return [section.view(data)]
     n = data.sizes["case"]
@@ -71,7 +71,7 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
 
 
 def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
-    """Return what the parts of a chapter show of a view."""
+    """Return the contents of the parts of a chapter for a view."""
     for part in parts:
         shown = part(view)
         if isinstance(shown, Sequence):
@@ -83,7 +83,7 @@ def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
 def _chapter(
     section: Section, block: Block, data: xr.Dataset, views: Sequence[Any], placing: Placing
 ) -> Chapter | None:
-    """Return a chapter for all cases, or for each case with the buttons that choose between them; None for an empty one."""
+    """Return a chapter for all cases, or one for each case with buttons; None for an empty chapter."""
     bodies = [placing(_contents(block.parts, view)) for view in views]
     if not any(bodies):
         return None
@@ -102,7 +102,7 @@ def _nodes(tree: xr.DataTree) -> dict[str, Node]:
 
 
 def _provenance(tree: xr.DataTree) -> list[Content]:
-    """Who made this, with what, from which study."""
+    """Return versions, date and study file of the result."""
     node = Node(tree.to_dataset())
     used = versions(node.text("versions", "{}"))
     rows = [

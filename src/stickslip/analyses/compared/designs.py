@@ -145,7 +145,7 @@ def differences(designs: Sequence[Design]) -> list[list[str]]:
 
 
 def _plain(value: Any) -> str:
-    """Return a value of a study file as text: numbers with the digits that they need, lists without quotes."""
+    """Return a value of a study file as text: numbers with all their digits, lists without quotes."""
     if isinstance(value, list):
         return f"[{', '.join(map(_plain, value))}]"
     return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -124,7 +124,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
 
 
 def _outputs(designs: Sequence[Design]) -> str:
-    """Name the outputs whose amplitudes are compared: once where they are called alike."""
+    """Name the compared outputs; equal names once."""
     names = {d.name: d.response.output_name for d in designs if d.response}
     if len({*names.values()}) == 1:
         return next(iter(names.values()))
@@ -132,7 +132,7 @@ def _outputs(designs: Sequence[Design]) -> str:
 
 
 def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> str:
-    """Say which case of each design is drawn, and which have none."""
+    """Name the case drawn for each design, and the designs without one."""
     own = [(d, _case(d, choice, divided=divided)) for d in designs]
     there = [f"{d.name}: {c.label or 'its only case'}" for d, c in own if c is not None]
     without = [d.name for d, c in own if c is None]
@@ -355,7 +355,7 @@ def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
 
 
 def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool) -> list[Card]:
-    """Return a card for each design at a case of it, held against the first one."""
+    """Return a card for each design at a case, compared with the first design."""
     found: list[Card] = []
     first, against = float("nan"), ""
     for design, case in pairs:

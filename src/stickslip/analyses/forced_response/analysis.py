@@ -102,14 +102,14 @@ NOTES = (
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return the assembled model and the sweep; refuse what cannot be computed."""
+    """Return the question of a case; refuse cases that cannot be computed."""
     for line in _of_pressures(case, model):
         LOG.info(line)
     return with_comparisons(question_of(case, model), case, model)
 
 
 def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
-    """Yield the points that are not done; put down what the dataset needs, and the checks asked for."""
+    """Yield the missing points, then store data for the dataset and the requested checks."""
     points = list(done)
     failure: Exception | None = None
     try:
@@ -146,7 +146,7 @@ def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Return the estimated cost, where resonances are to be expected, and how harmonics will be chosen."""
+    """Return estimated cost, expected resonances, and the selection of harmonics."""
     question = question_of(case, model)
     chooser, passages = question.chooser, case.settings.harmonics.passages
     labels = question.model.error_labels
@@ -177,23 +177,23 @@ def _check(case: Case, model: Model) -> tuple[str, ...]:
 
 
 def _verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
-    """Return what is to be thought of each case and its points."""
+    """Return the verdicts on each case and its points."""
     return verdicts(data, [str(x) for x in data["case_label"].values])
 
 
 def _completed(data: xr.Dataset, measured: MeasuredPeaks | None) -> xr.Dataset:
-    """Return the dataset with the measured peaks, and with what friction does at the peak of each case."""
+    """Return the dataset with measured peaks, and with the effect of friction at the peak of each case."""
     return with_regimes(with_measured(data, measured))
 
 
 def _of_pressures(case: Case, model: Model) -> tuple[str, ...]:
-    """Return what is told of pressure fields; a model without a study has no table of its loads."""
+    """Return lines about pressure fields; empty for a Python model, which has no table of its loads."""
     given = getattr(case.settings, "load", {})
     return pressure_lines(model, {name: table.modal_forces for name, table in given.items()})
 
 
 def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
-    """Yield the points that are not done."""
+    """Yield the missing points."""
     if notes.get("finished") is not None:
         return
     _compile(question)
@@ -207,7 +207,7 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
 
 
 def _of_physics(question: Question, response: Response) -> Values:
-    """Return what the job knows of the physics of its case, and how far the model decides its peak."""
+    """Return the properties of the modes of a case, and the sensitivity of its peak to the model."""
     return (
         of_physics(question, response)
         | motion_at_peak(question, response)
@@ -218,7 +218,7 @@ def _of_physics(question: Question, response: Response) -> Values:
 
 
 def _put_down(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
-    """Put down all that the dataset needs, once."""
+    """Store all data for the dataset, once."""
     if notes.get("response") is not None:
         return
     shift = peak_shift(question, response)
@@ -235,7 +235,7 @@ def _put_down(question: Question, response: Response, examined: Sequence[Examine
 
 
 def _judge(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
-    """Integrate in time what was asked for, and return what is known of the stability then."""
+    """Make the requested time integrations, and return the stability known then."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
     checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
@@ -256,7 +256,7 @@ def _judge(question: Question, response: Response, examined: list[Examined], not
 
 
 def _answer_in_time(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
-    """March where no periodic motion stands for the response, once."""
+    """Integrate in time at points without a valid periodic motion, once."""
     if notes.get(NOT_PERIODIC) is not None:
         return
     answers = [
@@ -270,7 +270,7 @@ def _answer_in_time(question: Question, response: Response, examined: Sequence[E
 
 
 def _bifurcations(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> Values:
-    """Locate the bifurcations of the response, and follow what leaves there."""
+    """Locate the bifurcations of the response, and follow side branches."""
     found = located(question, response, notes)
     for line in found.sentences:
         LOG.info(f"bifurcations: {question.said(line)}")
@@ -287,7 +287,7 @@ def _check_harmonics(question: Question, response: Response, notes: Notes) -> No
 
 
 def _compile(question: Question) -> None:
-    """Evaluate contacts and strategy once, or the first case would count their compilation as work; of a large problem the work is more than that."""
+    """Evaluate contacts and strategy once, so that compilation does not count as work of the first case; skipped for large problems."""
     problem, system, omega = question.problem, question.model.system, question.sweep.ends[0]
     if isinstance(problem.low, HarmonicBalance) and problem.low.large:
         return
@@ -323,7 +323,7 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
 
 
 def _values(solved: Solved) -> Values:
-    """Return all that a job put down under the names of variables."""
+    """Return all stored variables of a job."""
     return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
 
 

@@ -217,7 +217,7 @@ def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Choo
 
 
 def _name(strategy: Strategy) -> str:
-    """Return what a study file calls a strategy, of one of your own its class."""
+    """Return the name of a strategy in study files; for one of the user the name of its class."""
     own = type(strategy).__name__
     return next((name for name, (_, known) in STRATEGIES.items() if known == own), own)
 
@@ -229,7 +229,7 @@ def _more(response: Response, chooser: Chooser) -> str:
 
 
 def _kept(response: Response) -> str:
-    """Say which harmonics were kept how often, the most frequent ones first."""
+    """Count the points with each set of harmonics, the most frequent set first."""
     counts = Counter(named(a.point.harmonics) for a in response.accepted)
     each = [f"H = {own} at {n}" for own, n in counts.most_common(NAMED)]
     rest = sum(counts.values()) - sum(n for _, n in counts.most_common(NAMED))
@@ -238,7 +238,7 @@ def _kept(response: Response) -> str:
 
 
 def _listed(points: Sequence[ForcedPoint], over: BoolArray) -> str:
-    """Return the ranges of neighbouring frequencies above the threshold as text."""
+    """Return the frequency ranges above the threshold as text."""
     found: list[tuple[float, float]] = []
     inside = False
     for i in np.argsort([p.omega for p in points]):

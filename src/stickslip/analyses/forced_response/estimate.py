@@ -122,7 +122,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
 
 
 def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
-    """Return how many numbers a Newton step holds at once."""
+    """Return how many numbers a Newton step stores at once."""
     if sectors > 1:  # a factor of each harmonic and the wheel's matrices
         return 12 * (unknowns + 4 * coordinates) * coordinates
     if unknowns <= MAX_ARRAY_UNKNOWNS:  # an array of all harmonics together, and its factors
@@ -144,7 +144,7 @@ def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
 
 
 def _flops(unknowns: int) -> int:
-    """Return what a Newton step takes; with many unknowns a Krylov method is used, which does not factorise them all together."""
+    """Return the operations of a Newton step; above a size a Krylov method factorises the harmonics separately."""
     return 4 * unknowns * min(unknowns, FACTORISED) ** 2
 
 

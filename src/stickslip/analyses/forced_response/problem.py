@@ -316,7 +316,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _require_coefficients(model: Assembled, sweep: Sweep) -> None:
-    """Refuse aerodynamic coefficients that do not reach to all harmonics that may be kept."""
+    """Refuse aerodynamic coefficients that do not cover all harmonics that may be kept."""
     force = model.system.structure.feedback_of(1)
     if force is None:
         return
@@ -328,7 +328,7 @@ def _require_coefficients(model: Assembled, sweep: Sweep) -> None:
 
 
 def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
-    """Return the model whose sliders start from the static state under a share of the friction, and that state."""
+    """Return the model whose sliders start from the static state under a fraction of the friction, and that state."""
     try:
         system = frozen_sliders(model.system, model.load.static, share)
     except InputError as error:
@@ -339,7 +339,7 @@ def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
 
 
 def _driving(loads: Mapping[str, Any]) -> str:
-    """Return the key of the only load that vibrates; the table where there are several."""
+    """Return the key of the only harmonic load; for several loads the table."""
     driven = {name: table for name, table in loads.items() if table.harmonic > 0}
     if len(driven) != 1:
         return "load"
@@ -358,7 +358,7 @@ def _require_driven(model: Model, sweep: Sweep) -> None:
 
 
 def _require_integrable(model: Model) -> None:
-    """Refuse a check by time integration of what it does not know."""
+    """Refuse a check by time integration of a model that it does not support."""
     for name, part in model.parts.items():
         if part.structure.loss is not None or (part.damping and part.damping.loss_factor):
             raise input_error(
@@ -380,7 +380,7 @@ def _require_integrable(model: Model) -> None:
 
 
 def _require_sectors(model: Model, assembled: Assembled) -> None:
-    """Refuse a wheel whose sectors are too many coordinates to be integrated."""
+    """Refuse a wheel whose sectors have too many coordinates for time integration."""
     side = assembled.system.structure
     if side.wheel is None:
         if assembled.blades is not None and side.n > MOST_IN_TIME:
@@ -401,7 +401,7 @@ def _require_sectors(model: Model, assembled: Assembled) -> None:
 
 
 def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> None:
-    """Refuse what needs contact forces that are functions of the gaps, where a contact is rigid."""
+    """Refuse features that need contact forces as functions of the gaps, in a model with rigid contacts."""
     found = [name for name, contact in model.contacts.items() if law_name(contact.law) == RIGID]
     if not found:
         return

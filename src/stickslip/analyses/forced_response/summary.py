@@ -87,7 +87,7 @@ def orders_sentence(data: xr.Dataset) -> str:
 
 
 def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
-    """Return the peak of each engine order where several act at once."""
+    """Return the peak of each engine order, if several act at once."""
     head = ("case", "engine order", *HEAD, "its own Hz")
     rows = []
     for i, label in enumerate(labels):
@@ -104,7 +104,7 @@ def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
 
 
 def _of_blades(data: xr.Dataset, labels: list[str]) -> TextTable:
-    """Return amplification and largest blade where the sectors of a wheel differ."""
+    """Return amplification and largest blade of a mistuned wheel."""
     title = "Blades of the wheel"
     if "amplification" not in data:
         return TextTable(title, (), ())
@@ -176,7 +176,7 @@ def _row(data: xr.Dataset, i: int, label: str) -> tuple[str, ...]:
 
 
 def _millimetres(size: float) -> str:
-    """Write a peak with more digits than are shown: columns round it, and rounding twice gives another last digit."""
+    """Write a peak with more digits than shown: columns round it, and rounding twice gives another last digit."""
     return f"{size:.7g}" if size >= 1e-4 else f"{size:.5g}"
 
 
@@ -205,7 +205,7 @@ def _sentences(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...
 
 
 def _along(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
-    """Return the sentences that single points have, with the labels of their cases."""
+    """Return the sentences of single points, with the labels of their cases."""
     if f"{name}_sentence" not in data:
         return ()
     told = zip(data[f"{name}_case"].values, data[f"{name}_sentence"].values, strict=True)

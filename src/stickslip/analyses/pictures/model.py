@@ -79,7 +79,7 @@ def facts(nodes: Mapping[str, Node]) -> Table | None:
 
 
 def _together(nodes: Mapping[str, Node]) -> Node:
-    """Return what any analysis stores of the model: the first one that does."""
+    """Return the facts about the model from the first analysis that stores them."""
     each = [node.data for node in reversed(list(nodes.values()))]
     told = {n: v.variable for data in each for n, v in data.data_vars.items() if set(v.dims) <= {"xyz"}}
     return Node(xr.Dataset(told, attrs={k: v for data in each for k, v in data.attrs.items()}))
@@ -95,7 +95,7 @@ _COUNTS = (
 
 
 def _static(node: Node) -> list[list[str]]:
-    """Return what the centrifugal load does, where something turns."""
+    """Return the effects of the centrifugal load, if something rotates."""
     displacement = node.scalar("static_displacement_m")
     if not np.isfinite(displacement):
         return []

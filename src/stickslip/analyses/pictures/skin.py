@@ -75,7 +75,7 @@ def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
 
 
 def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
-    """Keep the triangles or edges whose bounding box meets the box from `low` to `high`."""
+    """Return the triangles or edges whose bounding box meets the box from `low` to `high`."""
     corners = points[parts]
     meets = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
     return np.asarray(parts[meets.all(axis=1)])
@@ -106,7 +106,7 @@ def _contacts(response: Response, position: FloatArray, *, named: bool, keyed: b
 
 
 def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.Mesh3d]:
-    """Draw the contacts, coloured by what they do in a cycle at the peak of the case that is shown first: patches where points have areas."""
+    """Draw the contacts coloured by their state in a cycle at the peak of the case shown first; as patches if points have areas."""
     case = response.cases[response.chosen]
     state = states(response, case)
     open_, slips = ((state == k).any(axis=(1, 2)) for k in (2, 1))
@@ -134,7 +134,7 @@ def _states(response: Response, position: FloatArray) -> list[go.Scatter3d | go.
 
 
 def _named(response: Response, position: FloatArray, at: IntArray, alone: IntArray, state: int) -> go.Scatter3d:
-    """Draw contact points in a state: those that stand alone as dots, those on a patch to point at; names where they are few."""
+    """Draw contact points in a state: single points as dots, points of a patch as hover targets; with names if they are few."""
     names = np.array(response.labels("contact"), dtype=object)
     few = len(names) <= _MOST_NAMES
     size = np.where(np.isin(at, alone), 8.0, 2.0)
@@ -167,7 +167,7 @@ def contact_patches(response: Response, position: FloatArray) -> dict[int, Float
 
 
 def _places(response: Response) -> np.ndarray:
-    """Return where the names of contact points stand: of neighbouring lines above and below, so that they do not cover each other."""
+    """Return label positions of contact points, alternately above and below neighbouring lines so that they do not overlap."""
     place = np.full(len(response.labels("contact")), "top center", dtype=object)
     for line, members in enumerate(contact_lines(response)):
         place[members] = "bottom center" if line % 2 else "top center"
@@ -175,7 +175,7 @@ def _places(response: Response) -> np.ndarray:
 
 
 def _sections(response: Response, position: FloatArray) -> go.Scatter3d:
-    """Join the contact points of each section of a rigid body, which has no skin: names that end alike."""
+    """Connect the contact points of each section of a rigid body, which has no skin; names of a section end alike."""
     rows: dict[str, list[int]] = {}
     for index, name in enumerate(response.labels("contact") if rigid_bodies(response) else ()):
         rows.setdefault(name.rpartition(".")[2], []).append(index)
@@ -193,7 +193,7 @@ def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _eye(response: Response) -> dict[str, float] | None:
-    """Return from where the contacts are seen: aslant onto their faces where these look one way; None where they do not."""
+    """Return the viewpoint: oblique to the contact faces if they face one way; None otherwise."""
     if not response.has("contact_frame"):
         return None
     normal = np.nanmean(response.values("contact_frame")[:, :, 2], axis=0)

@@ -21,7 +21,7 @@ from stickslip.units import RPM
 
 
 def _numbers(asked: CampbellTable, wheel: Wheel) -> tuple[int, ...]:
-    """Return the wave numbers of the nodal diameters asked for; else those that the engine orders excite."""
+    """Return the wave numbers of the requested nodal diameters, else of those excited by the engine orders."""
     if asked.nodal_diameters is not None:
         return wheel.numbers(asked.nodal_diameters)
     return tuple(sorted({wheel.diagram(m) for m in asked.engine_orders}))
@@ -39,7 +39,7 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
 
 
 def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable) -> list[tuple[int, float]]:
-    """Return engine orders that leave all followed modes of their wave below them, and the speed in rpm from which they do."""
+    """Return engine orders that rise above all followed modes of their wave, and the speed in rpm from which they do."""
     known = {w.wave_number: w.frequencies_hz for w in waves}
     found = []
     for order in sorted(asked.engine_orders):
@@ -88,7 +88,7 @@ def _beyond(unfollowed: Sequence[tuple[int, float]]) -> Variables:
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return what is solved."""
+    """Return the question of a case."""
     asked: CampbellTable = case.settings.campbell
     if not model.rotates:
         raise input_error(

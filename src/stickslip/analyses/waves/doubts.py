@@ -132,7 +132,7 @@ def in_ranges(numbers: Sequence[int] | set[int]) -> str:
 
 
 def _more(n_modes: int, ratio: float) -> int:
-    """Guess how many modes reach `ratio` times as high: modes of blades come no denser than in proportion to frequency."""
+    """Estimate how many modes reach `ratio` times as high: at most in proportion to frequency for blades."""
     return max(n_modes + 1, math.ceil(n_modes * min(ratio, 100.0)))
 
 

@@ -95,7 +95,7 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
 
 
 def _of_wheel(eigenvalues: ComplexArray) -> Variables:
-    """Return the modes of a wheel whose sectors differ, in the flow, the least damped first."""
+    """Return the modes of a mistuned wheel in the flow, the least damped first."""
     about = "of a mode of the wheel whose sectors differ, in the flow with its own damping"
     return {
         "wheel_damping": variable("wheel_mode", damping_ratio(eigenvalues), "1", f"damping ratio {about}"),
@@ -121,7 +121,7 @@ def _influence(note: Any) -> InfluenceCoefficients:
 
 
 def _unstable(waves: Sequence[WaveFlutter], total: FloatArray, sectors: int, asked: FlutterTable) -> list[Verdict]:
-    """Say which waves have less damping than is wanted, the least stable first."""
+    """Report waves with less damping than required, the least stable first."""
     required = asked.required_percent / PERCENT
     rows = [(total[i, m], i, m) for i, m in np.argwhere(total < required)]
     if not rows:
@@ -134,7 +134,7 @@ def _unstable(waves: Sequence[WaveFlutter], total: FloatArray, sectors: int, ask
 
 
 def _others(rows: Sequence[tuple[float, int, int]], worst: float) -> str:
-    """Say how many waves are as the worst: that grow, or have too little damping; and how many modes, where that differs."""
+    """Count the waves, and the modes if their number differs, that grow or have too little damping."""
     alike = [row for row in rows if row[0] < 0 or worst >= 0]
     if len(alike) == 1:
         return ""
@@ -144,7 +144,7 @@ def _others(rows: Sequence[tuple[float, int, int]], worst: float) -> str:
 
 
 def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:
-    """Doubt the energy method where the eigenvalue differs: then the fluid changes the mode."""
+    """Doubt the energy method if the eigenvalue differs: the fluid then changes the mode."""
     size = np.abs(by_eigenvalue).max(initial=0.0)
     off = np.abs(energy - by_eigenvalue).max(initial=0.0)
     if not off > APART * size:
@@ -157,7 +157,7 @@ def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return what is solved."""
+    """Return the question of a case."""
     asked: FlutterTable = case.settings.flutter
     given = model.aerodynamics
     if given is None:
@@ -188,7 +188,7 @@ def _inputs(case: Case, model: Model) -> Question:
 
 
 def _solve(inputs: Question, done: Sequence[Any], notes: Notes) -> Iterator[Any]:
-    """Yield what is found of each wave; the coefficients go into the notes first."""
+    """Yield the record of each wave; the coefficients go into the notes first."""
     if notes.get(INFLUENCE) is None:
         flow = flow_around(inputs.model)
         assert flow is not None

@@ -33,7 +33,7 @@ from stickslip.units import HZ, RPM
 
 
 def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
-    """Return the frequencies to compare with; None if there are none."""
+    """Return the reference frequencies; None if there are none."""
     if asked.reference is None:
         return None
     return read_reference(home / asked.reference, asked.reference_case)
@@ -49,7 +49,7 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
 
 
 def _of_stages(waves: Sequence[WaveModes]) -> Variables:
-    """Return what part of the energy each stage has; nothing of a single wheel."""
+    """Return the energy share of each stage; empty for a single wheel."""
     shares = np.array([w.shares.T for w in waves])
     if not shares.size:
         return {}
@@ -63,7 +63,7 @@ def _of_stages(waves: Sequence[WaveModes]) -> Variables:
 
 
 def _in_flow(waves: Sequence[WaveModes]) -> Variables:
-    """Return damping and frequency of the eigenvalues with aerodynamic forces; nothing where there are none."""
+    """Return damping and frequency of the eigenvalues with aerodynamic forces; empty without such forces."""
     values = np.array([w.in_flow for w in waves])
     if not values.size:
         return {}
@@ -89,7 +89,7 @@ def _compared(solved: Solved, hertz: FloatArray) -> Variables:
 
 
 def _of_other_speed(solved: Solved) -> list[Verdict]:
-    """Tell of frequencies to compare with that are of another speed."""
+    """Report reference frequencies at another speed."""
     asked: ModesTable = solved.case.settings.modes
     known, rpm = _compared_with(asked, solved.case.home), float(solved.notes["model"]["speed_rpm"])
     others = known.not_at(rpm) if known is not None else ()
@@ -110,7 +110,7 @@ def _shapes(waves: Sequence[WaveModes]) -> Variables:
 
 
 def _inputs(case: Case, model: Model) -> Question | StagesQuestion:
-    """Return what is solved."""
+    """Return the question of a case."""
     asked: ModesTable = case.settings.modes
     if model.stages is not None:
         return stages_question(model, asked.nodal_diameters, asked.number)
@@ -137,7 +137,7 @@ def _inputs(case: Case, model: Model) -> Question | StagesQuestion:
 
 
 def _solve(inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: Notes) -> Iterator[WaveModes]:
-    """Yield what is found of each wave, or nodal diameter of stages, and put down the modes of a wheel whose sectors differ."""
+    """Yield the modes of each wave, or of each nodal diameter of stages, and store the modes of a mistuned wheel."""
     if isinstance(inputs, StagesQuestion):
         yield from each_diameter(inputs, done, notes)
         return
@@ -147,7 +147,7 @@ def _solve(inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: 
 
 
 def _unreached(asked: Question | StagesQuestion) -> list[str]:
-    """Say which waves of several stages will be in no list."""
+    """Name the waves of several stages that appear in no list."""
     told = unreached(asked.assembly) if isinstance(asked, StagesQuestion) else []
     return [f"modes: {v.why}. {v.remedy}" for v in told]
 
@@ -163,7 +163,7 @@ def _refuse_too_many(model: Model, number: int) -> None:
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say how many modes there will be, and which waves of several stages are in no list."""
+    """State the number of modes, and the waves of several stages that appear in no list."""
     asked = _inputs(case, model)
     return (counted("modes", asked), *_unreached(asked))
 

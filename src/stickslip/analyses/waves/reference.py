@@ -112,7 +112,7 @@ def _rows(path: Path, case: str | None) -> tuple[dict[tuple[int, int], float], s
 
 
 def _lines(path: Path, stream: TextIO, case: str | None) -> Iterator[tuple[int, Row]]:
-    """Yield the rows that are compared with and the numbers of their lines."""
+    """Yield the reference rows and their line numbers."""
     reader = csv.DictReader(stream)
     required = [name for name, field in Row.model_fields.items() if field.is_required()]
     needed = [*required, *(["case"] if case is not None else [])]

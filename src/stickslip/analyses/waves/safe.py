@@ -75,7 +75,7 @@ def _pairs(waves: Sequence[WaveModes], met: Safe) -> Variables:
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return what is solved."""
+    """Return the question of a case."""
     asked: SafeTable = case.settings.safe
     if model.sectors == 1:
         raise input_error(

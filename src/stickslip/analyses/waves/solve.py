@@ -248,7 +248,7 @@ def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
 
 
 def _own_points(model: Model) -> IntArray:
-    """Return the points of the skin that do not follow the neighbour's, as those of the high cyclic face do."""
+    """Return the skin points that do not depend on the neighbour, unlike those of the high cyclic face."""
     following = np.ones((model.places.n, 1))
     following[own_dofs(model)] = 0.0
     return np.flatnonzero(~model.on_skin(following).any(axis=(0, 2)))

@@ -55,7 +55,7 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
 
 
 def _stiffest_table(case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]) -> TextTable:
-    """Return the frequencies that the harmonics left out could make."""
+    """Return the frequencies with the uncoupled harmonics of the flanges fixed."""
     rows = tuple(
         (*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, case["stiffest_hz"].values, strict=True)
     )
@@ -94,7 +94,7 @@ def flutter_tables(case: xr.Dataset) -> list[TextTable]:
 
 
 def _mistuned_flutter(case: xr.Dataset) -> list[TextTable]:
-    """Return the least damped modes of a wheel whose sectors differ; nothing where they are alike."""
+    """Return the least damped modes of a mistuned wheel; none for a tuned one."""
     if "wheel_damping" not in case:
         return []
     hertz, damping = case["wheel_frequency_hz"].values, case["wheel_damping"].values
@@ -175,7 +175,7 @@ def _pair(pair: xr.Dataset, labels: Sequence[str]) -> tuple[str, ...]:
 
 
 def _meeting(rpm: float, margin: float) -> tuple[str, str]:
-    """Write the speed of a resonance and its margin; far from the speed they are extrapolated too far for more digits."""
+    """Write the speed of a resonance and its margin with few digits if extrapolated far."""
     if not np.isfinite(rpm):
         return "never", "-"
     if abs(margin) > NEARBY:
@@ -184,7 +184,7 @@ def _meeting(rpm: float, margin: float) -> tuple[str, str]:
 
 
 def _static(case: xr.Dataset) -> list[TextTable]:
-    """Return what the centrifugal load does, or nothing where nothing turns."""
+    """Return the effects of the centrifugal load; none without rotation."""
     told = case.attrs
     if not np.isfinite(told["static_rpm"]):
         return []
@@ -212,7 +212,7 @@ def _labels(case: xr.Dataset) -> list[str]:
 
 
 def _names(case: xr.Dataset) -> list[tuple[str, str]]:
-    """Return the names of the waves and their kinds; where nothing parts the directions, both have the frequencies."""
+    """Return names and kinds of the waves; without splitting both directions share the frequencies."""
     sectors = int(case.attrs["sectors"])
     named = [wave_name(int(k), sectors) for k in case["wave_number"]]
     if sectors == 1:

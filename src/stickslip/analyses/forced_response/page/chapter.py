@@ -76,7 +76,7 @@ def stability(response: Response) -> list[Table | Words]:
 
 
 def _error(error: float) -> str:
-    """Write the error of a multiplier; it has none where no force acts on more harmonics."""
+    """Write the error of a multiplier; empty if no force acts on more harmonics."""
     if not np.isfinite(error):
         return "not known"
     return number(error, 2) if error > 0.0 else "none"

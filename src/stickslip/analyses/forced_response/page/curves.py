@@ -125,7 +125,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
 
 
 def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
-    """Return the line of a curve in two parts, dashed beside unstable points; none where there are no such points."""
+    """Return a curve as two lines, the second one dashed along unstable points; none without points."""
     at, x = response.points(case), abscissa(response)[0]
     off, y = response.unstable[at], response.accepted[at] * response.scale.factor
     if not off.any():
@@ -146,13 +146,13 @@ def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
 
 
 def _symbols(response: Response) -> np.ndarray:
-    """(point,) circles for the harmonics of the first passage, diamonds for others; open where doubtful, crosses where wrong."""
+    """Return (point,) symbols: circles for the harmonics of the first passage, diamonds for others; open if doubtful, crosses if wrong."""
     shape = np.where(response.more, "diamond", "circle").astype(object)
     return np.where(response.levels == 2, "x", shape + np.where(response.levels == 1, "-open", ""))
 
 
 def _reasons(response: Response) -> np.ndarray:
-    """(point,) lines that say why a point is not trusted."""
+    """Return (point,) hover lines with the reason why a point is not trusted."""
     if not response.has("verdict_reason"):
         return np.full(response.hz.size, "", dtype=object)
     reasons = zip(response.levels, response.labels_of("verdict_reason"), strict=True)
@@ -165,7 +165,7 @@ def _wrapped(text: str) -> str:
 
 
 def _failures(response: Response) -> go.Scatter:
-    """Crosses where points did not converge: at their amplitude if it is known, else at the bottom."""
+    """Draw crosses at unconverged points: at their amplitude if it is known, else at the bottom."""
     at = np.flatnonzero(~response.converged)
     values = response.response() * response.scale.factor
     good = values[response.converged & np.isfinite(values)]
@@ -191,7 +191,7 @@ def _scale_buttons(*, logarithmic: bool) -> list[dict[str, object]]:
 
 
 def _peaks(response: Response) -> str:
-    """Say where the peaks of the first and the last case lie."""
+    """Name the peaks of the first and the last case."""
     known = [c for c in response.peaked if response.resonates(c)] or response.peaked
     scale, ends = response.scale, (*known[:1], *known[1:][-1:])
     peaks = [
@@ -331,7 +331,7 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
 
 
 def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
-    """Group cases by all that is varied beside `key`: a curve each."""
+    """Group cases by all varied keys except `key`; each group is a curve."""
     found: dict[str, list[ShownCase]] = {}
     for case in cases:
         others = ", ".join(t for t in case.label.split(", ") if not t.startswith(f"{key} = "))

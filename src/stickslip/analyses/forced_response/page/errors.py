@@ -17,7 +17,7 @@ _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
 
 
 def _error_traces(figure: go.Figure, response: Response) -> None:
-    """Add predicted errors of all cases (left) and both errors of some (right; in the same panel where there is one case)."""
+    """Draw predicted errors of all cases (left), and predicted and real errors of some (right; in the same panel for a single case)."""
     asked, real = response.alert, response.floats("real_error_percent")
     both = most(response, real) if response.is_error else []
 
@@ -83,7 +83,7 @@ def _caption(response: Response) -> str:
 
 
 def _above(response: Response) -> str:
-    """Say what became of the solutions whose harmonics are predicted to be too few: a solution with more overrules the prediction."""
+    """State the outcome of the solutions with too large a predicted error; a solution with more harmonics overrules the prediction."""
     known, audit = (response.floats(f"{name}_error_percent") for name in ("own", "audit"))
     above = response.converged & (known > response.threshold)
     if not above.any():
@@ -98,12 +98,12 @@ def _above(response: Response) -> str:
 
 
 def _floor(response: Response) -> float:
-    """Smallest value drawn: an error below is rounding; other indicators may be smaller."""
+    """Smallest value drawn: smaller errors are rounding, other indicators may be smaller."""
     return _SMALLEST_ERROR if response.is_error else _SMALLEST_INDICATOR
 
 
 def _all_rounding(response: Response) -> bool:
-    """Whether all errors lie under the axis, where nothing would be drawn."""
+    """Whether all errors are below the axis, so that nothing would be drawn."""
     every = np.concatenate([response.alert.error, response.floats("real_error_percent")])
     return response.is_error and not np.any(every >= _SMALLEST_ERROR)
 

@@ -110,7 +110,7 @@ def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, flo
 
 
 def _harmonic_share(response: Response, case: ShownCase) -> float:
-    """Largest share of the contact forces' vibration that harmonics beyond the first passage's carry, in percent."""
+    """Return the largest percentage of the oscillating contact forces in harmonics beyond the first passage."""
     at = np.flatnonzero((response.point_case == case.index) & response.converged & response.more)
     if not at.size or not response.has("contact_force"):
         return float("nan")
@@ -124,7 +124,7 @@ def _harmonic_share(response: Response, case: ShownCase) -> float:
 
 
 def _why(response: Response, case: ShownCase) -> str:
-    """Say what the contact does at the peak of a case and what the higher harmonics carry."""
+    """Describe the contacts at the peak of a case and the part of the higher harmonics."""
     reasons = []
     if response.has("peak_state") and response.peak(case) >= 0:
         state = states(response, case)
@@ -207,7 +207,7 @@ def _other_text(response: Response) -> str:
 
 
 def _alert_row(response: Response, case: ShownCase) -> tuple[str, str]:
-    """Say in which ranges a case was flagged, and how large its predicted error is at most."""
+    """Return the flagged ranges of a case, and its largest predicted error."""
     ranges = (
         number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz" for a, b in flagged_ranges(response, case)
     )
@@ -225,7 +225,7 @@ def _other_row(response: Response, case: ShownCase) -> tuple[str, str]:
 
 
 def _kept_where(response: Response, case: ShownCase | None = None) -> str:
-    """Say which harmonics were kept how often, the most frequent ones first."""
+    """Count the points with each set of harmonics, the most frequent set first."""
     mine = response.converged
     if case is not None:
         mine = mine & (response.point_case == case.index)

@@ -44,7 +44,7 @@ def _peak_card(response: Response) -> Card:
 
 
 def _whole(response: Response, case: ShownCase) -> str:
-    """Return the peak itself of a case whose response is over the force, as the terminal tells it."""
+    """Return the absolute peak of a case whose response is divided by the force, as on the terminal."""
     return f", {amplitude(response.peak_response(case) * case.excitation, response.length)}"
 
 
@@ -61,7 +61,7 @@ def _shift_card(response: Response) -> Card | None:
 
 
 def _damping_card(response: Response) -> Card | None:
-    """Return quality factor and equivalent damping ratio of the case that is shown first, and the range of all."""
+    """Return quality factor and equivalent damping ratio of the case shown first, with the range of all cases."""
     ratios = {c: response.number_of("peak_damping", c) for c in response.peaked}
     known = {c: z for c, z in ratios.items() if z > 0 and response.resonates(c)}
     shown = next((c for c in known if c.index == response.chosen), None)
@@ -77,7 +77,7 @@ def _damping_card(response: Response) -> Card | None:
 
 
 def _blade_card(response: Response) -> Card | None:
-    """Return the largest amplification of a wheel whose sectors differ, and of which blade."""
+    """Return the largest amplification of a mistuned wheel, and its blade."""
     if not response.has("amplification", "largest_blade"):
         return None
     factors = {c: response.number_of("amplification", c) for c in response.peaked}
@@ -93,7 +93,7 @@ def _blade_card(response: Response) -> Card | None:
 
 
 def _loss_card(response: Response) -> Card | None:
-    """Return what one case loses at its peak; several have their shift instead."""
+    """Return the energy dissipated at the peak of a single case; several cases show their frequency shift instead."""
     if len(response.peaked) != 1 or not response.has("dissipated_energy"):
         return None
     own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
@@ -103,7 +103,7 @@ def _loss_card(response: Response) -> Card | None:
 
 
 def _alert_cards(response: Response) -> list[Card]:
-    """Return how often more harmonics were asked for, and how wrong few would have been."""
+    """Return how often more harmonics were requested, and the error with few."""
     asked = response.alert
     if not asked.error.size:
         return []
@@ -119,7 +119,7 @@ def _alert_cards(response: Response) -> list[Card]:
 
 
 def _work_cards(response: Response) -> list[Card]:
-    """Return how often more harmonics were kept, where anything chose, and what that cost."""
+    """Return how often more harmonics were kept, if a strategy chose, and their cost."""
     n, found = int(response.converged.sum()), []
     if response.decides:
         more = int(np.sum(response.more & response.converged))
@@ -134,7 +134,7 @@ def _work_cards(response: Response) -> list[Card]:
 
 
 def _verdict_card(response: Response) -> Card | None:
-    """Return how many cases are trusted, of one case its verdict; and how many points are not."""
+    """Return the number of trusted cases, or the verdict on a single case, and the number of points that are not trusted."""
     levels = [response.level(c) for c in response.cases]
     if not levels[0]:
         return None

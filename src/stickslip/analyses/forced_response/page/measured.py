@@ -69,7 +69,7 @@ class Measured:
                         figure.add_trace(points, row=1, col=column)
 
     def _points(self, own: BoolArray, y: FloatArray, error: FloatArray, unit: str) -> go.Scatter:
-        """Return some of the points, all with bars or all without."""
+        """Return a trace of points, either all with error bars or all without."""
         source = self.response.text("measured_source")
         points = go.Scatter(
             x=self.values[own],
@@ -103,7 +103,7 @@ class Measured:
         return "" if found is None else str(found.attrs.get("error", ""))
 
     def _agreement(self, cases: Sequence[ShownCase]) -> str:
-        """Compare at the values that were both computed and measured."""
+        """Compare computed and measured peaks at common values."""
         pairs = [(i, self._case(i, cases)) for i in range(len(self.values))]
         found = []
         for name, what, y, error, computed in (
@@ -125,7 +125,7 @@ class Measured:
         return f" Where both are known they differ in {joined(found)}." if found else ""
 
     def _case(self, point: int, cases: Sequence[ShownCase]) -> ShownCase | None:
-        """Return the one case that a point was measured for."""
+        """Return the only case that agrees with a measured point."""
         found = [c for c in cases if same(self.values[point], c.value) and _agrees(self.others[point], c)]
         return found[0] if len(found) == 1 else None
 
@@ -154,7 +154,7 @@ def measured_of(response: Response, key: str) -> Measured | None:
 
 
 def _per_page(response: Response, values: FloatArray) -> FloatArray:
-    """Return what makes amplitudes of the page of measured ones; NaN where the force is not known."""
+    """Return the function from measured amplitudes to those of the page; NaN if the force is unknown."""
     measured = response.data.get("measured_amplitude")
     per_force = measured is not None and measured.attrs.get("units") == "m/N"
     if per_force == response.per_force:
@@ -164,5 +164,5 @@ def _per_page(response: Response, values: FloatArray) -> FloatArray:
 
 
 def _agrees(others: str, case: ShownCase) -> bool:
-    """Whether a case has the values of other varied keys that a point tells."""
+    """Return whether a case has the other varied values of a point."""
     return not others or set(others.split(", ")) <= set(case.label.split(", "))

@@ -78,7 +78,7 @@ def blades(response: Response) -> Plot | None:
 
 
 def _per_hz(response: Response, x: FloatArray) -> float:
-    """Return what the frequencies of a figure are times to be its abscissa."""
+    """Return the factor from frequencies to the abscissa of a figure."""
     known = np.isfinite(x) & (response.hz > 0)
     return float(x[known][0] / response.hz[known][0]) if known.any() else 1.0
 
@@ -319,5 +319,5 @@ def wheel_in_motion(response: Response) -> Plot | None:
 
 
 def _first(motion: ComplexArray) -> float:
-    """Return the phase of the largest blade, which leans most at the beginning."""
+    """Return the phase at which the largest blade leans most, where the motion begins."""
     return float(np.angle(motion[int(np.argmax(np.abs(motion)))]))

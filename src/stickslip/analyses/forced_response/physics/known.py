@@ -137,7 +137,7 @@ def no_resonance(question: Question) -> tuple[Verdict, ...]:
 
 
 def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:
-    """Doubt where friction leaves the mean position of a body free."""
+    """Doubt a body whose mean position is left free by friction."""
     chosen = [a.point for a in response.accepted if not a.point.converged]
     if response.top is not None:
         chosen = [response.top.point, *chosen]

@@ -152,7 +152,7 @@ def of_physics(question: Question, response: Response) -> Values:
 
 
 def _of_energy(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
-    """Yield a verdict where a mode without damping has its resonance and nothing takes energy there."""
+    """Yield a verdict on an undamped resonance without any dissipation."""
     top = response.top
     if top is None or not physics.undamped:
         return
@@ -184,13 +184,13 @@ def _damping(question: Question, accepted: Accepted) -> float:
 
 
 def _decided_by_damping(question: Question, accepted: Accepted) -> bool:
-    """Whether the damping that counts as none would change a motion by more than the threshold: else stiffness and inertia decide its size."""
+    """Return whether a negligible damping would change a motion by more than the threshold; else stiffness and inertia decide its size."""
     share = damped_share(question.problem, accepted.point, UNDAMPED_RATIO)
     return not share <= question.limit
 
 
 def _of_bounds(physics: Physics) -> Iterator[Verdict]:
-    """Yield a verdict where the load is more than friction can take."""
+    """Yield a verdict on a load that exceeds the bound on friction."""
     if physics.unbounded:
         mode, excess = max(physics.unbounded, key=lambda own: own[1])
         why = (
@@ -201,7 +201,7 @@ def _of_bounds(physics: Physics) -> Iterator[Verdict]:
 
 
 def _of_bodies(physics: Physics) -> Iterator[Verdict]:
-    """Yield a verdict where a part alone vibrates on the springs of its contacts within the range."""
+    """Yield a verdict on a part that vibrates alone on its contact springs inside the range."""
     every = [m for m in physics.stuck if m.on_contacts]
     if every:
         mode = every[0]
@@ -214,7 +214,7 @@ def _of_bodies(physics: Physics) -> Iterator[Verdict]:
 
 
 def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> Iterator[Verdict]:
-    """Yield the note on what friction can do to the modes, of a peak to the mode that it belongs to, or why there is no estimate."""
+    """Yield a note on the effect of friction on the modes near peaks, or the reason why there is no estimate."""
     if not physics.damped:
         return
     if moving:
@@ -230,7 +230,7 @@ def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> 
 
 
 def _loads_move(question: Question, response: Response) -> str:
-    """Return why normal loads at the peak are not steady enough for an estimate; empty where they are."""
+    """Return why normal forces at the peak vary too much for an estimate; empty if they do not."""
     if response.top is None:
         return "there is no peak"
     laws = question.model.system.springs.laws

@@ -74,13 +74,13 @@ def stiffness_changes(question: Question, response: Response) -> Values:
 
 
 def _at_resonance(question: Question, point: ForcedPoint) -> bool:
-    """Whether a peak was resolved there: no frequencies are listed, and it is no end of the sweep."""
+    """Return whether a peak was resolved at a point: frequencies are not listed, and it is no end of the sweep."""
     ends = np.array(question.sweep.omega_range)
     return not (np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) or question.sweep.grid.size)
 
 
 def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
-    """Return the model with more modes, its sliders where those of the model are; None where there is none on the same coordinates."""
+    """Return the model with more modes and the sliders of the given one; None if none has the same coordinates."""
     own = question.model.system
     if question.richer is None or question.richer[0].retained_labels != own.retained_labels:
         return None
@@ -90,7 +90,7 @@ def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
 
 
 def _coarser(question: Question) -> tuple[System, int] | None:
-    """Return the model with half the points of meshed contacts, and how many are left out."""
+    """Return the model with half the points of meshed contacts, and the number of points removed."""
     model, table = question.model, question.model.contacts
     if model.blades is not None or not model.system.structure.reduced or model.system.interface.rigid:
         return None
@@ -98,7 +98,7 @@ def _coarser(question: Question) -> tuple[System, int] | None:
 
 
 def _change(response: Response, own: Found, other: Found) -> Change:
-    """Return how a peak differs from the model's own, found in the same way; NaN where one is not found."""
+    """Return the difference of a peak from the model's own, found in the same way; NaN if one is not found."""
     if own is None or other is None:
         return UNKNOWN
     before, after = (problem.amplitude(point, response.output) for problem, point in (own, other))
@@ -106,7 +106,7 @@ def _change(response: Response, own: Found, other: Found) -> Change:
 
 
 def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> ForcedPoint | None:
-    """Find a peak by a short sweep, where the solution at a point does not lead to that of another model; None where it is an end of that."""
+    """Find a peak by a short sweep if the solution at a point does not lead to that of another model; None at an end of the sweep."""
     around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
     short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
     problem = forced_problem(system, load, short)
@@ -117,7 +117,7 @@ def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint)
 
 
 def _found(question: Question, system: System, load: HarmonicLoad, point: ForcedPoint) -> Found:
-    """Find the peak of a system near a point; at the frequency of the point where frequencies are listed, or it is the end of the sweep."""
+    """Find the peak of a system near a point; for listed frequencies and at ends of the sweep at the frequency of the point."""
     own = point.support
     few = min(question.sweep.peak_points, PEAK_POINTS)
     sweep = replace(question.sweep, low=own, high=own, selection="always_high", peak_points=few)

@@ -84,7 +84,7 @@ def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any
 
 
 def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
-    """Return the variable of all cases, one after the other; of what all cases share that of the first."""
+    """Return the variable of all cases, concatenated; a variable common to all cases comes from the first."""
     if along not in ("case", *ROWS):
         return each[0]
     joined: xr.Variable = xr.Variable.concat(each, along)  # type: ignore[no-untyped-call]
@@ -92,13 +92,13 @@ def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
 
 
 def _told(name: str, variable: xr.Variable) -> bool:
-    """Whether a variable says anything: checks that were not asked for and speeds that nothing runs over do not."""
+    """Whether a variable has content: checks not requested and speeds of a response over frequency have none."""
     nothing = name == "speed_rpm" and bool(np.all(np.isnan(variable.values)))
     return not nothing and variable.sizes.get(variable.dims[0], 1) > 0
 
 
 def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
-    """Return the values of a case with their dimensions, its number in its rows."""
+    """Return the variables of a case with their dimensions, and the number of the case in its rows."""
     peak = int(values["peak_point"])
     values = values | {"peak_point": peak + before if peak >= 0 else peak}
     for own, like in ROWS.values():
@@ -121,7 +121,7 @@ def _shaped(value: Any, dims: Sequence[str]) -> Any:
 
 
 def _aligned(each: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Return datasets of cases with the same labels and lengths."""
+    """Return datasets of cases with equal labels and lengths."""
     counts = {d: np.arange(max(e.sizes.get(d, 0) for e in each)) for d in COUNTED}
     labelled = [d for d in LABELLED if any(d in e.coords for e in each)]
     labels = {d: list(dict.fromkeys(x for e in each for x in e[d].values)) for d in labelled}
@@ -165,7 +165,7 @@ def with_measured(data: xr.Dataset, found: MeasuredPeaks | None) -> xr.Dataset:
 
 
 def _of(name: str, found: Quantity, about: str) -> dict[str, Any]:
-    """Return the variables of a quantity and of its error bars; none where it was not measured."""
+    """Return the variables of a measured quantity and of its error bars; none if not measured."""
     if not found.unit:
         return {}
     own = {name: variable(DIM, found.values, found.unit, f"measured {about}")}

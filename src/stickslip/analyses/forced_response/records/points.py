@@ -233,7 +233,7 @@ def lost_point(problem: ForcedProblem, error: Exception) -> ForcedPoint:
 
 
 def _audit(point: ForcedPoint, audits: Sequence[ForcedPoint]) -> ForcedPoint | None:
-    """Return the solution with most harmonics at the frequency of a point; None where there is none with more than its own."""
+    """Return the solution with the most harmonics at the frequency of a point; None if none has more than the point."""
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
     return most if point.converged and most.harmonics.size > point.harmonics.size else None
 

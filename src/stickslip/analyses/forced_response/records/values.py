@@ -186,7 +186,7 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
 
 
 def _unstable_peak(response: Response) -> tuple[float, float]:
-    """Return amplitude and frequency (Hz) of the largest motion where it is unstable, so that it is not the peak; else NaN."""
+    """Return amplitude and frequency (Hz) of the largest motion if it is unstable; else NaN."""
     if response.unstable_peak < 0:
         return np.nan, np.nan
     own = response.accepted[response.unstable_peak]
@@ -294,7 +294,7 @@ def highest(response: Response) -> int:
 
 
 def _kept(points: Sequence[ForcedPoint], high: int) -> IntArray:
-    """Return 1 for every harmonic from 0 to `high` that a solution keeps, else 0."""
+    """Return 1 for every harmonic from 0 to `high` in a solution, else 0."""
     table = np.zeros((len(points), high + 1), dtype=np.int64)
     for row, point in zip(table, points, strict=True):
         row[point.harmonics] = 1
@@ -302,7 +302,7 @@ def _kept(points: Sequence[ForcedPoint], high: int) -> IntArray:
 
 
 def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> ComplexArray:
-    """Return harmonics 0..high: zero where they were not kept, NaN where there is no solution."""
+    """Return harmonics 0..high: zero if not kept, NaN without a solution."""
     out = np.zeros((high + 1, *shape), dtype=complex)
     if values is None:
         out[:] = complex(np.nan, np.nan)

@@ -82,7 +82,7 @@ def located(question: Question, response: Response, notes: Notes) -> Bifurcation
 
 
 def _by_hill(problem: ForcedProblem, point: ForcedPoint, pieces: Pieces) -> Stability:
-    """Return the multipliers of a motion by Hill's method; none where it did not find all that it counted."""
+    """Return the multipliers of a motion by Hill's method; none if it missed some of those it counted."""
     found = hill_stability(problem, point, pieces.keep)
     if found.missing == 0:
         return found.stability
@@ -91,7 +91,7 @@ def _by_hill(problem: ForcedProblem, point: ForcedPoint, pieces: Pieces) -> Stab
 
 
 def _most(question: Question) -> int:
-    """Return how many motions of a case are examined at most."""
+    """Return the largest number of motions examined in a case."""
     if not by_hill(question.model.system):
         return MAX_EXAMINED_MOTIONS
     seconds = hill_work(question.model.system) / FLOPS
@@ -107,7 +107,7 @@ def followed(question: Question, found: Bifurcations) -> list[tuple[Bifurcation,
 
 
 def _most_followed(question: Question) -> int:
-    """Return from how many bifurcations of a case branches are followed: from none of a wheel that is too large for its multipliers."""
+    """Return the largest number of bifurcations whose branches are followed; none on a wheel too large for its multipliers."""
     system = question.model.system
     return 0 if system.structure.wheel is not None and by_hill(system) else MOST_FOLLOWED
 
@@ -181,7 +181,7 @@ def bifurcations_line(question: Question) -> tuple[str, ...]:
 
 
 def _of_motions(known: Sequence[Stability | None], examined: Sequence[Examined]) -> Values:
-    """Return what is known of the stability of each point: by an examination, by multipliers along the branch, by what follows from others."""
+    """Return the stability of each point: by an examination, by multipliers along the branch, or inferred from others."""
     word = np.full(len(known), MOTION["not examined"], dtype=np.int64)
     basis = np.zeros(len(known), dtype=np.int64)
     own = {e.position: e for e in examined}

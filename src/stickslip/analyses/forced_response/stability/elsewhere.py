@@ -38,7 +38,7 @@ def motions_elsewhere(question: Question, response: Response) -> Values:
 
 
 def _on_branch(response: Response, other: OtherMotion) -> bool:
-    """Whether the response passes the motion elsewhere on its branch, as round a fold."""
+    """Whether the response contains the motion elsewhere on its branch, as round a fold."""
     return any(
         abs(a.point.omega / other.point.omega - 1.0) <= SAME_FREQUENCY_RTOL
         and abs(response.amplitude(a) / other.amplitude - 1.0) <= max(ALIKE, ANOTHER)

@@ -91,7 +91,7 @@ def examines_every_wave(system: System) -> bool:
 
 
 def _lasting(seconds: float) -> str:
-    """Return a long time as it is read: in seconds, hours or days."""
+    """Write a long time in seconds, hours or days."""
     for name, unit in (("days", 86400.0), ("hours", 3600.0)):
         if seconds > 2 * unit:
             return f"{seconds / unit:.0f} {name}"

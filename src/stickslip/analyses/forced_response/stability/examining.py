@@ -82,7 +82,7 @@ def neighbours_of(
 
 @dataclass(eq=False)
 class _Search:
-    """Goes over the points of a course and puts down what is known."""
+    """Search along the points of a course for changes of stability."""
 
     question: Question
     response: Response
@@ -93,7 +93,7 @@ class _Search:
     found: dict[int, Examined] = field(default_factory=dict)  # by place on the course
 
     def look(self, place: int) -> Examined:
-        """Examine a point, whatever it takes, once."""
+        """Examine a point once, whatever its cost."""
         if place not in self.found:
             position = self.course.order[place]
             one = self._linear(place) or self.examine(self.response.accepted[position])
@@ -102,7 +102,7 @@ class _Search:
         return self.found[place]
 
     def along(self) -> None:
-        """Examine the points beside which stability may change, and halve what lies between until it follows from both ends."""
+        """Examine the points next to possible changes of stability, then bisect until the verdicts between two points follow from both."""
         for place in self._first():
             if self.spent > self.allowed:
                 return
@@ -122,7 +122,7 @@ class _Search:
             heappush(open_, (middle - b, middle, b))
 
     def settle_peak(self) -> None:
-        """Examine the largest motion that is not known to be unstable until one is known that is not; a few, whatever they take."""
+        """Examine the largest motion not known to be unstable, repeatedly until one is stable or undecided; a few whatever their cost."""
         for further in range(FURTHER):
             every = self.all_points()
             position = largest(self.response, every)
@@ -132,7 +132,7 @@ class _Search:
             self.look(self.course.order.index(position))
 
     def all_points(self) -> list[Examined]:
-        """Return what is known of every point: examined, carried along, by the sign of the determinant, or nothing."""
+        """Return the stability of every point: examined, inferred between two points, by the sign of the determinant, or unknown."""
         own = dict(self.found)
         for k, position in enumerate(self.course.order):
             linear = None if k in own else self._linear(k)
@@ -151,7 +151,7 @@ class _Search:
     # --- what follows for points that are not examined ------------------------------------------
 
     def _carries(self, a: int, b: int) -> bool:
-        """Whether the verdict of two examined points is that of all between."""
+        """Whether the verdict of two examined points holds for all points between them."""
         if a not in self.found or b not in self.found:
             return False
         ends = (self.found[a], self.found[b])
@@ -188,7 +188,7 @@ class _Search:
         )
 
     def _opposed(self, place: int) -> bool:
-        """Whether the determinant has another sign than at the nearest stable point of the branch, and examined points beside it with its sign are unstable."""
+        """Whether the determinant differs in sign from the nearest stable point of the branch, and examined neighbours with this sign are unstable."""
         sign, stretch = self.course.sign, self._stretches
         others = [k for k in self._of_run(place) if k != place]
         same = {self.found[k].verdict for k in others if stretch[k] == stretch[place]}
@@ -203,12 +203,12 @@ class _Search:
 
     @cached_property
     def _runs(self) -> IntArray:
-        """(n,) number of the run of the branch that a point belongs to."""
+        """(n,) index of the run of the branch that contains each point."""
         return np.concatenate([[0], np.cumsum(self.course.cut)]).astype(np.int64)
 
     @cached_property
     def _stretches(self) -> IntArray:
-        """(n,) number of the stretch of one sign that a point belongs to."""
+        """(n,) index of the range of constant sign that contains each point."""
         sign = self.course.sign
         return np.concatenate([[0], np.cumsum((sign[1:] != sign[:-1]) | self.course.cut)]).astype(np.int64)
 
@@ -216,7 +216,7 @@ class _Search:
         return self.response.accepted[self.course.order[place]].point.omega
 
     def _linear(self, place: int) -> Examined | None:
-        """Return what is known of a point at which no contact changes its state, from another one with the same states: both obey one linear system.
+        """Return the stability of a point without changes of contact state, from another one with the same states: both obey one linear system.
 
         Its exponents do not depend on the frequency of the load, and its multipliers are those of the other to the ratio of the periods.
         Samples may miss a short slip; it acts on harmonics beyond those driven, so that the solution must be exact, too.
@@ -236,7 +236,7 @@ class _Search:
     # --- where to look ----------------------------------------------------------------------------
 
     def _first(self) -> Iterator[int]:
-        """Yield the ends of the branch, the points beside folds, and those between which the list of transitions changes, the nearest to the peak first."""
+        """Yield the ends of the branch, points next to folds, and points between which the list of transitions changes, the nearest to the peak first."""
         course = self.course
         peak = course.order.index(self.response.peak)
         yield from (k for run in course.runs() for k in (run[0], run[-1]))
@@ -246,7 +246,7 @@ class _Search:
 
 
 def _inside_between(one: Examined, other: Examined) -> bool:
-    """Whether no multiplier moves so far from one point to another that it may pass the unit circle between them.
+    """Whether no multiplier moves so far between two points that it may cross the unit circle.
 
     A pair keeps the modulus of its damping while it moves along its circle, until it meets on the real axis: there one of the two may leave.
     """
@@ -284,7 +284,7 @@ def _course(question: Question, response: Response) -> Course:
 
 
 def _jumps(response: Response, along: int) -> list[int]:
-    """Return the positions of points behind which the response jumps."""
+    """Return the indices of points after which the response jumps."""
     every = response.accepted
     branch = [i for i, a in enumerate(every[:along]) if a.fields is not None]
     shown = [f for f in (every[i].fields for i in branch) if f is not None]
@@ -296,7 +296,7 @@ def _jumps(response: Response, along: int) -> list[int]:
 
 
 def _allowed(question: Question, response: Response) -> float:
-    """Return the operations that examinations of a case may take: without limit where matrices are small, else as many as its solutions took."""
+    """Return the operations allowed for the examinations of a case: unlimited for small matrices, else as many as for its solutions."""
     system = question.model.system
     side = system.structure
     sectors = 1 if side.wheel is None else side.wheel.sectors

@@ -253,7 +253,7 @@ def seconds_in_time(system: System) -> float:
 
 
 def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
-    """Return what the motion in time did, `apart` percent from the nearest balance."""
+    """Return the outcome of the motion in time; `apart` is its distance from the nearest balance in percent."""
     if not isfinite(check.transient):
         return "left"
     if not found.settled and found.scatter > RINGS:
@@ -264,7 +264,7 @@ def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
 
 
 def _apart(balance: ComplexArray, known: ComplexArray) -> float:
-    """Return the distance of a balance from the integration, phases included, percent of the latter."""
+    """Return the distance of a balance from the integration, phases included, in percent of the integration."""
     size = float(np.linalg.norm(known))
     return 100 * float(np.linalg.norm(balance - known)) / size if size > 0.0 else float("inf")
 
@@ -286,12 +286,12 @@ def _size(question: Question, harmonics: ComplexArray) -> float:
 
 
 def _driven(question: Question, harmonics: ComplexArray) -> ComplexArray:
-    """Return of the harmonics of an output those that the load drives: amplitudes are their norm."""
+    """Return the driven harmonics of an output; the amplitude is their norm."""
     return np.array([harmonics[h] if h < len(harmonics) else 0.0 for h in question.driven])
 
 
 def _known(found: TransientResult) -> ComplexArray:
-    """Return the (n_h + 1, n_outputs) harmonics of an integration, m; of what did not settle the average."""
+    """Return (n_h + 1, n_outputs) harmonics of an integration, m; the average if it did not settle."""
     return found.harmonics if found.settled else found.averages
 
 
@@ -316,7 +316,7 @@ def _compared(question: Question, response: Response, point: ForcedPoint, found:
 
 
 def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray) -> float:
-    """Return the largest relative difference of outputs (H+1, n_outputs) from those of an integration, by the measure of errors, a fraction."""
+    """Return the largest relative difference between outputs (H+1, n_outputs) and those of an integration, in the error norm."""
     if not np.all(np.isfinite(true)):
         return float("nan")
     rows = min(len(true), len(found))
@@ -327,7 +327,7 @@ def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray)
 def _with_steps_enough(
     question: Question, response: Response, point: ForcedPoint, found: TransientResult, coarse: Check
 ) -> tuple[Check, TransientResult]:
-    """Go on from a settled motion with twice the steps until these do not change it: too long a step is the first to suspect."""
+    """Continue a settled motion with twice the steps until the steps no longer change it."""
     steps = STEPS
     while True:
         steps *= 2
@@ -410,13 +410,13 @@ def integrated(
 
 
 def _speeds(motion: ComplexArray, omega: float) -> FloatArray:
-    """Return the (n,) amplitudes of the speeds of a motion (H + 1, n), rad/s its frequency: the sums over its harmonics."""
+    """Return (n,) amplitudes of the velocities of a motion (H + 1, n), summed over its harmonics."""
     orders = np.arange(len(motion))[:, None]
     return np.asarray(np.sum(np.abs(orders * omega * motion), axis=0))
 
 
 def _kicked(start: TransientStart, speeds: FloatArray) -> TransientStart:
-    """Return a start with other speeds: by up to `speeds`, in other shares for each coordinate, that no symmetry hides a disturbance."""
+    """Return an initial state with velocities changed by up to `speeds`, differently in each coordinate, so that no symmetry hides a disturbance."""
     shares = np.cos(GOLDEN * np.arange(speeds.size))
     return replace(start, velocity=start.velocity + shares * speeds)
 

@@ -76,7 +76,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class _March:
-    """A course, how far its last period is from the balance it began on (NaN where it began elsewhere), the periods that leaving takes, and what follows with half the step."""
+    """A time integration: its distance from the initial balance (NaN without one), periods needed to leave it, and the result with half the step."""
 
     course: Course
     away: float
@@ -85,7 +85,7 @@ class _March:
 
     @property
     def stayed(self) -> bool:
-        """Whether it is still the motion it began on, as far as can be told."""
+        """Whether the motion is still the initial one, as far as known."""
         return self.away < (ESTIMATED_DISTANCE if self.course.periods < self.needed else ATTAINED_DISTANCE)
 
 
@@ -107,7 +107,7 @@ def without_periodic(
 
 
 def _alone(response: Response, examined: Sequence[Examined], one: Examined) -> bool:
-    """Whether an unstable motion is the largest one, or no stable motion of the response stands at its frequency."""
+    """Whether an unstable motion is the largest one, or has no stable motion of the response at its frequency."""
     if one.position == response.unstable_peak:
         return True
     known = {e.position: e.verdict == "stable" for e in examined}
@@ -181,12 +181,12 @@ def _marched(question: Question, response: Response, omega: float, work: float, 
 
 
 def _needed(multiplier: float) -> float:
-    """Return in how many periods a kick is sure to have left the motion; infinite where no multiplier says that it grows."""
+    """Return the number of periods in which a disturbance is sure to have grown; infinite if no multiplier exceeds 1."""
     return MARGIN * np.log(1.0 / KICK) / np.log(multiplier) if multiplier > 1.0 else np.inf
 
 
 def _away(found: Course, motion: ComplexArray) -> float:
-    """Return how far the vibration in the last period is from that of coefficients (H + 1, outputs), relative to it."""
+    """Return the relative distance of the last period's vibration from coefficients (H + 1, outputs)."""
     if not found.periods:
         return np.nan
     turns = 2.0 * np.pi * np.arange(1, KEPT + 1) / KEPT
@@ -202,7 +202,7 @@ def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
 
 
 def _told(question: Question, response: Response, omega: float, why: str, march: _March) -> Answer:
-    """Return an answer in numbers and words."""
+    """Return an answer with its sentence."""
     found = march.course
     of, own = statistics(found), response.output
     if found.overflowed or not np.isfinite(of.spread):
@@ -274,7 +274,7 @@ def _settledness(spread: float, settled: bool) -> str:
 
 
 def _of_the_step(march: _March, own: int) -> str:
-    """Return why a march is not to be trusted for its step; empty where it is."""
+    """Return why an integration is not reliable with its step; empty if it is."""
     if march.finer is None:
         return ""
     if march.finer.coarse:

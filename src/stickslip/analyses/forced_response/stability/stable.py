@@ -126,7 +126,7 @@ def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Ex
 
 
 def _of_motion(question: Question, seen: Examined, motion: ForcedPoint) -> Examined:
-    """Return what was found with the motion that it was found of; undecided where a study fixes fewer harmonics than that has."""
+    """Return the stability with the solution to which it applies; undecided if the study fixes fewer harmonics."""
     if question.sweep.auto and question.problem.strategy.verifies:
         return replace(seen, raised=motion)
     more = f"with H = {motion.order} it is {seen.verdict}; the harmonics asked for are too few for its stability"
@@ -185,7 +185,7 @@ def _complex(note: Mapping[str, Any], of: str) -> ComplexArray:
 
 
 def _by_hill(question: Question, accepted: Accepted, keep: Keep) -> Examined:
-    """Return what Hill's method says of a point of a wheel, against every wave."""
+    """Return the stability of a point of a wheel by Hill's method, for every wave."""
     hill = hill_stability(question.problem, accepted.point, keep)
     found, said = hill.stability, hill.reason
     wheel = question.model.system.structure.wheel
@@ -208,7 +208,7 @@ def _seen(question: Question, accepted: Accepted, found: Stability, said: str) -
 
 
 def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
-    """Return which wave of a wheel the multiplier that decides belongs to; empty where disturbances die."""
+    """Return the wave of the decisive multiplier of a wheel; empty if disturbances decay."""
     if question.model.system.structure.wheel is None or found.verdict == "stable":
         return ""
     wave = growing_wave(point_disturbances(question.problem, accepted.point), found.multiplier)
@@ -216,7 +216,7 @@ def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
 
 
 def _named(question: Question, wave: WaveDisturbance) -> str:
-    """Return which wave a disturbance is."""
+    """Return the wave of a disturbance in words."""
     wheel = question.model.system.structure.wheel
     diameters = 0 if wheel is None else wave.nodal_diameter(wheel.sectors)
     return f", in wave {wave.wave} ({diameters} nodal diameters) near {wave.omega / HZ:.5g} Hz"

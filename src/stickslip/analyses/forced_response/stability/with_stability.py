@@ -96,7 +96,7 @@ def with_stability(
 
 
 def _with_peak(response: Response, examined: list[Examined], look: Looked) -> list[Examined]:
-    """Examine the largest motion, too, where another one has become it since motions took the places of points."""
+    """Examine the largest motion too if replaced points have changed which one it is."""
     for _ in range(MOST_PEAKS):
         peak = with_stable_peak(response, examined)
         known = {e.position for e in examined if e.basis != "not examined"}
@@ -109,7 +109,7 @@ def _with_peak(response: Response, examined: list[Examined], look: Looked) -> li
 
 
 def _examined(question: Question, response: Response, notes: Notes, look: Looked) -> list[Examined]:
-    """Examine the stability; what an interrupted run has examined is not done again.
+    """Return the stability of all points; examinations of an interrupted run are used again.
 
     Where a motion stays undecided and is soon integrated in time, that decides: of the peak, whose place another takes where the motion leaves it, then
     of others.
@@ -128,7 +128,7 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
 
 
 def _doubts_in_time(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
-    """Integrate in time the points that multipliers or predictions leave open, the largest first, and carry what a motion attains to its neighbours."""
+    """Integrate in time at points left open by multipliers or predictions, the largest first, and pass confirmed stability on to neighbours."""
     found, tried = examined, set[int]()
     seconds = seconds_in_time(question.model.system)
     for _ in range(min(MOST_DOUBTS, int(SECONDS_OF_DOUBTS / seconds))):
@@ -148,7 +148,7 @@ def _doubts_in_time(question: Question, response: Response, examined: list[Exami
 
 
 def _open_places(question: Question, response: Response, examined: Sequence[Examined]) -> set[int]:
-    """Return the positions of points whose stability is undecided, and of those whose harmonics a prediction alone doubts; not of unstable ones."""
+    """Return the indices of points with undecided stability, and of those whose harmonics only a prediction doubts; without unstable ones."""
     undecided = {e.position for e in examined if e.verdict == "undecided" and not e.motion}
     unstable = {e.position for e in examined if e.verdict == "unstable"}
     threshold = question.problem.strategy.threshold

@@ -63,7 +63,7 @@ class Judged:
         return said_once(found)
 
     def _of_rule(self, found: Sequence[Finding]) -> Iterator[Verdict]:
-        """Yield a verdict for what holds as a whole, and of each level one for its points: of the peak, else of the worst."""
+        """Yield the verdicts of a rule: one on the whole case, and for each level one for its points, at the peak or else at the worst point."""
         whole = [f for f in found if not f.points]
         yield from (Verdict(f.level, self.label, None, f.why, f.remedy) for f in whole)
         for level in LEVELS:
@@ -75,12 +75,12 @@ class Judged:
                 yield Verdict(level, self.label, float(self.case.hz[at]), why, first.remedy)
 
     def _weight(self, found: Finding) -> tuple[bool, float, float]:
-        """Return what decides which finding stands for all: at the peak, else the largest, else the nearest to the peak."""
+        """Return the rank of a finding: at the peak, then the largest, then the nearest to the peak."""
         apart = np.abs(self.case.hz[list(found.points)] - self.case.peak_hz).min()
         return self.case.peak in found.points, found.size, -float(np.nan_to_num(apart))
 
     def _others(self, group: Sequence[Finding], first: Finding) -> str:
-        """Say at how many points the same was found, and the largest value with its own frequency."""
+        """State the number of points with the same finding, and the largest value with its frequency."""
         hz = self.case.hz[sorted({i for f in group for i in f.points})]
         count = f"{hz.size} of {self.case.hz.size} points"
         most = max(group, key=lambda f: f.size)
@@ -100,7 +100,7 @@ def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
 
 
 def _examined(case: Curve) -> str:
-    """Say what was examined at the peak, its stability first, and what was not."""
+    """List the checks of the peak, stability first, and the missing ones."""
     if case.peak < 0:
         return "nothing to judge"
     peak = case.peak

@@ -70,7 +70,7 @@ def _of_amplitude(amplitude: FloatArray, few: BoolArray) -> dict[int, Jump]:
 
 
 def _of_loss(loss: FloatArray, elastic: float) -> list[Jump]:
-    """Return jumps of the dissipation; where slip begins it grows from nothing too, but each step is like the one after it."""
+    """Return jumps of the dissipation. At the onset of slip it grows from zero too, but each step is similar to the next."""
     step = np.abs(np.diff(loss))
     least = max(LOSS_COUNTS * float(loss.max(initial=0.0)), LOSS_SEEN * elastic)
     found = []
@@ -409,7 +409,7 @@ class Curve:
 
     @cached_property
     def _looked_at(self) -> dict[str, list[tuple[int, dict[str, Any]]]]:
-        """What `examined` yields, by the first word: rules ask for it again and again, and the dataset makes an array at each look."""
+        """Points and rows of `examined` by the first word of a check; cached, because rules ask often and the dataset makes an array each time."""
         words = [w for w in CHECKS if self.at.size and self.has(f"{w}_case")]
         return {word: list(self._points_of(word)) for word in words}
 

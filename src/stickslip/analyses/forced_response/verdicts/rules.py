@@ -218,7 +218,7 @@ def contact_stiffness(case: Curve) -> Iterator[Finding]:
 
 
 def _softer(case: Curve) -> str:
-    """Return what softer contacts do to a peak, to first order; empty where that is not known."""
+    """Return the effect of softer contacts on a peak, to first order; empty if unknown."""
     slope, hertz = (case.number(f"stiffness_{own}") for own in ("peak_slope", "frequency_slope_hz"))
     if not np.isfinite(slope):
         return ""
@@ -283,7 +283,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
 
 
 def _more(case: Curve, point: int) -> str:
-    """Say how a point gets more harmonics: what kept it from them is the study, the response's work, its limits, or the most there are."""
+    """Say how a point gets more harmonics, by what limits them: the study, the work of the response, its limits, or the largest number possible."""
     if not case.auto:
         return _of_selection(str(case.data.attrs.get("selection", "")))
     if case.own_error[point] <= case.limit:
@@ -301,7 +301,7 @@ def _more(case: Curve, point: int) -> str:
 
 
 def _of_selection(selection: str) -> str:
-    """Say what gives more harmonics where they are not raised along the branch."""
+    """Say which keys give more harmonics if they are not raised along the branch."""
     if selection == "always_low":
         return MORE_THAN_LOW
     if selection in STRATEGIES and selection not in VERIFYING:  # "auto" is five to them

@@ -214,13 +214,13 @@ def sticks_at(peaks: Sequence[CurvePeak], key: str = "") -> Literal["low", "high
 
 
 def _excites(low: CurvePeak, high: CurvePeak) -> bool:
-    """Whether the force that is varied is the excitation: no pull, and none that the excitation grows with."""
+    """Whether the varied force is the excitation: no static load, and none to which the excitation is proportional."""
     scaled = np.isclose(high.force * low.value, low.force * high.value, rtol=1e-9)
     return bool(scaled and not np.isclose(low.size, high.size, rtol=1e-3))
 
 
 def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | None:
-    """Return the end that sticks for a much larger share of the cycle, and where contacts dissipate less over the amplitude.
+    """Return the end at which contacts stick for a much larger fraction of the cycle and dissipate less relative to the amplitude.
 
     A contact that opens slips less, too: small differences of the share tell nothing.
     """
@@ -266,7 +266,7 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
 
 
 def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool) -> CurvePeak | None:
-    """Return the peak of a case; None where it is not known, no resonance, or wrong."""
+    """Return the peak of a case; None if it is unknown, no resonance, or wrong."""
     curve = Curve(data, case)
     wrong = curve.number("case_verdict") == LEVELS.index("wrong")
     if curve.peak < 0 or curve.at_the_end or curve.outside or wrong:
@@ -283,7 +283,7 @@ def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force:
 
 
 def _loss(curve: Curve) -> float:
-    """Return the energy that contacts dissipate at a peak, J: zero where it is rounding, NaN where the dataset does not tell."""
+    """Return the energy dissipated by contacts at a peak, J: zero for rounding, NaN if unknown."""
     if not curve.elastic > 0.0:
         return float("nan")
     loss = float(curve.dissipation[curve.peak])
@@ -368,7 +368,7 @@ def _middle(own: WorkingRange) -> str:
 
 
 def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
-    """Return from where to where, in words."""
+    """Return a range in words."""
     first, last = peaks[0], peaks[-1]
     if first is last:
         return f"at {_of(own, first)}"
@@ -376,7 +376,7 @@ def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
 
 
 def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
-    """Say of friction that never takes the peak 3 dB down how near it stays to full stick."""
+    """State how near the peak stays to full stick if friction never reduces it by 3 dB."""
     off = [p.size / stuck.size - 1 for p in own.peaks]
     if max(off) > 1 / HALF_POWER - 1:
         best, worst = own.smallest, max(own.peaks, key=lambda p: p.size)
@@ -415,7 +415,7 @@ def _gone(own: WorkingRange, gone: Sequence[CurvePeak]) -> str:
 
 
 def _saturated(best: CurvePeak, last: CurvePeak) -> str:
-    """Say how the loss over the amplitude grows while the amplitude does: a sliding contact loses four limits a unit of amplitude at most."""
+    """Compare the growth of dissipation and amplitude: a sliding contact dissipates at most four friction limits a unit of amplitude."""
     if not (best.loss > 0.0 and last.loss > 0.0 and last is not best):
         return ""
     grown, loss = last.amplitude / best.amplitude, last.loss / last.amplitude

@@ -17,7 +17,7 @@ _BAND = 0.02  # half the height of a label, and its distance from the line, as a
 
 
 def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
-    """Return where each line (wave, mode) is labelled: index of the speed, and 1 above or -1 below.
+    """Return the label position of each line (wave, mode): index of the speed, and 1 above or -1 below.
 
     It is the first speed at which neither another line nor another label is in the way.
     """
@@ -63,7 +63,7 @@ def _branches(view: Waves) -> list[go.Scatter]:
 
 
 def _orders(view: Waves, top: float) -> list[go.Scatter]:
-    """Engine-order lines, cut where they leave the picture, each with its name at the end."""
+    """Draw the engine-order lines inside the figure, each with its name at the end."""
     last, first = view.floats("speed_rpm").max(), view.floats("speed_rpm").min()
     traces = []
     for index, order in enumerate(view.numbers("engine_orders").astype(int)):
@@ -107,7 +107,7 @@ def _crossings(view: Waves) -> go.Scatter:
 
 
 def _not_shown(view: Waves, top: float) -> str:
-    """Say which engine orders leave the picture, and from where on their crossings are not known."""
+    """Name the engine orders that leave the figure, and the speed from which their crossings are unknown."""
     last, first = float(view.floats("speed_rpm").max()), float(view.floats("speed_rpm").min())
     asked = [int(m) for m in view.numbers("engine_orders")]
     cut = [f"EO {m}" for m in asked if first < top * 60 / m < last]

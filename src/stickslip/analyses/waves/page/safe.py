@@ -82,7 +82,7 @@ def safe_diagram(view: Waves) -> Plot:
 
 
 def _not_judged(view: Waves) -> set[int]:
-    """Return the engine orders that excite above the computed modes."""
+    """Return the engine orders above the computed modes."""
     if not view.has("pair_judged"):
         return set()
     orders = view.integers("pair_engine_order")
@@ -90,7 +90,7 @@ def _not_judged(view: Waves) -> set[int]:
 
 
 def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) -> go.Scatter:
-    """Mark the engine orders on the zig-zag line, their names where neither line nor modes run."""
+    """Mark the engine orders on the zig-zag line, with names away from lines and modes."""
     folded = np.abs(orders - sectors * np.round(orders / sectors))
     # the line rises to the right in the first half of a turn, to the left in the second
     places = np.where(2 * (orders % sectors) < sectors, "bottom right", "top right")

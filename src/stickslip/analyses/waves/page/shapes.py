@@ -64,7 +64,7 @@ def coarse_skin(points: FloatArray, triangles: IntArray, most: int) -> tuple[Int
 
 
 def _representatives(points: FloatArray, label: IntArray, count: int) -> IntArray:
-    """Return, for each label, the point nearest to the centroid of those that bear it."""
+    """Return, for each label, the labelled point nearest to their centroid."""
     size = np.bincount(label, minlength=count)
     centroid = np.stack([np.bincount(label, points[:, k], count) for k in range(3)], axis=1)
     off = np.linalg.norm(points - (centroid / size[:, None])[label], axis=1)
@@ -110,7 +110,7 @@ def mode_shapes(view: Waves) -> Plot | None:
 
 
 def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
-    """Return the sector at rest; the script puts the shape onto it."""
+    """Return the sector at rest; the script adds the mode shape."""
     light = {"ambient": 0.78, "diffuse": 0.5, "specular": 0.08, "roughness": 0.9}
     bar = {"title": {"text": "displacement<br>/ largest"}, "len": 0.55, "thickness": 14}
     still = np.zeros(len(points), dtype=np.float32)
@@ -135,7 +135,7 @@ def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
 
 
 def _payload(view: Waves, modes: int, kept: IntArray, faces: IntArray) -> dict[str, object]:
-    """Return what the script needs, arrays as text."""
+    """Return the data of the script, arrays as text."""
     points = view.floats("skin_point")[kept] * _MM
     shape = view.data["shape"].values[:, :modes, kept]
     largest = np.abs(shape).max(axis=(2, 3, 4), keepdims=True)
@@ -163,7 +163,7 @@ def _payload(view: Waves, modes: int, kept: IntArray, faces: IntArray) -> dict[s
 
 
 def _outside_of_wheel(view: Waves, faces: IntArray) -> IntArray:
-    """Leave out the faces between neighbouring sectors, where the skin was not made coarser already."""
+    """Remove the faces between neighbouring sectors, if the skin is not yet coarse."""
     cut = view.integers("skin_cut") if view.has("skin_cut") else np.zeros(0, dtype=np.int64)
     same = len(cut) == len(faces) and view.sectors > 1
     return faces[cut == 0] if same else faces

@@ -189,7 +189,7 @@ def energy(response: Response) -> Plot | None:
 
 
 def _widest_range(response: Response, total: FloatArray) -> str:
-    """Say in which case friction dissipates over the widest range of frequency."""
+    """Name the case in which friction dissipates over the widest frequency range."""
     widths = []
     for case in response.cases:
         at = response.points(case)

@@ -56,7 +56,7 @@ def period(response: Response, case: ShownCase, name: str) -> FloatArray:
 
 
 def _drawn(response: Response, *names: str) -> tuple[ShownCase, ...]:
-    """Cases with a peak whose variables are there and finite."""
+    """Return the cases with a peak whose variables exist and are finite."""
     if not response.has(*names):
         return ()
     first = response.data[names[0]]
@@ -77,7 +77,7 @@ def _state_keys() -> list[go.Scatter]:
 
 
 def _drawn_samples(curves: int, samples: int) -> slice:
-    """Return which samples of a period are drawn: every second or fourth ... of many curves, so that the page stays small."""
+    """Return the samples of a period to draw: with many curves every second, fourth ... one, to keep the page small."""
     step = 2 if samples >= 2 * 64 else 1
     while curves * samples // step > _MOST_SAMPLES and samples // (2 * step) >= _FEWEST_SAMPLES:
         step *= 2
@@ -103,7 +103,7 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
 
 
 def _area(response: Response, case: ShownCase, direction: int) -> FloatArray:
-    """(contact,) areas of the loops: energy lost in a cycle, J; zero where rounding alone makes one."""
+    """Return (contact,) areas of the loops: energy dissipated in a cycle, J; zero for rounding."""
     gap, force = (period(response, case, name)[:, direction] for name in ("peak_gap", "peak_force"))
     work = 0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap)
     area = np.nan_to_num(np.abs(work.sum(axis=-1)))
@@ -125,7 +125,7 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
 
 
 def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> list[list[int]]:
-    """Return the contact points drawn, by row: those with a force, where they are many those that lose most in any case."""
+    """Return the contact points to draw, by row: those with a force; of many those with the largest dissipation in any case."""
     spans = [np.ptp(period(response, c, "peak_force")[:, direction], axis=-1) for c in cases]
     acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
     if len(acting) > _MOST_LOOPS:
@@ -208,7 +208,7 @@ def _state_caption(response: Response, case: ShownCase, rows: list[int]) -> str:
 
 
 def _rubs(response: Response, case: ShownCase, rows: list[int]) -> BoolArray:
-    """Which rows of (contact, tangent) have friction: a stop has no tangential force, and its state says no more than closed or open."""
+    """Return the rows (contact, tangent) with friction. A stop has no tangential force; its state is only closed or open."""
     if not response.has("peak_force"):
         return np.ones(len(rows), dtype=bool)
     force = period(response, case, "peak_force")[:, : len(response.labels("tangent"))]

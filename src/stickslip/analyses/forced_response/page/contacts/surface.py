@@ -56,7 +56,7 @@ def surface_map(response: Response) -> Plot | None:
 
 
 def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
-    """Return the contacts whose points span a surface: their points, and places (p, 2) along t and w from the middle, mm."""
+    """Return the contacts whose points span a surface: their points, and positions (p, 2) along t and w from the centre, mm."""
     position, frame = (response.values(f"contact_{name}") for name in ("position", "frame"))
     found = {}
     for group, members in response.groups.items():
@@ -72,14 +72,14 @@ def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
 
 
 def _shares(response: Response, case: ShownCase) -> tuple[FloatArray, FloatArray]:
-    """Return for which share of the cycle each contact point slips and is open, percent."""
+    """Return the percentage of the cycle during which each contact point slips and is open."""
     state = states(response, case)
     slips, opens = (100.0 * (state == k).any(axis=1).mean(axis=1) for k in (1, 2))
     return slips, opens
 
 
 def _rims(response: Response, points: IntArray) -> dict[int, FloatArray]:
-    """Return the corners (k, 2) of the patches of a contact, in the plane of `_surfaces`, mm; none without areas."""
+    """Return the corners (k, 2) of a contact's patches in the plane of `_surfaces`, mm; none without areas."""
     if not response.has("contact_area"):
         return {}
     position, frame, area = (response.values(f"contact_{n}") for n in ("position", "frame", "area"))
@@ -89,7 +89,7 @@ def _rims(response: Response, points: IntArray) -> dict[int, FloatArray]:
 
 
 def _patches(rims: Mapping[int, FloatArray], slips: FloatArray) -> list[go.Scatter]:
-    """Draw the patches of a contact, those of about the same share of slip as one trace."""
+    """Draw the patches of a contact, with one trace for patches of similar slip."""
     steps: dict[int, list[int]] = {}
     for k in rims:
         steps.setdefault(int(np.ceil(STEPS * slips[k] / 100.0)), []).append(k)
