@@ -1,4 +1,4 @@
-"""Motions that a sweep does not meet, and which one most starts end on: the analysis ``all_motions``."""
+"""Search for motions that a sweep misses, with their basins of attraction: the analysis ``all_motions``."""
 
 from collections.abc import Iterator, Sequence
 
@@ -17,14 +17,14 @@ MODEL, FOUND = "model", "found"  # notes
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return what is searched; refuse what cannot be."""
+    """Return the problem of a search; refuse what cannot be searched."""
     question = question_of(case, model)
     LOG.info(f"all_motions: {_said(question)}")
     return question
 
 
 def _solve(inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[Stage]:
-    """Yield the stages that are not done."""
+    """Yield the missing stages."""
     if notes.get(FOUND) is not None:
         return
     notes.put(MODEL, dict(inputs.facts) | {"output": inputs.model.output_labels[0]})
@@ -39,7 +39,7 @@ def _solve(inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[St
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say what is searched, and for how long."""
+    """Describe the search, and its estimated time."""
     question = question_of(case, model)
     seconds = search_seconds(question.problem, question.search)
     return (

@@ -1,4 +1,4 @@
-"""All motions: every branch in one figure, and the basins of attraction."""
+"""All motions on the page: every branch in one figure, and the basins of attraction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,10 +1,10 @@
-"""Per cent as it is written: two digits, three from 100 on, and never an exponent."""
+"""Numbers in percent: two digits, three from 100 on, and never an exponent."""
 
 import numpy as np
 
 
 def percent(share: float, *, unit: bool = True) -> str:
-    """Write a share in per cent with at most three digits; what is beyond 1000 % is said to be so."""
+    """Write a fraction in percent with at most three digits; above 1000 % as a bound."""
     value = 100 * share
     if not np.isfinite(value):
         return "-"

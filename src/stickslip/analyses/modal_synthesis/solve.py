@@ -1,4 +1,4 @@
-"""Synthesises the response at each level, judges whether the mode is alone, and solves directly where that is asked for."""
+"""Solution at each level: synthesised response, test of the single mode, and direct solution if requested."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ NOBODY = Isolation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, linear=False)
 
 @dataclass(frozen=True, eq=False)
 class Synthesis:
-    """What all levels share."""
+    """Data common to all levels."""
 
     question: Question
     oscillator: ModalOscillator
@@ -71,7 +71,7 @@ class Synthesis:
 
 
 def solve(question: Question, done: Sequence[SynthesisLevel], notes: Notes) -> Iterator[SynthesisLevel]:
-    """Yield the levels that are not done."""
+    """Yield the missing levels."""
     began = process_time()
     notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
     mode = question.mode
@@ -102,7 +102,7 @@ def solve(question: Question, done: Sequence[SynthesisLevel], notes: Notes) -> I
 
 
 def judged(alone: Isolation, resolved: float, changed: float) -> tuple[str, str]:
-    """Return what is to be thought of a peak, and why; `changed`: by how much more harmonics are foretold to change the nonlinear mode there."""
+    """Return the verdict on a peak and its reason; `changed` is the predicted change of the nonlinear mode by more harmonics."""
     off = percent(alone.foreign)
     motion = f"the other modes move by {percent(max(alone.output, alone.gaps))} of the mode"
     near = f"the next frequency is {percent(alone.distance)} away"
@@ -296,7 +296,7 @@ def _design(own: ModalOscillator, question: Question) -> dict[str, Any]:
 
 
 def backbone_of(question: Question, mode: StuckMode, notes: Notes) -> Backbone:
-    """Return the nonlinear mode of a job, from its notes where it is among them."""
+    """Return the nonlinear mode of a job, from its notes if stored."""
     known = notes.get(NOTE)
     if known is not None:
         return _read(question, mode, known)

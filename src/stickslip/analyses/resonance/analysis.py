@@ -30,16 +30,16 @@ HARMONICS = "harmonics"  # note: the highest peak with more of them
 def unmet_peaks(
     search: PeakSearch, points: Sequence[PeakPoint], values: Sequence[float], later: int
 ) -> dict[str, FloatArray]:
-    """Return number and value of the peaks that no sweep was seen to reach.
+    """Return number and value of the peaks that no sweep has confirmed.
 
     Parameters
     ----------
     search
-        Of what.
+        Search of the peaks.
     points
-        All that was found.
+        All points found.
     values
-        In the order in which they were visited; the peaks of the last one were found by a sweep.
+        Values in the order of visits; the peaks of the last one were found by a sweep.
     later
         Number of the first peak that was followed back.
     """

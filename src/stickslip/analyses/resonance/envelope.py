@@ -1,4 +1,4 @@
-"""The highest of several peaks over the parameter: crossings, and where the highest is lowest."""
+"""The highest of several peaks over the parameter: crossings, and its minimum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from stickslip.response.resonances.point import PeakPoint
 
 @dataclass(frozen=True)
 class Overtaking:
-    """Where another peak becomes the highest, along the values as they were visited.
+    """A value of the parameter at which another peak becomes the highest, in the order of visits.
 
     Parameters
     ----------
     value
-        Of the parameter, between two visited ones on straight lines.
+        Value of the parameter, interpolated between two visited ones.
     before, after
         Numbers of the peaks.
     amplitude
-        There, m.
+        Amplitude at this value, m.
     """
 
     value: float
@@ -31,14 +31,14 @@ class Overtaking:
 
 
 def heights(points: Sequence[PeakPoint], values: Sequence[float]) -> FloatArray:
-    """Return (peaks, values) amplitudes of the maxima at the visited values; NaN where there is none."""
+    """Return (peaks, values) amplitudes of the maxima at the visited values; NaN for missing ones."""
     known = {(p.peak, p.value): p.amplitude for p in points if p.converged and p.is_maximum}
     count = 1 + max((p.peak for p in points), default=-1)
     return np.array([[known.get((i, v), np.nan) for v in values] for i in range(count)])
 
 
 def along_span(points: Sequence[PeakPoint]) -> tuple[FloatArray, list[float]]:
-    """Return the same of curves that were followed by arc length, on straight lines between their points, and all values; a curve counts up to its first fold."""
+    """Return (peaks, values) amplitudes of curves followed by arc length, interpolated, and all values; a curve counts up to its first fold."""
     count = 1 + max((p.peak for p in points), default=-1)
     curves = [_before_fold([p for p in points if p.peak == i]) for i in range(count)]
     values = np.unique([p.value for own in curves for p in own])
@@ -65,20 +65,20 @@ def _before_fold(curve: Sequence[PeakPoint]) -> list[PeakPoint]:
 
 
 def highest(amplitude: FloatArray) -> IntArray:
-    """Return the number of the highest peak at each value, -1 where there is none."""
+    """Return the number of the highest peak at each value; -1 for none."""
     filled = np.where(np.isfinite(amplitude), amplitude, -np.inf)
     return np.where(np.any(np.isfinite(amplitude), axis=0), np.argmax(filled, axis=0), -1)
 
 
 def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaking]:
-    """Return where another peak becomes the highest.
+    """Return the values at which another peak becomes the highest.
 
     Parameters
     ----------
     amplitude
         (peaks, values) in m.
     values
-        As they were visited.
+        Values in the order of visits.
     """
     top = highest(amplitude)
     found = []
@@ -97,7 +97,7 @@ def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaki
 
 
 def valley(points: Sequence[PeakPoint], amplitude: FloatArray, values: Sequence[float]) -> tuple[float, float] | None:
-    """Return two visited values between which the highest peak is lowest and one and the same peak, whose slope changes its sign; None without."""
+    """Return two visited values between which the highest peak has its minimum without changing to another peak; None for none."""
     top = highest(amplitude)
     if not np.any(top >= 0):
         return None

@@ -1,4 +1,4 @@
-"""The response over speed and engine order, each speed with its own stiffness and preload."""
+"""The response over speed along engine orders, each speed with its own stiffness and preload."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Fast run-ups along the engine orders, beside the steady peaks."""
+"""Fast run-ups along the engine orders, compared with the steady peaks."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ JUDGED_PEAK_SHARE = 0.5  # share of the peak above which the second derivative i
 
 
 def fast_run_ups(question: Question, points: Sequence[RunUpPoint], notes: Notes) -> None:
-    """Compute all fast run-ups that are not among the notes, and put each down when it is finished."""
+    """Compute all fast run-ups missing in the notes, and store each when finished."""
     jobs = [(along, rate) for along in question.lines for rate in question.rates]
     for i, (along, rate) in enumerate(jobs):
         name = name_of(along.order, rate)
@@ -96,7 +96,7 @@ def _kept(
 
 
 def neglected(time: FloatArray, amplitude: ComplexArray, omega: FloatArray) -> float:
-    """Return the size of the second derivative of an amplitude, over 2ω times the first, around the largest amplitude.
+    """Return the ratio of the second derivative of an amplitude to 2ω times the first, around the largest amplitude.
 
     Parameters
     ----------

@@ -8,16 +8,16 @@ from stickslip.response.forced.response import Sweep
 
 
 def sweep_along(settings: Any, engine_order: int, driven: Iterable[int] = (1,)) -> Sweep:
-    """Return the sweep along an engine order that a study's tables ask for.
+    """Return the sweep along an engine order, as defined by a study's tables.
 
     Parameters
     ----------
     settings
-        With the tables ``run_up``, ``harmonics`` and ``solver``.
+        Settings with the tables ``run_up``, ``harmonics`` and ``solver``.
     engine_order
-        Times the speed it is the frequency of the first harmonic.
+        Ratio of the frequency of the first harmonic to the speed.
     driven
-        Harmonics that loads act in.
+        Harmonics of the loads.
     """
     table = settings.run_up
     lowest, highest = (engine_order * speed for speed in table.speeds)
