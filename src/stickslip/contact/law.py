@@ -164,6 +164,42 @@ class PlanarFriction(Protocol):
         ...
 
 
+@runtime_checkable
+class NormalContact(Protocol):
+    """A law of planar friction whose normal force is that of a piecewise-linear contact, whose transitions can be located.
+
+    Attributes
+    ----------
+    mu
+        Friction coefficient.
+    """
+
+    @property
+    def mu(self) -> float: ...  # noqa: D102
+
+    def normal_contact(self) -> PiecewiseLinear | None:
+        """Return the law without friction; None where the normal force is constant."""
+        ...
+
+
+@runtime_checkable
+class ResidualTraction(Protocol):
+    """A law with sliders that may start from a given traction."""
+
+    def unstretched(self) -> ContactLaw:
+        """Return the law without a residual traction at rest."""
+        ...
+
+
+@runtime_checkable
+class PressedOrOpen(Protocol):
+    """A law that takes its state at rest as a preload or as a clearance, never both."""
+
+    def at_rest(self, preload: float, gap: float) -> ContactLaw:
+        """Return the law with a further normal force, N, and a further clearance, m, at rest."""
+        ...
+
+
 def law_kernel(step: Callable[..., None]) -> Any:
     """Compile the step of a law.
 

@@ -9,8 +9,7 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, FloatArray, Matrix
 from stickslip.contact.initial_sliders import freezable, left_behind, sharing_friction
 from stickslip.contact.interface import Interface
-from stickslip.contact.law import OPEN, ContactLaw, holding_directions
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.law import OPEN, ContactLaw, ResidualTraction, holding_directions
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
@@ -43,7 +42,7 @@ class _Held:
 
 @by_one_thread
 def preload(system: System, static_load: FloatArray) -> FloatArray:
-    """Place the structure under a static load, its contacts sticking, slipping or open.
+    """Find the static equilibrium under a load, with contacts that stick, slip or are open.
 
     Parameters
     ----------
@@ -55,12 +54,12 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray
-        (n_retained,) static displacement of the retained coordinates, m; zero if there is no static load.
+        (n_retained,) static displacement of the retained coordinates, m; zero without a static load.
 
     Raises
     ------
     SingularError
-        If nothing holds a body (the message names the coordinate) or no equilibrium is found.
+        If a body has no support (the message names the coordinate), or no equilibrium is found.
     """
     # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
     interface = replace(system.springs, laws=tuple(map(_unstretched, system.springs.laws)))
@@ -89,10 +88,10 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
 
 
 def frozen_sliders(system: System, static_load: FloatArray, friction_share: float = 1.0) -> System:
-    """Place the structure under a static load first, and start every slider where that load leaves it.
+    """Return the system with all sliders at their positions in the static equilibrium.
 
-    A vibration during which no contact slips or opens is then that of plain springs, with the static state as its mean: harmonics
-    and static part do not feel each other (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off forgets.
+    A vibration without slip and lift-off is then linear about the static state: harmonics and static part are independent
+    (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off loses its initial position.
 
     Parameters
     ----------
@@ -101,21 +100,20 @@ def frozen_sliders(system: System, static_load: FloatArray, friction_share: floa
     static_load
         (n,) static forces on all dofs, N.
     friction_share
-        Share of the friction coefficients, above 0 to 1, with which the static state is found: no contact holds more than this
-        share of ``mu N``, and the rest is left to the vibration. With 1 a contact that slips under the static load stands on its
-        limit, and the least vibration moves its slider.
+        Factor on the friction coefficients in the static solution, above 0 to 1: contacts carry at most this share of ``mu N`` at
+        rest. With 1, a contact that slips under the static load is at its friction limit, and any vibration moves its slider.
 
     Returns
     -------
     System
-        With laws whose `slider` is set; `preload` finds the same static state of it.
+        System whose laws have a `slider`; `preload` finds the same static state for it.
 
     Raises
     ------
     InputError
         If the share is not above 0 to 1, or a law has no single slider.
     SingularError
-        If the static load finds no equilibrium.
+        If there is no equilibrium under the static load.
     """
     if not 0.0 < friction_share <= 1.0:
         raise input_error(
@@ -137,7 +135,7 @@ def frozen_sliders(system: System, static_load: FloatArray, friction_share: floa
 
 
 def _unstretched(law: ContactLaw) -> ContactLaw:
-    return replace(law, residual_traction=None) if isinstance(law, ElasticCoulomb) else law
+    return law.unstretched() if isinstance(law, ResidualTraction) else law
 
 
 def _released(balance: HarmonicBalance, options: Newton) -> Solution:
@@ -157,12 +155,12 @@ def _released(balance: HarmonicBalance, options: Newton) -> Solution:
 
 
 def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArray:
-    """Return the scaled solution with every contact bonded: the start of all that follows.
+    """Return the scaled solution with every contact bonded, the start of all other solutions.
 
     Raises
     ------
     SingularError
-        If a body is held by nothing even then; the message names the coordinate.
+        If a body has no support even with bonded contacts. The message names the coordinate.
     """
     load = to_complex(balance.linear_load(omega))
     rows = balance.rows
@@ -224,12 +222,12 @@ def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
 
 
 def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
-    """Return the contact points that stick in small vibrations: those under pressure, and those whose law never opens.
+    """Return which contact points (p,) stick in small vibrations: those under pressure, and those whose law never opens.
 
     Parameters
     ----------
     laws
-        One a point.
+        Law of each point.
     force
         (p, 3) static contact forces t, w, n, N.
     """
@@ -237,7 +235,7 @@ def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
 
 
 def opening(laws: Sequence[ContactLaw]) -> BoolArray:
-    """Return the contact points (p,) whose law lets go of them where they are far away."""
+    """Return which contact points (p,) have a law that opens at large distance."""
     found: dict[int, bool] = {}
     for law in laws:
         found.setdefault(id(law), _opens(law))

@@ -7,9 +7,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
-from stickslip.contact.law import ContactLaw, Rigid, scaled
+from stickslip.contact.law import ContactLaw, PressedOrOpen, Rigid, scaled
 from stickslip.contact.laws import LAWS, law_name
-from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError, input_error
 
 
@@ -32,20 +31,11 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
         raise _at_rest_alike(key, contact, *_without(law, missing))
     if contact.gap != 0.0 and law.k_n == 0.0:
         raise _at_rest_alike(key, contact, "has no normal stiffness here: its pressure is constant")
-    if isinstance(law, UnilateralSpring):
-        return _pressed_or_open(law, contact)
+    if isinstance(law, PressedOrOpen):
+        return law.at_rest(contact.preload, contact.gap)
     pressed = law.preload + contact.preload - law.k_n * contact.gap
     found: ContactLaw = replace(law, preload=pressed)
     return found
-
-
-def _pressed_or_open(law: UnilateralSpring, contact: Contact) -> UnilateralSpring:
-    """Return the law with a preload or a clearance: what is left of its own and of the contact's."""
-    preload, gap = law.preload + contact.preload, law.initial_gap + contact.gap
-    clearance = gap - preload / law.k_n
-    if clearance > 0.0:
-        return replace(law, preload=0.0, initial_gap=clearance)
-    return replace(law, preload=max(preload - law.k_n * gap, 0.0), initial_gap=0.0)
 
 
 def _without(law: Any, missing: list[str]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import COUPLED_TANGENTS, kernel_in
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.quantities import check_any_stiffness, friction_coefficient, normal_stiffness
 from stickslip.units import check_quantities, quantity
 
@@ -78,6 +79,12 @@ class CoupledCoulomb:
     def parameters(self) -> FloatArray:
         """Return the (5,) k_t, k_w, k_n, mu and preload."""
         return np.array([self.k_t, self._along_w, self.k_n, self.mu, self.preload])
+
+    def normal_contact(self) -> ElasticCoulomb | None:
+        """Return the normal contact without friction; None where the normal force is constant."""
+        if self.k_n <= 0.0:
+            return None
+        return ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=self.k_n, mu=0.0, preload=self.preload)
 
     def planar(self) -> FloatArray | None:
         """Return the (4,) k_t, k_n, mu and preload of an isotropic contact, see `contact.law.PlanarFriction`; None with two stiffnesses."""

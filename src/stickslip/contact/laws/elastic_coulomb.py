@@ -1,6 +1,6 @@
 """Unilateral normal spring with two independent Jenkins springs whose limit follows the normal force."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -90,6 +90,10 @@ class ElasticCoulomb:
     def elements(self) -> FloatArray:
         """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
         return self.parameters()[None]
+
+    def unstretched(self) -> "ElasticCoulomb":
+        """Return the law without a residual traction at rest."""
+        return replace(self, residual_traction=None)
 
     def initial_state(self) -> FloatArray:
         """Return the (2,) slider positions before t = 0, m."""

@@ -1,6 +1,6 @@
 """Normal spring that pushes and cannot pull, without friction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -48,6 +48,14 @@ class UnilateralSpring:
                 f"has a preload of {self.preload} N and an initial gap of {self.initial_gap} m",
                 "A contact at rest is either pressed or open: give one of them.",
             )
+
+    def at_rest(self, preload: float, gap: float) -> "UnilateralSpring":
+        """Return the law with a further normal force (N) and clearance (m): as a preload where it is pressed, else as a clearance."""
+        preload, gap = self.preload + preload, self.initial_gap + gap
+        clearance = gap - preload / self.k_n
+        if clearance > 0.0:
+            return replace(self, preload=0.0, initial_gap=clearance)
+        return replace(self, preload=max(preload - self.k_n * gap, 0.0), initial_gap=0.0)
 
     def parameters(self) -> FloatArray:
         """Return the (7,) row of an elementary contact without tangential springs."""

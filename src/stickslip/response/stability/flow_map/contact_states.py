@@ -15,9 +15,7 @@ from stickslip.contact.element import K_N, MU, RESIDUAL, UNILATERAL
 from stickslip.contact.event_integrals import Events, room_for_events
 from stickslip.contact.events import exact_period
 from stickslip.contact.interface import Interface
-from stickslip.contact.law import SLIP, STICK, ContactLaw, PiecewiseLinear
-from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.law import SLIP, STICK, ContactLaw, NormalContact, PiecewiseLinear
 from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, SIGN, START, STATE
 
 
@@ -87,14 +85,12 @@ def located_part(law: ContactLaw) -> PiecewiseLinear | None:
     """Return what of a law has transitions that can be located: all of it, the normal contact of planar friction, or nothing."""
     if isinstance(law, PiecewiseLinear):
         return law
-    if isinstance(law, CoupledCoulomb) and law.k_n > 0.0:
-        return ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=law.k_n, mu=0.0, preload=law.preload)
-    return None
+    return law.normal_contact() if isinstance(law, NormalContact) else None
 
 
 def is_located(law: ContactLaw) -> bool:
     """Whether all transitions of a law can be located: planar contacts without friction have none but those of their normal springs."""
-    frictionless = isinstance(law, CoupledCoulomb) and law.mu == 0.0 and law.k_n > 0.0
+    frictionless = isinstance(law, NormalContact) and law.mu == 0.0 and law.normal_contact() is not None
     return isinstance(law, PiecewiseLinear) or frictionless
 
 
