@@ -29,14 +29,14 @@ SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How well the contacts hold the free body at one point.
+    """Determinacy of the mean position of a free body at one point.
 
     Attributes
     ----------
     ratio
-        Smallest over largest singular value of the balanced Jacobian, to some per cent.
+        Smallest over largest singular value of the balanced Jacobian, to a few per cent.
     coordinate
-        Name of the coordinate that is held least.
+        Name of the least determined coordinate.
     """
 
     ratio: float
@@ -49,7 +49,7 @@ class Drift:
 
 
 def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
-    """Find the least held coordinate of the periodic problem at a point.
+    """Find the least determined coordinate of the periodic problem at a point.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def as_array(jac: FloatArray) -> Held:
 
 
 def by_products(jac: StructuredJacobian) -> Held | None:
-    """Find the same without the array, for which thousands of contacts leave no room; None where an iteration does not converge.
+    """Find the same singular value by matrix-vector products, for thousands of contacts; None if an iteration does not converge.
 
-    A coordinate is balanced in each harmonic by what couples it within.
+    Each coordinate is balanced in each harmonic by its coupling within that harmonic.
     """
     most = [abs(block).max(axis=0) for _, block in jac.own_blocks()]
     own = np.array([a.toarray().ravel() if scipy.sparse.issparse(a) else a for a in most])

@@ -23,16 +23,16 @@ ALIKE = 0.03  # relative distance of the harmonics in time from those of a solut
 
 @dataclass(frozen=True, eq=False)
 class Basins:
-    """Where the starts at one frequency end.
+    """Motions on which the random starts at one frequency end.
 
     Parameters
     ----------
     omega
-        rad/s.
+        Frequency of the load, rad/s.
     ends
-        (starts,) number of the motion at this frequency that each ends on; `APERIODIC`: on none that repeats with the load's period, or
-        on none within the periods allowed; `PERIODIC`: on one that repeats, for which no solution was found; `DIVERGED`: it grows without
-        bound.
+        (starts,) number of the motion at this frequency on which each start ends. `APERIODIC`: the motion does not repeat with the
+        period of the load, or not within the allowed periods; `PERIODIC`: it repeats, and no solution was found for it; `DIVERGED`: it
+        grows without bound.
     """
 
     omega: float
@@ -47,12 +47,12 @@ class Basins:
         return self.count(motion) / len(self.ends) if self.ends else np.nan
 
     def interval(self, motion: int) -> tuple[float, float]:
-        """Return between which shares the basin of a motion lies with 95 % confidence, of starts drawn in the same way."""
+        """Return the 95 % confidence interval of the share of starts that end on a motion, for starts drawn in the same way."""
         return share_interval(self.count(motion), len(self.ends))
 
 
 def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the binomial interval of Clopper and Pearson (1934) for `count` of so many `starts`; (0, 1) without any."""
+    """Return the binomial confidence interval of Clopper and Pearson (1934) for `count` out of `starts`; (0, 1) without starts."""
     rest_of = 0.5 * (1.0 - confidence)
     low = float(betaincinv(count, starts - count + 1, rest_of)) if count > 0 else 0.0
     high = float(betaincinv(count + 1, starts - count, 1.0 - rest_of)) if count < starts else 1.0
@@ -66,13 +66,13 @@ class StartSampler:
     Parameters
     ----------
     problem
-        What vibrates.
+        The forced response.
     omega
         Frequency of the load, rad/s.
     mean
-        (n,) static displacement that all begin about, m.
+        (n,) mean displacement of all random states, m.
     shapes, omegas, radius
-        (n, modes), (modes,) in rad/s and (modes,): mass-normalised modes with contacts stuck, and the largest modal amplitude of each.
+        (n, modes) mass-normalised modes with stuck contacts, (modes,) their frequencies in rad/s, and (modes,) their largest amplitudes.
     """
 
     problem: ForcedProblem
@@ -83,7 +83,7 @@ class StartSampler:
     radius: FloatArray
 
     def draw(self, seed: tuple[int, ...]) -> TransientStart:
-        """Return the state of a seed; sliders as a contact has them that never moved."""
+        """Return the random state of a seed, with sliders at their initial positions."""
         rng = np.random.default_rng(seed)
         size = self.radius * np.sqrt(rng.uniform(size=self.radius.size))
         turn = rng.uniform(0.0, 2.0 * np.pi, self.radius.size)
@@ -94,7 +94,7 @@ class StartSampler:
 
 
 def not_marched(system: System) -> str:
-    """Return why a system has no starts in time and no multipliers here; empty where it has."""
+    """Return why a system can neither be integrated in time nor have multipliers here; empty where it can."""
     side = system.structure
     if side.wheel is not None or side.speed_follows_frequency:
         return "a tuned wheel is searched as a travelling wave, its sectors are not marched in time"
@@ -111,7 +111,7 @@ def not_marched(system: System) -> str:
 def sampler(
     problem: ForcedProblem, omega: float, motions: list[ComplexArray], modes: int, spread: float
 ) -> StartSampler:
-    """Return what draws states about motions, (H+1, n) complex amplitudes of all coordinates, up to `spread` times the largest of each mode."""
+    """Return a sampler of states about motions, (H+1, n) complex amplitudes in m, up to `spread` times the largest amplitude of each mode."""
     structure = one_structure(problem.system.stuck_structure(), "all motions")
     own = normal_modes(structure, min(modes, structure.n))
     shapes = np.asarray(own.shapes).real
@@ -125,7 +125,7 @@ def sampler(
 
 
 def in_time(own: StartSampler, start: TransientStart, stepping: TimeStepping) -> TransientResult:
-    """Integrate from a state until the motion repeats; harmonics of the retained coordinates, then of the outputs, are reported."""
+    """Integrate from a state until the motion repeats; results are harmonics of the retained coordinates, then of the outputs."""
     system, linear = own.problem.system, own.problem.low.linear
     contacts = system.interface
     watched = np.concatenate([linear.retained, system.outputs])
@@ -143,7 +143,7 @@ def in_time(own: StartSampler, start: TransientStart, stepping: TimeStepping) ->
 
 
 def drawn(own: StartSampler, seed: int, place: int) -> Iterator[TransientStart]:
-    """Yield states without end, the same for a seed and the place of the frequency."""
+    """Yield an endless sequence of states, the same for the same seed and the same number `place` of the frequency."""
     number = 0
     while True:
         yield own.draw((seed, place, number))

@@ -26,14 +26,14 @@ class _Deflated:
 
 @dataclass(frozen=True, eq=False)
 class Distance:
-    """How far two states are apart, in units of the size of the vibration: 1 is another one, not a neighbour.
+    """Distance of two states over the size of the vibration: distinct motions are about 1 apart.
 
     Parameters
     ----------
     weights
-        (size,) share of each unknown: none of the static ones.
+        (size,) weight of each unknown; zero for static ones.
     size
-        Of the vibrations that are compared.
+        Size of the compared vibrations.
     """
 
     weights: FloatArray
@@ -44,13 +44,13 @@ class Distance:
         return float(np.linalg.norm(self.weights * (a - b))) / self.size
 
     def same(self, a: FloatArray, b: FloatArray) -> bool:
-        """Whether two solutions are one."""
+        """Whether two solutions are the same motion."""
         near = min(float(np.linalg.norm(self.weights * v)) / self.size for v in (a, b))
         return self.between(a, b) <= SOLUTION_DISTANCE * min(1.0, max(near, SOLUTION_DISTANCE))
 
 
 def distance_among(weights: FloatArray, known: Sequence[FloatArray]) -> Distance:
-    """Return how states near the `known` ones are compared: in units of the smallest of these."""
+    """Return the distance for states near the `known` ones, in units of the smallest of them."""
     sizes = [float(np.linalg.norm(weights * x)) for x in known]
     return Distance(weights, min((s for s in sizes if s > 0.0), default=1.0))
 
@@ -73,18 +73,18 @@ def deflated_newton(
     evaluate
         Residual and Jacobian.
     start
-        (size,) where to begin; none of the known solutions.
+        (size,) initial unknowns, different from all known solutions.
     known
-        (size,) each, solutions to stay away from.
+        Known solutions (size,), which are excluded.
     distance
-        How distances are measured.
+        Distance between states.
     options
         Tolerance and iterations.
 
     Returns
     -------
     Solution
-        Converged only if it is a solution and none of the known ones.
+        Converged only if it solves the equations and differs from the known solutions.
     """
     weights = distance.weights / distance.size
 
@@ -116,5 +116,5 @@ def deflated_newton(
 
 
 def charged_with(last: Solution, before: Solution) -> Solution:
-    """Return a solution with the cost of the one that led to it."""
+    """Return a solution whose cost includes that of the previous solve."""
     return charged(last, [before, last])

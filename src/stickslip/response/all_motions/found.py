@@ -17,35 +17,35 @@ Kind = Literal["branch", "searched", "starts", "motions"]
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A part of a search, arrays and numbers only, so that it can be written down and given back.
+    """Part of a search. It holds arrays and numbers only, so that a journal can store and restore it.
 
     Attributes
     ----------
     kind
-        ``branch``: a branch that was followed; ``searched``: deflation at a frequency is over; ``starts``: so are the starts in time there;
-        ``motions``: the motions at a frequency, each once.
+        ``branch``: points of a branch; ``searched``: deflation at a frequency is finished; ``starts``: the starts in time at a frequency
+        are finished; ``motions``: the distinct motions at a frequency.
     place
         Number of the frequency; -1 for the sweep.
     origin
-        How a branch was found: by the ``sweep``, by ``deflation``, or in ``time``.
+        Method that found a branch: ``sweep``, ``deflation`` or ``time``.
     end
-        Why a branch ends, in words; for starts whether the budget ended them.
+        Reason for the end of a branch, in words; for starts, whether the budget ended them.
     omega
-        (k,) rad/s, of the period of the motion: along the branch, of the motions, of the starts.
+        (k,) frequencies of the period of the motion, rad/s, along the branch, of the motions or of the starts.
     coefficients
-        (k, H+1, n_retained) amplitudes of the retained coordinates, m; of starts those at their end, NaN where no period repeats.
+        (k, H+1, n_retained) amplitudes of the retained coordinates, m; for starts at their end, NaN where no period repeats.
     branch
-        (k,) of motions the number of their branch; of starts the number of their motion or what `Basins` says; else empty.
+        (k,) for motions the number of their branch; for starts the number of their motion or a code of `Basins`; otherwise empty.
     multiplier, error
-        (k,) of motions: modulus of the multiplier that decides and its error; NaN where it was not examined.
+        (k,) for motions: modulus of the multiplier that decides the stability, and its error; NaN where it was not examined.
     change
-        (k,) of motions: what more harmonics would change in it, relative to its vibration; infinite where no motion with more is near.
+        (k,) for motions: predicted change by more harmonics, relative to the vibration; infinite where no motion with more is near.
     words
-        Of motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
+        Stability of the motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
     tries
         Deflated solves, or starts, since the last stage.
     seconds
-        What it took.
+        Computing time, s.
     """
 
     kind: Kind
@@ -70,13 +70,14 @@ class MotionBranch:
     Attributes
     ----------
     origin
-        How it was found.
+        Method that found the branch.
     end
-        Why it ends, in words.
+        Reason for its end, in words.
     omega, amplitude
-        (points,) rad/s, and of the first output over the harmonics that the load drives, m; of motions of several periods over all.
+        (points,) frequency, rad/s, and amplitude of the first output, m, over the driven harmonics; for motions of several periods over
+        all harmonics.
     coefficients
-        (points, H+1, n_retained), m.
+        (points, H+1, n_retained) amplitudes of the retained coordinates, m.
     """
 
     origin: Origin
@@ -87,22 +88,22 @@ class MotionBranch:
 
     @property
     def isola(self) -> bool:
-        """Whether it closes in itself, and no sweep meets it."""
+        """Whether the branch is a closed curve that no sweep meets."""
         return self.origin != "sweep" and self.end == CLOSES
 
     @property
     def peak(self) -> float:
-        """Its largest amplitude, m, between its points by a parabola; 0 without a point."""
+        """Largest amplitude, m, interpolated between points by a parabola; 0 without points."""
         return self._turning(self.amplitude)[0] if self.omega.size else 0.0
 
     @property
     def peak_omega(self) -> float:
-        """Frequency there, rad/s; NaN without a point."""
+        """Frequency of the largest amplitude, rad/s; NaN without points."""
         return self._turning(self.amplitude)[1] if self.omega.size else np.nan
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Its lowest and highest frequency, rad/s, where it folds between its points by a parabola; NaN without a point."""
+        """Lowest and highest frequency, rad/s, at folds interpolated by a parabola; NaN without points."""
         if not self.omega.size:
             return np.nan, np.nan
         return -self._turning(-self.omega)[0], self._turning(self.omega)[0]
@@ -136,18 +137,18 @@ class MotionAt:
     Attributes
     ----------
     branch
-        Number of its branch.
+        Number of the branch of the motion.
     amplitude
-        Of the first output over the harmonics that the load drives, m; of motions of several periods over all.
+        Amplitude of the first output over the driven harmonics, m; for motions of several periods over all harmonics.
     coefficients
-        (H+1, n_retained), m.
+        (H+1, n_retained) amplitudes of the retained coordinates, m.
     stability
         ``stable``, ``unstable``, ``undecided`` or ``not examined``.
     multiplier, error
-        Modulus of the multiplier that decides, and its error.
+        Modulus of the multiplier that decides the stability, and its error.
     change
-        What more harmonics would change in the motion, relative to its vibration; infinite where no motion with more is near, NaN where it
-        was not examined.
+        Predicted change of the motion by more harmonics, relative to its vibration; infinite where no motion with more is near, NaN
+        where it was not examined.
     """
 
     branch: int
@@ -161,18 +162,18 @@ class MotionAt:
 
 @dataclass(frozen=True, eq=False)
 class AtFrequency:
-    """What was found at a frequency: motions in the order of their branches, and where starts end.
+    """Motions found at a frequency, in the order of their branches, and their basins.
 
     Attributes
     ----------
     omega
-        Of the load, rad/s.
+        Frequency of the load, rad/s.
     motions, basins
-        What was found, and where starts end.
+        The motions, and the motions on which random starts end.
     tries
-        Deflated solves there.
+        Number of deflated solves at this frequency.
     spent
-        Whether the budget ended the deflation or the starts there.
+        Whether the budget ended the deflation or the starts at this frequency.
     """
 
     omega: float
@@ -184,24 +185,24 @@ class AtFrequency:
 
 @dataclass(frozen=True, eq=False)
 class AllMotions:
-    """What a search found; nothing proves that there is no other motion.
+    """Result of a search. Further motions may exist.
 
     Attributes
     ----------
     branches
-        The first one is that of the sweep.
+        Branches of motions, the branch of the sweep first.
     at
-        The frequencies that were searched.
+        Results at the searched frequencies.
     tries, starts
-        Deflated solves, and starts in time.
+        Number of deflated solves, and of starts in time.
     seconds
-        What the search took.
+        Computing time of the search, s.
     solves
-        Deflated solves, starts and points of branches together.
+        Number of deflated solves, starts and points of branches together.
     spent
-        Whether the budget ended it before all was tried that was asked for.
+        Whether the budget ended the search early.
     unmarched
-        Why nothing was started in time, nor its stability examined; empty where it was.
+        Reason for no starts in time and no stability; empty otherwise.
     """
 
     branches: tuple[MotionBranch, ...]
@@ -215,12 +216,12 @@ class AllMotions:
 
     @property
     def isolas(self) -> tuple[MotionBranch, ...]:
-        """Branches that close in themselves, and that no sweep meets."""
+        """Branches that are closed curves and that no sweep meets."""
         return tuple(b for b in self.branches if b.isola)
 
 
 def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) -> AllMotions:
-    """Return what the stages of a search tell together; frequencies are those of the load."""
+    """Combine the stages of a search to its result; frequencies are those of the load."""
     periods = search.periods
     branches = [
         MotionBranch(s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients)
@@ -266,7 +267,7 @@ SPENT = "the budget is spent"
 
 
 def work_of(stage: Stage) -> int:
-    """Return what a stage counts in the budget: deflated solves or starts in time, and the points of a branch."""
+    """Return the work of a stage in units of the budget: deflated solves, starts in time, and points of a branch."""
     return stage.tries + (stage.omega.size if stage.kind == "branch" else 0)
 
 

@@ -27,25 +27,25 @@ def mode_starts(
     known: Sequence[FloatArray],
     modes: int,
 ) -> list[FloatArray]:
-    """Return starts for motions that an internal or subharmonic resonance sustains, the one that needs least load first.
+    """Return starts for motions at an internal or subharmonic resonance, the one that needs the smallest load first.
 
-    A mode with contacts stuck or open vibrates freely in one harmonic where damping and load are left away and the force along its shape
-    vanishes. A motion on a closed curve apart from the sweep lies near such a free motion plus the known motion, in some phase.
+    Without damping and load, a mode with contacts stuck or open vibrates freely in one harmonic where the force along its shape
+    vanishes. A motion on an isolated branch lies near such a free motion plus the known motion, at some phase.
 
     Parameters
     ----------
     problem
-        What vibrates.
+        The forced response.
     balance
-        Its equation.
+        Equations of the motion.
     omega
         Frequency of the period of the motion, rad/s.
     periods
-        Of the load in it.
+        Periods of the load in one period of the motion.
     known
-        (size,) unknowns of the known motions.
+        Unknowns (size,) of the known motions.
     modes
-        Number of lowest modes of either kind.
+        Number of lowest modes with stuck, and with open contacts.
     """
     side = problem.system.structure
     if not known or side.wheel is not None or side.speed_follows_frequency:

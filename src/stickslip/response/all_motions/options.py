@@ -16,40 +16,40 @@ from stickslip.solve.newton_method import Newton
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSearch:
-    """How to search for all motions.
+    """Options of a search for all motions.
 
     Parameters
     ----------
     omega_range
         Range of the sweep and of the branches, rad/s.
     at
-        Frequencies that are searched, rad/s; none: `frequencies` of them in the middle of equal parts of the range.
+        Searched frequencies, rad/s; none: the centres of `frequencies` equal parts of the range.
     frequencies
-        Their number.
+        Number of searched frequencies without `at`.
     periods
-        Periods of the load in one of the motion: 3 to search motions of ω/3, too.
+        Periods of the load in one period of the motion; 3 includes motions of ω/3.
     harmonics
-        Highest harmonic of the load's frequency; it stays as it is.
+        Highest harmonic of the load's frequency, the same in the whole search.
     samples
-        Of a period, where contacts are evaluated on samples.
+        Samples per period for contacts that are evaluated on samples.
     points
         Smallest number of points of the sweep.
     tries
-        Deflated solves at a frequency since the last that found a motion.
+        Deflated solves at a frequency after the last one that found a motion.
     starts
         Random states at each frequency.
     modes
         Lowest modes, contacts stuck, in which states are drawn; all where there are fewer.
     spread
-        Largest modal amplitude of a state, in units of the largest of the motions that are known.
+        Largest modal amplitude of a random state over the largest of the known motions.
     most_periods
-        After which a start that repeats nothing is given up.
+        Periods after which a start without a repeating motion is given up.
     steps
-        Steps in a period of the motion.
+        Time steps in a period of the motion.
     solves
-        Budget of deflated solves, starts and points of branches together: none begins after it, and deflation leaves half of it to the starts.
+        Budget of deflated solves, starts and points of branches together. Deflation leaves half of it to the starts.
     seed
-        Of the random states.
+        Seed of the random states.
     evaluator
         How piecewise-linear laws are evaluated.
     newton
@@ -99,7 +99,7 @@ class MotionSearch:
 
 
 def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> ForcedProblem:
-    """Return the forced response that is searched; refuse a rigid contact."""
+    """Set up the forced response for a search; refuse rigid contacts."""
     if system.interface.rigid:
         raise input_error(
             "all motions",

@@ -55,14 +55,14 @@ TIMED = 3  # periods
 
 @by_one_thread
 def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> AllMotions:
-    """Search for all periodic motions under a load, with its period.
+    """Search for all periodic motions with the period of the load.
 
     Parameters
     ----------
     system, load
-        What vibrates, and what drives it.
+        Structure with contacts, and static and harmonic forces on all dofs, N.
     search
-        Where, how long, and with what.
+        Range, budget and discretisation.
 
     Raises
     ------
@@ -95,7 +95,7 @@ class _Search:
         self.mark = perf_counter()
 
     def run(self) -> Iterator[Stage]:
-        """Go through all that was asked for."""
+        """Yield the stages of the whole search."""
         if not self._branches():
             yield self._kept(self._swept())
         for place, omega in enumerate(self.places):
@@ -354,7 +354,7 @@ class _Search:
 
 
 def search_seconds(problem: ForcedProblem, search: MotionSearch) -> float:
-    """Return about how long the deflated solves and the starts take, s, new branches left aside; the budget may end them before."""
+    """Return the estimated time of deflated solves and starts, s, without new branches. The budget may end the search earlier."""
     order, omega = search.periods * search.harmonics, search.places[0] / search.periods
     whole = with_stiffness(problem.balance(harmonics_of(order)))
     balance = replace(whole, jacobian="dense")

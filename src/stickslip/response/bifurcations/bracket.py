@@ -23,16 +23,16 @@ CIRCLE = 1.0 + UNIT_TOLERANCE
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Two neighbouring points of a branch with the same harmonics, and what lies between.
+    """Segment of a branch between two neighbouring points with the same harmonics.
 
     Parameters
     ----------
     problem
         The forced response.
     balance, following
-        Its equation with these harmonics, and how a branch of it is followed.
+        Equations with these harmonics, and options of their continuation.
     before, after
-        The two points, their tangents along the branch.
+        The two points, with tangents along the branch.
     """
 
     problem: ForcedProblem
@@ -43,7 +43,7 @@ class Stretch:
 
     @property
     def folds(self) -> bool:
-        """Whether the branch turns back in it."""
+        """Whether the segment has a fold."""
         return bool(self.before.tangent[-1] * self.after.tangent[-1] < 0.0)
 
     @cached_property
@@ -52,39 +52,39 @@ class Stretch:
         return measure_at(self.before.x, self.following).of(self.after.y - self.before.y)
 
     def along(self, point: Point) -> float:
-        """Return how far along the chord a point lies, a share of it."""
+        """Return the position of a point along the chord, as a share of its length."""
         row = measure_at(self.before.x, self.following).row(self.after.y - self.before.y)
         return float(row @ (point.y - self.before.y)) / self.length**2
 
     def between(self, before: Point, after: Point) -> "Stretch":
-        """Return a part of it."""
+        """Return the segment between two of its points."""
         return Stretch(self.problem, self.balance, self.following, before, after)
 
     def fold(self) -> Point:
-        """Return the fold in it."""
+        """Return the fold of the segment."""
         return located(self.balance, self.before, self.after, FOLD, self.following)
 
     def where(self, value: Callable[[Point], float], tolerance: float) -> Point:
-        """Return the point at which a function of the points changes its sign, or jumps over zero."""
+        """Return the point at which a function of the point changes sign or jumps over zero."""
         mark = Mark(name="bifurcation", value=value, tolerance=tolerance)
         return located(self.balance, self.before, self.after, mark, self.following)
 
     def at(self, share: float, tolerance: float) -> Point:
-        """Return its point at a share of the chord."""
+        """Return the point at a share of the chord."""
         return self.where(lambda point: self.along(point) - share, tolerance)
 
     def connected(self, low: Point, high: Point, tolerance: float) -> bool:
-        """Whether two neighbours of a located point are so near to each other that no gap of the branch lies between."""
+        """Whether the two neighbours of a located point are close enough to belong to one connected branch."""
         measure = measure_at(low.x, self.following)
         return measure.of(high.y - low.y) <= APART * tolerance
 
     def forced(self, point: Point) -> ForcedPoint:
-        """Return a point of it as one of the response."""
+        """Return a point of the segment as a point of the response."""
         return forced_point(self.balance, point.solution, "check", 0, point.p, 0.0)
 
 
 def stretch(problem: ForcedProblem, before: ForcedPoint, after: ForcedPoint) -> Stretch | None:
-    """Return the step between two neighbouring points, both with the harmonics of that which has more; None where one of them has no such solution."""
+    """Return the segment between two neighbouring points, both with the larger set of harmonics; None without such solutions."""
     support = max(before, after, key=lambda p: p.harmonics.size).support
     balance = problem.balance(support)
     following = problem.following(balance)
@@ -116,7 +116,7 @@ class Spectrum:
     Parameters
     ----------
     values, errors
-        (k,) multipliers and how far they may be off.
+        (k,) multipliers, and their error bounds.
     """
 
     values: ComplexArray
@@ -128,17 +128,17 @@ class Spectrum:
         return int(np.count_nonzero(np.abs(self.values) > CIRCLE))
 
     def excess(self, k: int) -> float:
-        """Return by how much the k-th modulus, from 0, is above that of the circle."""
+        """Return the k-th modulus (from 0) minus 1."""
         return float(abs(self.values[k])) - CIRCLE if k < self.values.size else -1.0
 
     def known(self, k: int) -> bool:
-        """Whether the k-th multiplier lies on its side of the circle with its error."""
+        """Whether the k-th multiplier, with its error, lies on one side of the unit circle."""
         if k >= self.values.size:
             return True
         return bool(self.errors[k] < abs(self.excess(k)))
 
     def rough(self, k: int, error: float) -> bool:
-        """Whether the k-th multiplier may be on either side of the circle and is off by more than an `error`."""
+        """Whether the k-th multiplier may lie on either side of the unit circle and has an error above `error`."""
         return k < self.values.size and not self.known(k) and bool(self.errors[k] > error)
 
     def of_place(self, k: int) -> tuple[complex, float]:
@@ -154,7 +154,7 @@ def neutral_of(found: Stability) -> int:
 
 
 def spectrum(found: Stability, neutral: int) -> Spectrum:
-    """Return the multipliers of a motion without so many `neutral` ones, those nearest to 1."""
+    """Return the multipliers of a motion without the `neutral` ones nearest to 1."""
     values, errors = found.floquet.multipliers, found.errors
     left = np.sort(np.argsort(np.abs(values - 1.0), kind="stable")[neutral:])
     order = left[np.argsort(-np.abs(values[left]), kind="stable")]

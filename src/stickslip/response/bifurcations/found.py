@@ -21,30 +21,30 @@ LEADS_TO: dict[BifurcationKind, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Bifurcation:
-    """A place on a branch where multipliers cross the unit circle, or where it folds.
+    """Point of a branch at which multipliers cross the unit circle, or at which the branch folds.
 
     Parameters
     ----------
     kind
-        What happens there: ``fold``, ``period doubling`` (at -1), ``Neimark-Sacker`` (at an angle), ``branch point`` (at 1 without a fold:
-        a branch of less symmetry crosses), ``jump of multipliers`` (over the circle, by a contact that changes its state).
+        ``fold``, ``period doubling`` (crossing at -1), ``Neimark-Sacker`` (crossing at an angle), ``branch point`` (crossing at 1
+        without a fold: a branch of less symmetry crosses), or ``jump of multipliers`` (over the circle, by a contact that changes its state).
     point
-        The solution there, with the harmonics of the branch.
+        Solution at the bifurcation, with the harmonics of the branch.
     amplitude
-        Of the response there, m.
+        Amplitude of the response, m.
     multiplier
-        That which crosses; of a fold that nearest to 1, of a jump that on the side where it is larger. NaN where none is known.
+        Crossing multiplier; at a fold the one nearest to 1, at a jump the larger of the two sides. NaN where unknown.
     multiplier_error
-        How far it may be from that of the motion with all harmonics.
+        Error bound of the multiplier against the motion with all harmonics.
     omega_error
-        How far the frequency may be off, rad/s: what is left of the bracket, and what the error of the multiplier makes of it. Of a
-        fold that is the difference from the same fold with more harmonics.
+        Error bound of the frequency, rad/s, from the bracket and from the error of the multiplier. At a fold it is the difference
+        from the same fold with more harmonics.
     before, after
-        Number of multipliers outside of the unit circle on either side.
+        Number of multipliers outside the unit circle on either side.
     place
-        Positions of the two neighbouring points between which it lies.
+        Positions of the two neighbouring points.
     certain
-        Whether the multiplier that crosses lies on its side of the circle at both of these points, with its error. A fold is.
+        Whether the crossing multiplier, with its error, lies on its side of the circle at both of these points. A fold is certain.
     """
 
     kind: BifurcationKind
@@ -70,14 +70,14 @@ class Bifurcation:
 
     @property
     def beat(self) -> float:
-        """Second frequency of what leaves a Neimark-Sacker bifurcation, rad/s, known up to multiples of the first; else 0."""
+        """Second frequency of the motions from a Neimark-Sacker bifurcation, rad/s, up to multiples of the first; otherwise 0."""
         if self.kind != "Neimark-Sacker":
             return 0.0
         return float(abs(np.angle(self.multiplier))) / (2.0 * np.pi) * self.omega
 
     @property
     def sentence(self) -> str:
-        """What was found, in words."""
+        """Description of the bifurcation."""
         error = f" ± {self.omega_error / HZ:.2g}" if np.isfinite(self.omega_error) else ""
         m = self.multiplier
         off = f" ± {self.multiplier_error:.2g}" if np.isfinite(self.multiplier_error) else ""
@@ -101,15 +101,15 @@ class Bifurcations:
     Parameters
     ----------
     found
-        Along the branch.
+        Bifurcations in the order of the branch.
     unseen
-        First and last frequency of each step in which nothing could be seen, rad/s, and why.
+        First and last frequency of each segment that could not be examined, rad/s, and the reason.
     examined
-        Number of motions whose multipliers were asked for.
+        Number of motions whose multipliers were computed.
     stabilities
-        What is known of the stability of each point of the branch; None where it was not asked for, or nothing is known.
+        Stability of each point of the branch; None where it was not computed or is unknown.
     stride
-        Of how many points one was looked at, and those between where the numbers of multipliers outside differ.
+        Every so many points one was examined, and those between where the number of multipliers outside the circle differs.
     """
 
     found: tuple[Bifurcation, ...]
@@ -120,12 +120,12 @@ class Bifurcations:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What was found, and `limits`."""
+        """Descriptions of all bifurcations, followed by `limits`."""
         return (*(b.sentence for b in self.found), *self.none_met, *self.limits)
 
     @property
     def none_met(self) -> tuple[str, ...]:
-        """That none was met, or nothing; and how many motions of the branch have multipliers that leave it open."""
+        """Sentence that no bifurcation was found, and how many motions have undecided multipliers; empty where some were found."""
         known = [s for s in self.stabilities if s is not None]
         open_ = sum(s.verdict == "undecided" for s in known)
         unjudged = f"{open_} of {len(known)} motions could not be judged" if open_ else ""
@@ -136,7 +136,7 @@ class Bifurcations:
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Where nobody looked, and what looking took."""
+        """Sentences about unexamined segments and about the cost of the examination."""
         told = [
             f"between {a / HZ:.6g} and {b / HZ:.6g} Hz bifurcations are not seen: {why}" for a, b, why in self.unseen
         ]

@@ -55,29 +55,28 @@ def bifurcations(
 ) -> Bifurcations:
     """Locate the bifurcations along a branch of a forced response.
 
-    Folds are where the tangent of the branch turns back, whatever the multipliers say. The others lie between two points of which one has
-    more multipliers outside of the unit circle: there the branch is solved on planes across the chord until the modulus that crosses is 1
-    (Brent's method), or until the two sides of a jump are as near to each other as the tolerance. Multipliers that leave and
-    come back within one step are not seen.
+    Folds are found where the tangent of the branch turns back. Other bifurcations lie between two points with different numbers of
+    multipliers outside the unit circle. The branch is solved on planes across the chord until the crossing modulus is 1 (Brent's
+    method), or until the two sides of a jump are within the tolerance. Multipliers that leave the circle and return within one step are missed.
 
     Parameters
     ----------
     problem
-        The forced response that the points belong to.
+        The forced response of the points.
     points
-        In the order of the branch; peak points at its end are left out. The branch is interrupted where one did not converge.
+        Points in the order of the branch, without peak points at its end. Points that did not converge interrupt the branch.
     examine
-        Multipliers of a solution; None: folds alone.
+        Function that returns the multipliers of a solution; None: folds only.
     tolerance
-        Length along the branch to which they are located, see `StepControl`.
+        Tolerance of the location, a length along the branch, see `StepControl`.
     most
-        Motions whose multipliers are asked for. Where the branch has more than two thirds as many points, only every second, third, ... is
-        looked at, and those between where the numbers differ.
+        Largest number of motions whose multipliers are computed. If the branch has more than two thirds as many points, only every
+        second, third, ... is examined, and those between where the numbers of multipliers outside the circle differ.
 
     Raises
     ------
     InputError
-        If the tolerance is not positive, or fewer than 20 motions are allowed; and what `examine` refuses.
+        If the tolerance is not positive, or fewer than 20 motions are allowed; also from `examine`.
     """
     if not 0.0 < tolerance < 1.0:
         raise input_error("bifurcations: tolerance", f"must be between 0 and 1, got {tolerance:g}", "1e-6 is usual.")
@@ -139,7 +138,7 @@ class _Walk:
     stride: int = 1
 
     def through(self, branch: Sequence[ForcedPoint], run: range) -> None:
-        """Look at points that follow each other."""
+        """Search the segments between consecutive points for bifurcations."""
         steps = {i: stretch(self.problem, branch[i], branch[i + 1]) for i in run[:-1]}
         for i, step in steps.items():
             if step is None:
@@ -155,7 +154,7 @@ class _Walk:
             self._compare(branch, steps, a, b)
 
     def ordered(self) -> list[Bifurcation]:
-        """Return the bifurcations along the branch, a fold's multiplier not being counted twice."""
+        """Return the bifurcations in the order of the branch, without a second entry for the multiplier of a fold."""
         own = sorted(self.crossings, key=lambda c: (c.found.place, c.share))
         taken: set[int] = set()
         counted: dict[int, Bifurcation] = {}
@@ -172,7 +171,7 @@ class _Walk:
         return [counted.get(id(c), c.found) for c in own if id(c) not in taken]
 
     def lost(self, first: float, last: float, why: str) -> None:
-        """Put down where nothing is seen; steps that follow each other for the same reason are one."""
+        """Record an unexamined segment; consecutive segments with the same reason become one."""
         if self.unseen and self.unseen[-1][2] == why:
             begin, end, _ = self.unseen[-1]
             if np.isclose(first, end, rtol=1e-9) or begin <= first <= last <= end:

@@ -15,19 +15,19 @@ from stickslip.response.time.sectors import SectorsInTime, all_sectors
 
 @by_one_thread
 def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProblem:
-    """Return the forced response whose period is that of several `periods` of the load.
+    """Return the forced response whose period is `periods` periods of the load.
 
-    Its frequency is ω over their number; the harmonics h of the load are its harmonics `periods` times h, and those between are
-    subharmonic. Frequencies of its sweep, points and amplitudes are in terms of this lower frequency.
+    Its frequency is ω / `periods`. Harmonic h of the load is its harmonic `periods` · h, and the harmonics between are
+    subharmonic. Its sweep, points and amplitudes refer to the lower frequency.
 
     Parameters
     ----------
     problem
-        Of one structure; a tuned wheel is taken sector by sector, see `every_sector`.
+        Forced response of one structure; for a tuned wheel first apply `every_sector`.
     periods
-        2 for a doubled period.
+        Number of periods, 2 for a doubled period.
     order
-        Highest harmonic of the load's frequency that is kept; all up to `periods` times as many are.
+        Highest harmonic of the load's frequency. All harmonics of the lower frequency up to `periods` times this one are kept.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProb
 
 
 def in_periods(point: ForcedPoint, periods: int) -> ForcedPoint:
-    """Return a point as one of `over_periods`, in whose period it does the same several times."""
+    """Return a point as a point of `over_periods`, whose period contains the motion several times."""
     order = point.order * periods
     coefficients = np.zeros((order + 1, point.coefficients.shape[1]), dtype=complex)
     coefficients[::periods] = point.coefficients
@@ -84,9 +84,9 @@ class EverySector:
     problem
         The forced response of all sectors as one structure; outputs are those of sector 0, then those of sector 1, and so on.
     tuned
-        That of one sector, which stands for all.
+        Forced response of one sector, which stands for all.
     sectors
-        All sectors in time.
+        All sectors for time integration.
     """
 
     problem: ForcedProblem

@@ -50,20 +50,20 @@ def _never() -> str:
 
 @dataclass(frozen=True, eq=False)
 class SideBranch:
-    """A branch of motions that another forced response does not hold.
+    """Branch of motions beside a forced response.
 
     Parameters
     ----------
     problem
-        What its points are solutions of: over several periods of the load, of all sectors of a wheel, or the one it was asked of.
+        Forced response of its points: over several periods of the load, of all sectors of a wheel, or the original one.
     periods
-        Periods of the load in one of the motion.
+        Periods of the load in one period of the motion.
     points
-        Along the branch, the first one where it was found; their frequency is that of the load over `periods`.
+        Points along the branch, from where it was found. Their frequency is that of the load over `periods`.
     end
-        Where it ended, in words.
+        Reason for the end of the branch, in words.
     sector_of
-        (n_retained,) sector of each retained coordinate of a wheel; None elsewhere.
+        (n_retained,) sector of each retained coordinate of a wheel; None for other structures.
     """
 
     problem: ForcedProblem
@@ -83,12 +83,12 @@ class SideBranch:
         return np.array([self.problem.amplitude(p) for p in self.points])
 
     def amplitude(self, point: ForcedPoint, output: int) -> float:
-        """Return the amplitude of an output over the harmonics that the load drives, m; of a wheel that of the sector where it is largest."""
+        """Return the amplitude of an output over the driven harmonics, m; on a wheel the largest of all sectors."""
         where = [self.problem.amplitude_of(point.omega, point.coefficients, o) for o in self._of_all(output)]
         return float(max(where))
 
     def subharmonic(self, point: ForcedPoint, output: int = 0) -> float:
-        """Return the amplitude of an output over all harmonics that are no multiples of the load's frequency, m; of a wheel the largest."""
+        """Return the amplitude of an output over all subharmonic terms, m; on a wheel the largest of all sectors."""
         motion = self.problem.low.linear.recover(point.omega, point.coefficients)
         rows = motion[:, self.problem.system.outputs[self._of_all(output)]]
         rows[:: self.periods] = 0.0
@@ -102,7 +102,7 @@ class SideBranch:
         return list(range(output, self.problem.system.outputs.size, each))
 
     def localisation(self, point: ForcedPoint) -> float:
-        """Return the share of the vibration, by squares, that the sector with the largest one has; of what is no wheel that of a coordinate."""
+        """Return the share of the squared amplitudes in the most active sector; without a wheel, in the most active coordinate."""
         size = np.sum(np.abs(point.coefficients[1:]) ** 2, axis=0)
         group = np.arange(size.size) if self.sector_of is None else self.sector_of
         each = np.bincount(group, size)
@@ -110,7 +110,7 @@ class SideBranch:
 
     @property
     def sentence(self) -> str:
-        """What it is, in words."""
+        """Description of the branch."""
         kind = f"with a period of {self.periods} periods of the load" if self.periods > 1 else "of less symmetry"
         if not self.points:
             return f"no branch {kind} was found: {self.end}"
@@ -125,9 +125,9 @@ class SideBranch:
 def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS) -> list[SideBranch]:
     """Follow the branches that leave a forced response at a bifurcation.
 
-    At a period doubling the motion is taken over two periods; at a branch point harmonics stay, and on a tuned wheel every sector may
-    do something else. Branches leave along the directions in which the equations are singular, and are followed by arc length until they
-    come back, leave the range of frequencies, or have as many points as are allowed. Harmonics stay as they are.
+    At a period doubling the motion covers two periods of the load. At a branch point of a tuned wheel every sector may move
+    differently. Branches leave along the singular directions of the equations. They are followed by arc length, with fixed harmonics,
+    until they return, leave the range of frequencies, or reach the largest number of points.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: i
     bifurcation
         A period doubling, a branch point, or a jump of a real multiplier.
     points
-        Most points of each.
+        Largest number of points of each branch.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: i
 def subharmonic_branch(
     problem: ForcedProblem, omega: float, periods: int, start: ComplexArray, *, points: int = POINTS
 ) -> SideBranch:
-    """Follow subharmonic motions from a given one, in both directions; no branch need lead to them from the forced response.
+    """Follow subharmonic motions from a given one in both directions; they may be isolated from the forced response.
 
     Parameters
     ----------
@@ -185,16 +185,16 @@ def subharmonic_branch(
     omega
         Frequency of the load at the start, rad/s.
     periods
-        Periods of the load in one of the motion: 3 for a motion of ω/3.
+        Periods of the load in one period of the motion: 3 for a motion of ω/3.
     start
-        (H+1, n_retained) coefficients of the motion to begin with, m, harmonics of ω over `periods`; as from a time integration, or a guess.
+        (H+1, n_retained) coefficients of a motion near the branch, m, in harmonics of ω / `periods`, from a time integration or a guess.
     points
-        Most points.
+        Largest number of points.
 
     Raises
     ------
     InputError
-        If `start` is not of the retained coordinates.
+        If `start` has another number of coordinates than are retained.
     """
     order = (
         problem.sweep.high_harmonics[-1]
@@ -231,9 +231,9 @@ def both_ways(
     points: int,
     over: Callable[[], str] = _never,
 ) -> tuple[list[ForcedPoint], str]:
-    """Follow a branch from one of its points to both sides; return at most so many points in their order, and why they end.
+    """Follow a branch from one of its points to both sides; return at most `points` points in their order, and the reason for the end.
 
-    `over` is asked before each step, and ends the branch with what it says.
+    `over` is called before each step; a text from it ends the branch and is the reason.
     """
     way = _Way(problem, balance, following, points, over)
     upward, end = way.followed(first, way.closes(first))
@@ -265,11 +265,11 @@ class _Way:
         return self.problem.sweep.omega_range
 
     def point(self, point: Point) -> ForcedPoint:
-        """Return a point as one of a response."""
+        """Return a point of the continuation as a point of the response."""
         return _point(self.balance, point)
 
     def followed(self, first: Point, stops: Stop | None) -> tuple[list[Point], str]:
-        """Return the points from a first one on along its tangent, and why they end."""
+        """Return the points from a first one along its tangent, and the reason for the end."""
         low, high = self.ends
         found = [first]
         while len(found) < self.points:
@@ -305,7 +305,7 @@ class _Way:
         return float(min(h for h, f in self.problem.low.linear.load.harmonics.items() if np.any(f)))
 
     def closes(self, first: Point) -> Stop:
-        """Return what ends a branch that comes back to its first point in its direction."""
+        """Return a stop condition for a branch that returns to its first point in the same direction."""
         count = [0]
 
         def stop(before: Point, after: Point) -> str:
@@ -385,9 +385,9 @@ def _point(balance: Balance, point: Point) -> ForcedPoint:
 
 
 def open_directions(balance: HarmonicBalance, point: Point, following: Following, count: int) -> FloatArray:
-    """Return the (count, n + 1) directions across the branch along which equations change least, those of its crossing branches.
+    """Return the (count, n + 1) directions of crossing branches, along which the equations change least.
 
-    They are singular vectors of the Jacobian with the tangent of the branch as a further row, those of the smallest singular values, by
+    They are the singular vectors of the smallest singular values of the Jacobian with the tangent of the branch as a further row, by
     inverse iteration.
     """
     at = balance.linearise(point.x, point.p)
@@ -409,11 +409,11 @@ def open_directions(balance: HarmonicBalance, point: Point, following: Following
 
 
 def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray | None) -> list[FloatArray]:
-    """Return the directions in which branches are looked for: each both ways, and combinations of several.
+    """Return the directions in which branches are searched: each one with both signs, and combinations of several.
 
-    Where a wheel loses its symmetry by waves of both directions at once, two directions are open and every combination solves the linear
-    equations. Those symmetric about a sector, or about the middle between two, belong to branches: where the first sector (of what is no
-    wheel, the first coordinate) moves most, where it moves least, and halfway between.
+    Where a wheel loses its symmetry by forward and backward waves at once, there are two directions, and every combination solves the
+    linear equations. Branches have the combinations that are symmetric about a sector or about the middle between two: where the first
+    sector (without a wheel, the first coordinate) moves most, where it moves least, and halfway between.
     """
     found = list(directions)
     if len(directions) > 1:
@@ -428,7 +428,7 @@ def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray
 def first_point(
     balance: HarmonicBalance, point: Point, direction: FloatArray, following: Following, end: float
 ) -> Point | None:
-    """Return a point of the branch that leaves in a direction, its tangent leading away from the other one; None where none is found."""
+    """Return the first point of the branch that leaves in a direction, with its tangent away from the known branch; None if none is found."""
     measure = measure_at(point.x, following)
     unit = direction / measure.of(direction)
     for away in AWAY:

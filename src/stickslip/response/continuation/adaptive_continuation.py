@@ -49,21 +49,21 @@ MAX_BRANCH_LENGTH = 40  # multiples of the smallest number of points at which an
 
 
 def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterator[Followed]:
-    """Follow a branch; see the module.
+    """Follow a branch with adaptive harmonics; the module describes the method.
 
     Parameters
     ----------
     curve
-        What is followed.
+        Equations of the branch with each set of harmonics.
     route
-        From where to where.
+        Range and steps of the parameter.
     done
-        What an interrupted run has yielded, in its order: none of it is computed again, and the rest comes out as it would have.
+        Results of an interrupted run, in their order. They are not computed again, and the remaining results are the same.
 
     Yields
     ------
     Followed
-        What is not in `done`.
+        Results that are not in `done`.
     """
     yield from _Walk(curve, route, iter(done)).run()
 
@@ -104,7 +104,7 @@ class _Walk:
     spent_before: float = 0.0  # and their work
 
     def run(self) -> Iterator[Followed]:
-        """Go from the first value to the last."""
+        """Yield the branch from the first value of the parameter to the last."""
         listed = self.route.listed
         yield from self._begun(listed[0] if listed else self.route.first)
         while not self._over():

@@ -23,14 +23,14 @@ Kind = Literal["point", "audit", "trial", "found", "between"]
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What is known of the error of a solution.
+    """Estimated truncation error of a solution.
 
     Attributes
     ----------
     bound
-        Of its relative error; 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
+        Bound of the relative error; 0 without forces on the neglected harmonics; NaN where it is unknown.
     asked, start
-        What a strategy of harmonic selection said beside it, where it is one.
+        Further harmonics and start that a strategy of harmonic selection requests; empty for other judgements.
     """
 
     bound: float = np.nan
@@ -40,24 +40,24 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """One solution on the way, or why there is none.
+    """Solution on the way along a branch, or a failed attempt.
 
     Attributes
     ----------
     kind
-        ``point``: a point of the branch; it takes the place of all that had its index or a higher one. ``audit``: the same motion with more harmonics, to
-        compare. ``trial``: the same with fewer, from which the branch goes on. ``found``: takes the place of the
-        point of its index alone, which was no solution. ``between``: stands behind the point of its index, once the branch is at its end.
+        ``point``: a point of the branch, which replaces all points with its index or a higher one. ``audit``: the same motion with more
+        harmonics, for comparison. ``trial``: the same motion with fewer harmonics, from which the branch continues. ``found``: replaces
+        the failed point of its index only. ``between``: follows the point of its index, added after the end of the branch.
     index
         Position along the branch.
     level
-        Of its harmonics.
+        Level of its harmonics.
     point
-        The solution and where the branch goes on.
+        Solution, tangent and step.
     judged
-        Of a ``point``, ``trial`` or ``found``.
+        Estimated error of a ``point``, ``trial`` or ``found``.
     seconds
-        What it took.
+        Computing time, s.
     """
 
     kind: Kind
@@ -78,12 +78,12 @@ class Followed:
         return self.point.p
 
     def taking(self, seconds: float) -> "Followed":
-        """Return the same with what it took."""
+        """Return the solution with its computing time, s."""
         return Followed(self.kind, self.index, self.level, self.point, self.judged, seconds)
 
 
 class Curve(Protocol):
-    """What is followed: one equation with several levels of harmonics; what is said here of levels holds where there is only one."""
+    """Curve of solutions of one equation with several levels of harmonics. The methods here describe a curve with one level."""
 
     @property
     def levels(self) -> int:
@@ -95,23 +95,23 @@ class Curve(Protocol):
         ...
 
     def following(self, level: int) -> Following:
-        """Return how its branch is followed."""
+        """Return the continuation options of a level."""
         ...
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve where no branch leads, by all that may help with a share `effort` of the Newton steps of `steps_at_most`; 0: by the corrector alone."""
+        """Solve at a value without a branch to it, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
         ...
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
-        """Return unknowns of one level as those of another."""
+        """Return unknowns of one level as unknowns of another level."""
         return x
 
     def starts(self, known: Followed, to: int) -> list[FloatArray]:
-        """Return states from which a known solution is solved on another level, the likeliest first."""
+        """Return starts for a known solution on another level, the most promising first."""
         return [self.lifted(known.point.x, known.level, to)]
 
     def cost(self, level: int) -> float:
-        """Return the work of a Newton step, beside that of a small system."""
+        """Return the work of a Newton step, relative to that of a small system."""
         return 1.0
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
@@ -119,7 +119,7 @@ class Curve(Protocol):
         return Judged()
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
-        """Judge a solution where more harmonics are not to be had, by fewer."""
+        """Estimate the error of a solution on the last level from a solution with fewer harmonics."""
         return Judged()
 
     def quiet(self, level: int, judged: Judged) -> bool:
@@ -127,23 +127,23 @@ class Curve(Protocol):
         return True
 
     def agree(self, fewer: Followed, more: Followed) -> bool:
-        """Whether two levels tell the same motion."""
+        """Whether the solutions of two levels are the same motion."""
         return True
 
     def alike(self, one: Followed, other: Followed) -> bool:
-        """Whether two motions at one value of the parameter differ by no more than the error that is allowed."""
+        """Whether two motions at one value of the parameter differ by no more than the allowed error."""
         return False
 
     def near(self, fewer: Followed, more: Followed) -> bool:
-        """Whether they differ by so little that they cannot stand on different sheets."""
+        """Whether the solutions of two levels are too close to lie on different sheets of the branch."""
         return True
 
     def stored(self, found: Followed) -> Followed:
-        """Return a solution as it comes back from where it was written down, which rounds: what an interrupted run goes on from."""
+        """Return a solution as restored from the journal, which rounds; an interrupted run continues from it."""
         return found
 
     def height(self, found: Followed) -> float:
-        """Return what maxima are looked for in."""
+        """Return the quantity whose maxima are searched."""
         return 0.0
 
 
@@ -157,11 +157,12 @@ class OneLevel(Curve):
     Parameters
     ----------
     equation
-        What is solved.
+        Equation of the curve.
     way
-        How its branch is followed.
+        Continuation options.
     begin
-        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: effort, as for `stickslip.response.continuation.starting_solutions.without_branch`.
+        Function that solves at a value without a branch to it, from states that may be near. Its last argument is the effort, as in
+        `stickslip.response.continuation.starting_solutions.without_branch`.
     """
 
     equation: Problem
@@ -173,17 +174,17 @@ class OneLevel(Curve):
         return self.equation
 
     def following(self, level: int) -> Following:
-        """Return how its branch is followed."""
+        """Return the continuation options of a level."""
         return self.way
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve where no branch leads."""
+        """Solve at a value without a branch to it."""
         return self.begin(p, [n.point.x for n in near], effort)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Route:
-    """Where a branch begins and ends.
+    """Range of a branch, and the steps through it.
 
     Parameters
     ----------
@@ -192,9 +193,9 @@ class Route:
     points
         Smallest number of points.
     listed
-        Values to step through, in their order; empty: by arc length.
+        Values to step through, in their order; empty: continuation by arc length.
     leaves
-        Whether a branch that leads back, or nowhere for long, is left and taken up further on; otherwise it is followed to where it leads.
+        Whether to leave a branch that leads back or makes no progress, and to resume further on. Otherwise it is followed to its end.
     """
 
     first: float
@@ -218,20 +219,21 @@ class Route:
         return self.forward * one < self.forward * other
 
     def farthest(self, values: Sequence[float]) -> float:
-        """Return which of some values lies farthest along the way."""
+        """Return the value that lies farthest along the way."""
         return max(values, key=lambda p: self.forward * p)
 
     def onward(self, values: Sequence[float]) -> float:
-        """Return the value at which a branch through some values is taken up where it was lost."""
+        """Return the value at which a lost branch through `values` is resumed."""
         if self.listed:
             return self.listed[len(values)]
         ahead = self.farthest(values) + self.gap
         return ahead if self.before(ahead, self.last) else self.last
 
     def idle(self, values: Sequence[float]) -> bool:
-        """Whether a branch left the range backwards, or gained less than a step in its last points.
+        """Whether a branch left the range backwards, or advanced less than a step in its last points.
 
-        Stiff contacts that lift off under little damping fold it hundreds of times within a step: there it is left, as a machine would leave it.
+        Stiff contacts that lift off under little damping fold a branch hundreds of times within a step. It is then left, as a machine
+        would leave it.
         """
         if self.listed or not self.leaves:
             return False
@@ -249,19 +251,19 @@ def steps_through(length: float, points: int) -> StepControl:
 
 
 def following_vibration(problem: AnyBalance, control: StepControl, newton: Newton) -> Following:
-    """Return how a branch of a periodic problem is followed."""
+    """Return the continuation options of a periodic problem."""
     return Following(newton=newton, control=control, weights=vibration_weights(problem))
 
 
 def vibration_weights(problem: AnyBalance) -> FloatArray:
-    """Return the share of each unknown in the length of a step: the static part would hide the growth of the vibration."""
+    """Return the weight of each unknown in the step length, zero for the static part, which would hide the growth of the vibration."""
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0
     return weights
 
 
 class Placed(Protocol):
-    """What has its place along a branch: `Followed`, or what is kept of it."""
+    """Protocol of results with a position along a branch: `Followed`, or its stored form."""
 
     @property
     def kind(self) -> str: ...  # noqa: D102
@@ -274,7 +276,7 @@ P = TypeVar("P", bound=Placed)
 
 
 def branch_of(every: Iterable[P]) -> list[P]:
-    """Return the points of a branch among all that were found on the way: those that no later one took the place of."""
+    """Return the points of a branch among all results: those that no later result replaced."""
     branch: list[P] = []
     for one in every:
         if one.kind == "point":

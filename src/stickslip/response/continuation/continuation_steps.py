@@ -27,7 +27,7 @@ MIN_LEVELS = 2  # levels that are always allowed
 
 
 def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
-    """Return how many levels may be used after so many points and so much work: all while less than half of it is done, then fewer and fewer."""
+    """Return the number of usable levels after `points` points and `spent` work: all during the first half of the work, then fewer."""
     levels = curve.levels
     if levels <= MIN_LEVELS:
         return levels
@@ -37,7 +37,7 @@ def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
 
 
 def without_more(curve: Curve, levels: int, made: Followed) -> Followed:
-    """Return a solution judged by fewer harmonics where no audit is to come: a prediction that none confirms was wrong at times."""
+    """Return a solution judged by fewer harmonics, where no audit will follow: unconfirmed predictions were wrong at times."""
     last = made.kind != "audit" and 0 < made.level == levels - 1 < curve.levels - 1
     if not (last and made.converged) or made.judged.bound == 0.0:
         return made
@@ -45,7 +45,7 @@ def without_more(curve: Curve, levels: int, made: Followed) -> Followed:
 
 
 def onward(curve: Curve, here: Followed, index: int, target: float | None, last: float) -> Followed:
-    """Take a step along the branch towards `last`, or go to the listed value `target`."""
+    """Take a step along the branch towards `last`, or solve at the listed value `target`."""
     latest = Latest(curve.problem(here.level))
     following = curve.following(here.level)
     if target is None:
@@ -56,7 +56,7 @@ def onward(curve: Curve, here: Followed, index: int, target: float | None, last:
 
 
 def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> Followed:
-    """Solve at the value of a known solution with the harmonics of another level; the direction of travel stays."""
+    """Solve at the value of a known solution with the harmonics of another level, in the same direction of travel."""
     following, p = curve.following(level), known.p
     latest = Latest(curve.problem(level))
     patient = replace(following.newton, max_iterations=PATIENT)
@@ -80,7 +80,7 @@ def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
 def fresh(
     curve: Curve, route: Route, index: int, level: int, p: float, near: Sequence[Followed], effort: float
 ) -> Followed:
-    """Solve where no branch leads, by all that may help with a share `effort` of the Newton steps of `steps_at_most`; 0: by the corrector alone."""
+    """Solve at a value without a branch to it, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
     solution = curve.fresh(level, p, near, effort)
     latest = Latest(curve.problem(level))
     following = curve.following(level)
@@ -94,7 +94,7 @@ def fresh(
 
 
 def beside(curve: Curve, near: Sequence[Followed], missing: Followed, effort: float) -> Followed:
-    """Solve a value that was not found from the branches of its neighbours, with a share `effort` of the Newton steps of `steps_at_most`."""
+    """Solve at a failed value along the branches of its neighbours, with a share `effort` of the Newton steps of `steps_at_most`."""
     spent: list[Solution] = [missing.point.solution]
     for end in near:
         left = steps_at_most(missing.point.x.size, effort) - sum(s.iterations for s in spent[1:])
@@ -112,13 +112,13 @@ def beside(curve: Curve, near: Sequence[Followed], missing: Followed, effort: fl
 
 
 def lost(made: Followed) -> Followed:
-    """Return a step as one that led nowhere."""
+    """Return a step marked as failed."""
     solution = replace(made.point.solution, status=Status.STEP_TOO_SMALL)
     return replace(made, point=replace(made.point, solution=solution), judged=Judged())
 
 
 def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
-    """Whether a step beyond a corner goes back along the branch that led there."""
+    """Whether a step past a corner of the branch returns along the known part of the branch."""
     behind = [b for b in before[-RECENT:] if b.level == made.level]
     if not made.converged or len(behind) < 3:
         return False
@@ -137,9 +137,9 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
 
 
 def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -> int:
-    """Return how many points at the end of a branch run back beside it over the length of a step and tell nothing new: all since it turned, or none.
+    """Return the number of points at the end of a branch that run back beside it over a step length: all since it turned, or none.
 
-    Contacts that lift off many times in a period may turn a branch that has the most harmonics of all; with still more there would be no fold.
+    Contacts that lift off many times in a period may cause such a fold on the last level; more harmonics would remove it.
     """
     count = 0
     for before, after in pairwise(reversed(branch)):  # the last point first
@@ -169,7 +169,7 @@ def _beside(curve: Curve, before: Sequence[Followed], one: Followed) -> bool:
 
 
 def passed_maximum(curve: Curve, last: Sequence[Followed]) -> bool:
-    """Whether the point before the last of three is higher than its neighbours."""
+    """Whether the middle one of the last three points is a maximum."""
     if len(last) < 3 or not all(p.converged for p in last):
         return False
     before, top, after = map(curve.height, last)

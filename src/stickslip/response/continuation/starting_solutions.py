@@ -41,12 +41,12 @@ def without_branch(
     near: Sequence[FloatArray] = (),
     effort: float = 1.0,
 ) -> Solution:
-    """Solve a frequency from motions nearby, from the static equilibrium with the bonded vibration, from few harmonics, then by all that `solve_robustly` knows.
+    """Solve at one frequency from several starts: motions nearby, static equilibrium with bonded vibration, few harmonics, `solve_robustly`.
 
     Parameters
     ----------
     system
-        What `balance` was made of.
+        System of `balance`.
     balance
         The periodic problem.
     options
@@ -56,7 +56,7 @@ def without_branch(
     near
         (size,) unknowns of motions that may be near.
     effort
-        Share of the Newton steps of `steps_at_most` for all attempts, homotopies and other globalisations among them; 0: the corrector alone.
+        Share of the Newton steps of `steps_at_most` for all attempts, homotopies and other globalisations included; 0: Newton's method only.
     """
     starts = _starts(system, balance, options, omega, near)
     if effort:
@@ -79,9 +79,9 @@ def plain_sweep(
     options: Newton,
     over: Callable[[], bool] = bool,
 ) -> list[Followed]:
-    """Return the response of `balance` between two frequencies, in the order of the branch; it may hold points that were not found.
+    """Return the response of `balance` between two frequencies, in the order of the branch, failed points included.
 
-    `over` is asked after each solution, and ends the sweep.
+    `over` is called after each solution; True ends the sweep.
     """
     first, last = omega_range
     way = following_vibration(balance, steps_through(last - first, points), options)
@@ -101,7 +101,7 @@ def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotop
 
 
 def at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
-    """Return the (1, n_retained) static equilibrium, m; zero at coordinates that are retained beside those of the system."""
+    """Return the (1, n_retained) static equilibrium, m; zero at retained coordinates that are not those of the system."""
     rest = np.zeros((1, balance.linear.n), dtype=complex)
     own = np.searchsorted(balance.linear.retained, system.retained)
     rest[0, own] = preload(system.at(omega), balance.linear.load_at(omega).static)
@@ -125,7 +125,7 @@ def _starts(
 
 @dataclass(frozen=True, eq=False)
 class GrowingLoad:
-    """The balance at one frequency under a share p of its excitation; the static load is always whole.
+    """Balance at one frequency under a share p of its excitation and the full static load.
 
     Attributes
     ----------
@@ -156,9 +156,9 @@ class GrowingLoad:
 
 @dataclass(frozen=True, eq=False)
 class JoiningHarmonics:
-    """The balance at one frequency with a share p of the contact forces in the equations of its higher harmonics.
+    """Balance at one frequency with a share p of the contact forces in the equations of its higher harmonics.
 
-    At p = 0 these are linear, and the others are solved with little more than their own harmonics.
+    At p = 0 these equations are linear, and the lower harmonics are nearly independent of them.
 
     Attributes
     ----------
@@ -202,13 +202,13 @@ def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
 
 
 def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
-    """Yield ways from an easy problem to the balance at one frequency.
+    """Yield homotopies from a linear problem to the balance at one frequency.
 
-    First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
-    motion under every share of the excitation, the path that begins there comes to the whole of it, through folds if need be (degree
-    theory; Allgower & Georg 1990). Contacts act on the harmonics up to the highest that is driven alone: each one more folds the path more
-    often, and with all of them it takes ten times as many steps. Then the contact forces of the higher harmonics join. Where several
-    motions stand beside each other it may find another one than the neighbours in frequency.
+    First the excitation grows from almost zero, where no contact changes its state and the problem is linear. Damping bounds the
+    motion under every share of the excitation. The path therefore reaches the full excitation, through folds if necessary (degree
+    theory; Allgower & Georg 1990). During this homotopy contacts act on harmonics up to the highest driven one only: each further
+    harmonic adds folds, and with all of them the path takes ten times as many steps. Then the contact forces of the higher harmonics
+    join. Where several motions coexist, the result may differ from the motions at neighbouring frequencies.
 
     Parameters
     ----------

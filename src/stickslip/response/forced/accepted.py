@@ -13,11 +13,11 @@ AUDITS: tuple[Stage, ...] = ("audit", "check", "compared")
 
 
 def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the points that make up the response, each with the low-order point it repeats or is.
+    """Return the points of the response, each with its low-order point (the same point where it was not repeated).
 
-    In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
-    all converge the branch with many harmonics, where that reached the other side. What is missing then is taken from the motion
-    in time. Peak points come last.
+    They are in the order of the branch: points of the first passage, replaced by their repeats. Where some repeats of a run failed, the
+    branch with many harmonics replaces the run, if it reached the other side. Remaining gaps are filled from time integration. Peak
+    points come last.
     """
     pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
     if any(p.stage == "point" for p in points):
@@ -39,7 +39,7 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
 
 
 def audits_by_frequency(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:
-    """Return the solutions with more harmonics that were made to compare, by frequency, rad/s."""
+    """Return the comparison solutions with more harmonics by frequency, rad/s."""
     found: dict[float, list[ForcedPoint]] = {}
     for p in points:
         if p.stage in AUDITS and p.converged:
@@ -64,7 +64,7 @@ def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, Force
 
 
 def points_of_branch(points: Sequence[ForcedPoint], stage: Stage) -> list[ForcedPoint]:
-    """Return the points of a branch, which have a `stage` of their own: those that no later one took the place of."""
+    """Return the points of a branch, by their `stage`: those that no later point replaced."""
     branch: list[ForcedPoint] = []
     for one in points:
         if one.stage == stage:
@@ -79,7 +79,7 @@ def _fewer(one: ForcedPoint, other: ForcedPoint) -> bool:
 
 
 def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
-    """Return the points that make up the response; see `accepted_pairs`."""
+    """Return the points of the response; see `accepted_pairs`."""
     return [point for point, _ in accepted_pairs(points)]
 
 
@@ -100,15 +100,15 @@ def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[
 
 
 def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
-    """Return the frequency at which such a branch ends: that of the next quiet point, or of the last one."""
+    """Return the end frequency, rad/s, of a branch through a run of repeats: that of the next quiet point, or of the last point."""
     return low[min(last + 1, len(low) - 1)].omega
 
 
 def replaced(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> int:
-    """Return the index of the last point of the first passage whose place a branch takes; -1 if it takes none.
+    """Return the index of the last point of the first passage that a branch replaces; -1 if it replaces none.
 
-    It goes through its run where it came to the frequency of the next quiet point, and to its motion: where it folds it may pass that
-    frequency on other sheets. On another sheet it goes on to the end of the range and takes the place of all that follows.
+    A branch replaces its run if it reaches the frequency and the motion of the next quiet point. A folded branch may pass that
+    frequency on other sheets. It then continues to the end of the range and replaces all points that follow.
     """
     if not branch or not branch[-1].converged:
         return -1

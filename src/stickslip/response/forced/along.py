@@ -40,16 +40,16 @@ SAME_SHEET_RTOL = 0.3  # relative difference of motions that stand on the same s
 
 @dataclass(frozen=True, eq=False)
 class ForcedCurve:
-    """A forced response with one support of harmonics after the other.
+    """Forced response as a curve with several levels of harmonics.
 
     Parameters
     ----------
     forced
-        What vibrates, and what drives it.
+        The forced response.
     supports
-        Harmonics of each level, each holding the one before.
+        Harmonics of each level; each level includes the previous one.
     raises
-        Whether what is not quiet gets more of them.
+        Whether harmonics are raised where the estimated error is above the threshold.
     """
 
     forced: ForcedProblem
@@ -67,7 +67,7 @@ class ForcedCurve:
         return self.forced.balance(self.supports[level])
 
     def following(self, level: int) -> Following:
-        """Return how its branch is followed."""
+        """Return the continuation options of a level."""
         return self.forced.following(self.problem(level))
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
@@ -77,14 +77,14 @@ class ForcedCurve:
         return self.problem(to).unknowns(self.problem(level).coefficients(x))
 
     def starts(self, known: Followed, to: int) -> list[FloatArray]:
-        """Return what the judgement foretells of the next level, and the solution itself."""
+        """Return the start that the judgement predicts for the next level, and the solution itself."""
         own = [self.lifted(known.point.x, known.level, to)]
         if known.judged.start is not None and to == known.level + 1:
             own.insert(0, self.problem(to).unknowns(known.judged.start))
         return own
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at a frequency to which no branch leads."""
+        """Solve at a frequency without a branch to it."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
             forced.system,
@@ -96,11 +96,11 @@ class ForcedCurve:
         )
 
     def cost(self, level: int) -> float:
-        """Return the work of a Newton step, which grows with the unknowns: few are factorised, many solved by products."""
+        """Return the work of a Newton step, which grows with the unknowns: small systems are factorised, large ones solved by iteration."""
         return 1.0 + self.problem(level).size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Bound the error of a solution by what the strategy says of the harmonics of the next level."""
+        """Bound the error of a solution by the strategy's estimate for the harmonics of the next level."""
         strategy, forced = self.forced.strategy, self.forced
         if always_kept(strategy) is not None or (self.raises and self.levels == 1):
             return Judged()
@@ -167,7 +167,7 @@ class ForcedCurve:
         return DOUBT * step.measure.change(linear.recover(step.omega, q), moved)[0]
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
-        """Bound the error where no level follows, or none is allowed, by the difference from the level before, which is larger as long as more harmonics change less."""
+        """Bound the error on the last allowed level by the difference from the previous level, which is larger if the series converges."""
         before = self.problem(level - 1)
         x = self.lifted(point.x, level, level - 1)
         few_steps = replace(self.following(level - 1).newton, max_iterations=NEARLY)
@@ -179,7 +179,7 @@ class ForcedCurve:
         return Judged(max(safety * change, UNSEEN))
 
     def quiet(self, level: int, judged: Judged) -> bool:
-        """Whether a bound is below the threshold, or nobody can tell."""
+        """Whether a bound is below the threshold, or unknown."""
         if not self.raises:
             return True
         return not judged.bound > self.forced.strategy.threshold
@@ -193,7 +193,7 @@ class ForcedCurve:
         return self.change(one, other) <= self.forced.strategy.threshold
 
     def near(self, fewer: Followed, more: Followed) -> bool:
-        """Whether the motions differ by so little that they cannot stand on different sheets."""
+        """Whether the motions are too close to lie on different sheets of the branch."""
         return self.change(fewer, more) <= SAME_SHEET_RTOL
 
     def change(self, fewer: Followed, more: Followed) -> float:
@@ -205,11 +205,11 @@ class ForcedCurve:
         return self.forced.difference(omega, a, b)[0]
 
     def stored(self, found: Followed) -> Followed:
-        """Return a solution as it comes back from where it was written down."""
+        """Return a solution as restored from the journal."""
         return of_forced(self, to_forced(self, found))
 
     def stage_of(self, found: Followed) -> Stage:
-        """Return the name under which a solution is written down."""
+        """Return the stage under which the journal stores a solution."""
         if found.kind == "between":
             raise ValueError("no response has points between those of its branch")
         return "low" if found.kind == "point" and not self.raises else found.kind
@@ -227,7 +227,7 @@ def _height(curve: ForcedCurve, found: Followed) -> float:
 
 
 def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
-    """Follow the response with as many harmonics as each point needs.
+    """Follow the response with the harmonics that each point needs.
 
     Parameters
     ----------
@@ -246,21 +246,21 @@ def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Ite
 
 
 def route_of(problem: ForcedProblem) -> Route:
-    """Return from where to where a sweep goes."""
+    """Return the range and the steps of a sweep."""
     sweep = problem.sweep
     first, last = sweep.ends
     return Route(first=first, last=last, points=sweep.points, listed=tuple(sweep.grid.tolist()))
 
 
 def followed(curve: ForcedCurve, route: Route, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
-    """Follow a curve; points of the response in, points of the response out."""
+    """Follow a curve from and to points of the response."""
     known = [of_forced(curve, p) for p in done]
     for found in follow(curve, route, known):
         yield to_forced(curve, found)
 
 
 def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -> ForcedPoint:
-    """Return what was found on the way as a point of the response."""
+    """Return a result of the continuation as a point of the response."""
     return _as_forced(curve, found, stage or curve.stage_of(found))
 
 
@@ -274,7 +274,7 @@ def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint
 
 
 def of_forced(curve: ForcedCurve, point: ForcedPoint) -> Followed:
-    """Return a point of the response as it was found on the way."""
+    """Return a point of the response as a result of the continuation."""
     kind: Kind = point.stage if point.stage in KINDS else "point"
     level = curve.supports.index(point.support)
     start = point.start if point.start.size else None

@@ -23,8 +23,8 @@ def amplitudes(motion: ComplexArray, driven: Harmonics, of: AmplitudeOf) -> Floa
     driven
         Harmonics that the load drives.
     of
-        ``first``: of these harmonics, the norm over several. ``half_peak_to_peak``: half the distance from the least to the largest displacement in a
-        period. ``rms``: root mean square about the mean.
+        ``first``: amplitude of the driven harmonics, for several their norm. ``half_peak_to_peak``: half the distance from the smallest
+        to the largest displacement in a period. ``rms``: root mean square about the mean.
     """
     if of == "first":
         rows = [h for h in driven if h < len(motion)]
@@ -53,9 +53,9 @@ def extremes(motion: ComplexArray) -> FloatArray:
 def error_measure(
     system: System, sweep: Sweep, driven: Harmonics, dofs: IntArray, places: IntArray | None = None
 ) -> ErrorMeasure:
-    """Return what an error of `dofs` is taken of; `places`: where these stand among what is compared, if that is not all dofs.
+    """Return the error measure over `dofs`; `places` are their positions among the compared dofs, if these are not all dofs.
 
-    Where the amplitude is more than the driven harmonics, all that vibrate count.
+    Where the amplitude includes more than the driven harmonics, all harmonics except the mean count.
     """
     at = dofs if places is None else places
     chosen = driven if sweep.error_harmonics is None else tuple(sweep.error_harmonics)

@@ -37,19 +37,19 @@ NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 def double_passage(
     problem: ForcedProblem, done: Sequence[ForcedPoint], static: Callable[[], FloatArray]
 ) -> Iterator[ForcedPoint]:
-    """Finish the response with few harmonics, then solve again what needs more.
+    """Compute the response with few harmonics, then repeat the points that need more.
 
-    A run of neighbouring repeats is gone through forward, and backward for what failed. What has failed still is looked for along the branch with many
-    harmonics, which may take the place of the run, then by homotopies.
+    A run of neighbouring repeats is solved forward, and failed repeats once more backward. Points that still fail are searched along
+    the branch with many harmonics, which may replace the run, then by homotopies.
 
     Parameters
     ----------
     problem
         The forced response.
     done
-        Points of an interrupted run, in the order in which they came.
+        Points of an interrupted run, in their order.
     static
-        Gives the (n_retained,) static equilibrium, m.
+        Function that returns the (n_retained,) static equilibrium, m.
 
     Yields
     ------
@@ -78,7 +78,7 @@ class _Second:
     high: dict[int, ForcedPoint] = field(default_factory=dict)
 
     def run(self) -> Iterator[ForcedPoint]:
-        """Repeat what needs more harmonics, run by run."""
+        """Repeat the points that need more harmonics, run by run."""
         passed = -1
         asked = {p.index: p for p in self.low if self.problem.asks_again(p)}
         for first, last in runs_of_repeats(asked):
@@ -182,9 +182,9 @@ def repeat(
     static: Callable[[], FloatArray] | None = None,
     branch: Sequence[ForcedPoint] = (),
 ) -> ForcedPoint:
-    """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
+    """Solve one frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
-    A neighbour whose own neighbours failed is as far as the branch led: no detour begins farther away than the next point.
+    The branch is followed from a neighbour no farther away than the next point.
 
     Parameters
     ----------
@@ -195,9 +195,9 @@ def repeat(
     others
         Accepted points by index: repeats, and points of the first passage that need none.
     static
-        Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
+        Function that returns the (n_retained,) static equilibrium, m, for `solve_robustly` as the last attempt; None: no such attempt.
     branch
-        Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
+        Points of a branch with many harmonics, which gives starts where it passed the frequency.
     """
     began = perf_counter()
     omega = point.omega
@@ -325,7 +325,7 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
 
 
 def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:
-    """Return the two points of a branch between which it went across the frequency of `point`, on the sheet nearest to its motion."""
+    """Return the two points of a branch on either side of the frequency of `point`, on the sheet nearest to its motion."""
     ends = [
         sorted((a, b), key=lambda p: abs(p.omega - point.omega))
         for a, b in pairwise(p for p in branch if p.converged)

@@ -26,22 +26,22 @@ MORE = (2, 4, 6, 10)  # harmonics more than asked for
 
 @dataclass(frozen=True)
 class Marched:
-    """What the motion in time from rest did; see `stickslip.response.time.repeating.Repetition`.
+    """Time integration from rest; see `stickslip.response.time.repeating.Repetition`.
 
-    What is called finer is with half the step, from where the motion had come to; NaN where that was not needed.
+    Values called finer come from a continuation with half the step; NaN where it was not needed.
 
     Attributes
     ----------
     periods, steps, angle
-        Marched, steps in a period, and by which the fastest contact that opens or closes turns in one of them, rad.
+        Number of periods, steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
     every, finer_every
-        Periods after which it repeats itself; 0: it does not.
+        Number of periods after which the motion repeats; 0: it does not repeat.
     change
-        Of the harmonics of all gaps over the last period, of their size.
+        Relative change of the harmonics of all gaps over the last period.
     wander, finer_wander
-        Largest change of the first harmonic of the outputs from one of the last periods to the next, of its size.
+        Largest relative change of the first harmonic of the outputs between two of the last periods.
     growth, finer_growth
-        Factor by which a small difference grows in a period; NaN where that was not looked at.
+        Growth factor of a small difference in a period; NaN where it was not computed.
     opened
         Share of the time in which contacts are open.
     """
@@ -79,24 +79,24 @@ def _does(every: float, wander: float, growth: float) -> str:
 
 
 def marched_of(point: ForcedPoint) -> Marched | None:
-    """Return what the motion in time did at a point; None where nothing was marched."""
+    """Return the time integration at a point; None without one."""
     return Marched(*point.marched) if point.marched.size else None
 
 
 def found_in_time(
     problem: ForcedProblem, accepted: Sequence[ForcedPoint], done: Sequence[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:
-    """Yield what the motion in time leads to at the frequencies that were not found, but for those `done`.
+    """Yield results of time integration at the failed frequencies that are not in `done`.
 
-    A motion that repeats itself starts Newton's method. Structures of `MOST_COORDINATES` and more, rigid contacts, and structures that have no
-    form in time (tuned wheels, structural damping, coordinates without mass) are left as they are.
+    A motion that repeats starts Newton's method. Structures with `MOST_COORDINATES` or more coordinates, rigid contacts, and structures
+    without equations in time (tuned wheels, structural damping, coordinates without mass) are skipped.
 
     Parameters
     ----------
     problem
         The forced response.
     accepted
-        Its points so far.
+        Points of the response so far.
     """
     first, last = problem.sweep.omega_range
     system = problem.system

@@ -36,16 +36,16 @@ LONGER = 6.0  # a step in time lasts so many times longer than its operations do
 
 @dataclass(frozen=True, eq=False)
 class OtherMotion:
-    """A motion that is not that of the response.
+    """Motion beside that of the response at the same frequency.
 
     Attributes
     ----------
     start
-        What it was found from: ``contacts stuck``, ``contacts open``, ``rest``.
+        Start that led to it: ``contacts stuck``, ``contacts open`` or ``rest``.
     point
-        It.
+        The motion.
     amplitude, known
-        Of it and of the response there, m.
+        Amplitude of the motion, and of the response, m.
     """
 
     start: str
@@ -57,18 +57,18 @@ class OtherMotion:
 def other_motions(
     problem: ForcedProblem, points: Sequence[ForcedPoint], solved_points: Sequence[ForcedPoint], output: int
 ) -> Iterator[OtherMotion]:
-    """Yield motions of another amplitude than that of the response.
+    """Yield motions whose amplitude differs from that of the response.
 
     Parameters
     ----------
     problem
         The forced response.
     points
-        Where they are looked for, the most important one first.
+        Points at whose frequencies to search, the most important one first.
     solved_points
-        All that were solved: a march takes no more work than they did together.
+        All solved points. A time integration takes at most as much work as they did together.
     output
-        Position of the output whose amplitude counts.
+        Position of the output whose amplitude is compared.
     """
     if problem.system.interface.rigid or not problem.system.structure.reduced:
         return

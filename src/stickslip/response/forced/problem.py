@@ -35,7 +35,7 @@ DETOUR = 30  # most points on the way from a neighbour
 
 @dataclass(frozen=True, eq=False)
 class ForcedPoint:
-    """One frequency of a forced response: arrays and numbers only, so that it can be written down and given back.
+    """Solution at one frequency of a forced response. It holds arrays and numbers only, so that a journal can store and restore it.
 
     Attributes
     ----------
@@ -53,27 +53,27 @@ class ForcedPoint:
     coefficients
         (order+1, n_retained) complex displacement of the retained coordinates, m.
     tangent, step, orientation
-        Where the branch goes on (scaled); empty and 0 outside the first passage.
+        Scaled tangent, step length and orientation of the branch; empty and 0 outside the first passage.
     status
         How the solver ended; a point that did not converge is no solution.
     iterations
         Newton steps.
     predicted_error
-        Indicator of the strategy: of an alert the predicted error, as a fraction; NaN where it was not asked.
+        Indicator of the strategy, for an alert the predicted error as a fraction; NaN where it was not computed.
     seconds_contact, seconds_linear, seconds_total
-        Time in contact forces, in factorisations, and in all.
+        Computing time of contact forces, of factorisations, and in total, s.
     rescue
-        What it took to find the solution.
+        Method that found the solution.
     harmonics
         Harmonics kept, growing from 0.
     asked
-        Harmonics with which the strategy wants this frequency solved again; empty: none.
+        Harmonics with which the strategy requests another solution; empty: no request.
     start
-        (H+1, n_retained) coefficients from which it is solved again, m; empty: the strategy has none, or asks for nothing.
+        (H+1, n_retained) coefficients to start that solution from, m; empty: no start, or no request.
     kept
-        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, 0 where it does not; empty: all keep all.
+        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, otherwise 0; empty: all coordinates keep all harmonics.
     marched
-        What the motion in time did, in the order of `stickslip.response.forced.from_time.Marched`; empty: not marched.
+        Results of time integration, in the order of `stickslip.response.forced.from_time.Marched`; empty without one.
     """
 
     stage: Stage
@@ -126,7 +126,7 @@ class ForcedPoint:
 
 @dataclass(frozen=True, eq=False)
 class ForcedProblem:
-    """A system under a load, set up for both passages."""
+    """Forced response of a system under a load, set up for all passages."""
 
     system: System
     sweep: Sweep
@@ -138,25 +138,25 @@ class ForcedProblem:
 
     @cached_property
     def strategy(self) -> Strategy:
-        """How harmonics are chosen."""
+        """Strategy that chooses harmonics."""
         return self.sweep.strategy
 
     @cached_property
     def measure(self) -> ErrorMeasure:
-        """What an error is taken of."""
+        """Error measure over the watched dofs."""
         system = self.system
         dofs = system.outputs if system.alert_dofs is None else system.alert_dofs
         return error_measure(system, self.sweep, self.driven, dofs)
 
     @cached_property
     def of_outputs(self) -> ErrorMeasure:
-        """The same of the outputs, as positions among them."""
+        """Error measure over the outputs, by their positions."""
         outputs = self.system.outputs
         return error_measure(self.system, self.sweep, self.driven, outputs, np.arange(outputs.size))
 
     @property
     def alert_solve(self) -> Solve:
-        """Solver of the alert's enlarged system: that of Newton, but exact enough for an error of a thousandth."""
+        """Linear solver of the alert's enlarged system: Newton's solver with a tolerance fine enough for an error of a thousandth."""
         return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
 
     def balance(self, harmonics: Harmonics) -> Balance:
@@ -171,7 +171,7 @@ class ForcedProblem:
         return self.others[harmonics]
 
     def local(self, harmonics: Harmonics, by_dof: ByDof | None) -> AnyBalance:
-        """Return the periodic problem with the harmonics of each retained coordinate; without them with these `harmonics` in all."""
+        """Return the periodic problem with harmonics by retained coordinate; for None, with these `harmonics` in all coordinates."""
         whole = self.balance(harmonics)
         if by_dof is None or all(own == harmonics for own in by_dof):
             return whole
@@ -185,7 +185,7 @@ class ForcedProblem:
         next_omega: float | None = None,
         left: Events | None = None,
     ) -> Step:
-        """Return a scaled solution of `balance` as a strategy sees it, with the events that its evaluation `left`."""
+        """Return the input of a strategy for a scaled solution of `balance`, with the contact events `left` by its evaluation."""
         smallest = self.sweep.low_harmonics
         by_dof = None
         if isinstance(balance, LocalBalance):
@@ -205,7 +205,7 @@ class ForcedProblem:
         )
 
     def following(self, balance: AnyBalance) -> Following:
-        """Return how a branch of `balance` is followed."""
+        """Return the continuation options of `balance`."""
         if balance in self.ways:
             return self.ways[balance]
         # along a branch a shorter step is cheaper than a long correction
@@ -217,7 +217,7 @@ class ForcedProblem:
         return way
 
     def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance, steps: int = STEPS_BETWEEN) -> Point:
-        """Go from a solution to another frequency on the branch with the harmonics of `balance`, within so many Newton `steps`."""
+        """Follow the branch from a solution to another frequency with the harmonics of `balance`, in at most `steps` Newton steps."""
         following = self.following(balance)
         most = min(DETOUR, following.control.max_points)
         following = replace(following, control=replace(following.control, max_points=most))
@@ -227,7 +227,7 @@ class ForcedProblem:
         return step_to(balance, start, omega, following, steps)
 
     def alerted(self, point: ForcedPoint) -> bool:
-        """Whether the alert asks for more harmonics at a point of the first passage."""
+        """Whether the alert requests more harmonics at a point of the first passage."""
         return point.converged and bool(point.predicted_error > self.strategy.threshold)
 
     @property
@@ -236,12 +236,12 @@ class ForcedProblem:
         return always_kept(self.strategy) != "low"
 
     def asks_again(self, point: ForcedPoint) -> bool:
-        """Whether a point of the first passage is repeated: alerted, or not found although its neighbours, or more harmonics, may lead to it."""
+        """Whether a point of the first passage is repeated: after an alert, or a failure that neighbours or more harmonics may resolve."""
         anew = self.sweep.rescue == "all" or point.support != self.high.harmonics
         return (self.repeats and not point.converged and anew) or self.alerted(point)
 
     def branch_point(self, point: ForcedPoint, balance: Balance | None = None) -> Point:
-        """Return a point of a branch as one that it goes on from; `balance` has its harmonics."""
+        """Return a point of a branch as the start of its continuation; `balance` has its harmonics."""
         x = (balance or self.balance(point.support)).unknowns(point.coefficients)
         contact, linear = point.seconds_contact, point.seconds_linear
         solution = Solution(x, point.status, point.iterations, 0.0, contact, linear, rung=point.rescue)
@@ -252,7 +252,7 @@ class ForcedProblem:
         return self.difference(point.omega, point.coefficients, reference.coefficients)[0]
 
     def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> tuple[float, int]:
-        """Return the largest relative difference of two motions (H+1, n_retained) at a frequency, a fraction of the first one, and the place of what differs so."""
+        """Return the largest relative difference of two motions (H+1, n_retained), as a fraction of the first, and the position of that dof."""
         rows = self.measure.rows(len(one), len(other))
         linear = self._linear_of(rows - 1)
         motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
@@ -277,7 +277,7 @@ class ForcedProblem:
     def amplitude_of(self, omega: float, coefficients: ComplexArray, output: int | None = None) -> float:
         """Return the amplitude of output number `output`, m, as the sweep measures it.
 
-        None: the largest one of those that the system's peak is of.
+        None: the largest amplitude of the outputs that define the system's peak.
         """
         motion, system = self.low.linear.recover(omega, coefficients), self.system
         first = np.zeros(1, dtype=np.int64) if system.peak_of is None else system.peak_of
@@ -361,7 +361,7 @@ def forced_point(
     there: Point | None = None,
     judged: Judged = Judged(),  # noqa: B008  # frozen
 ) -> ForcedPoint:
-    """Return a solution as a point of the response, with what a branch goes on with `there` and how it is `judged`."""
+    """Return a solution as a point of the response, with tangent and step of the branch `there` and its estimated error `judged`."""
     tangent: FloatArray = np.zeros(0)
     step = sign = 0.0
     if there is not None:
@@ -391,7 +391,7 @@ def forced_point(
 
 
 def refuse_ill_posed(system: System) -> None:
-    """Refuse a system without unknowns, and masses that are negative."""
+    """Refuse a system without unknowns or with negative masses."""
     if not system.retained.size:
         raise input_error(
             "System.interface",

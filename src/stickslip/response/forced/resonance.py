@@ -30,7 +30,7 @@ PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its freq
 def resolve_peak(
     problem: ForcedProblem, accepted: Sequence[ForcedPoint], done: Iterable[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:
-    """Add points around the highest one until its bracket is narrow; each gets the harmonics that it needs.
+    """Add points around the highest one until its bracket is narrow, each with the harmonics that it needs.
 
     Parameters
     ----------
@@ -39,12 +39,13 @@ def resolve_peak(
     accepted
         Points of the response in the order of the branch.
     done
-        Peak points of an interrupted run, and what they were checked with.
+        Peak points of an interrupted run, and their checks.
 
     Yields
     ------
     ForcedPoint
-        Points not in `done`: ``peak``, of which that with most harmonics counts at its frequency, and ``check``: more harmonics, to compare.
+        Points not in `done`: ``peak``, of which the one with most harmonics counts at each frequency, and ``check`` with more harmonics,
+        for comparison.
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
     search = _Search(problem, iter(done))  # an iterator is used as far as the peak needs it
@@ -96,7 +97,7 @@ def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     Parameters
     ----------
     problem
-        The changed problem; the order of its first passage, or its high one, is that of `point`.
+        The changed problem. The order of its first passage, or its high order, equals that of `point`.
     point
         The known peak.
     """
@@ -136,12 +137,12 @@ class _Search:
     count: int = 0
 
     def point(self, sides: Sequence[ForcedPoint], omega: float) -> Taken:
-        """Solve at a frequency with the harmonics of that of its neighbours which has most, and with more still where that is asked for."""
+        """Solve at a frequency with the larger set of harmonics of its two neighbours, and with more where the strategy requests it."""
         made = yield from self._take(lambda: self._between(sides, omega))
         return (yield from self.settled(made))
 
     def settled(self, made: ForcedPoint, *, audit: bool = False) -> Taken:
-        """Add harmonics until a point needs no more of them; `audit`: compare it with more in any case."""
+        """Add harmonics until a point needs no more; `audit`: compare it with more harmonics in any case."""
         auto = self.problem.sweep.auto
         while made.converged:
             curve = self._curve(made.support)
@@ -168,7 +169,7 @@ class _Search:
         return curve.agree(of_forced(curve, made), of_forced(curve, more))
 
     def raised(self, point: ForcedPoint, support: Harmonics) -> Taken:
-        """Solve a point with the harmonics of a support; the point itself where that is not found."""
+        """Solve a point with the harmonics of a support; return the point itself if that fails."""
         curve = self._curve(support)
         now, level = of_forced(curve, point), curve.supports.index(support)
         more = yield from self._take(lambda: self._more(curve, now, level, "check"))

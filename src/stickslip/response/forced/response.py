@@ -49,8 +49,7 @@ def forced_response(
     sweep
         Range, harmonics, alert.
     done
-        Points of an interrupted run, in the order in which they came; none of them is computed again, and the rest comes out
-        as it would have.
+        Points of an interrupted run, in their order. They are not computed again, and the remaining points are the same.
 
     Yields
     ------
@@ -60,7 +59,7 @@ def forced_response(
     Raises
     ------
     SingularError
-        If the static load finds no equilibrium.
+        If there is no equilibrium under the static load.
     """
     problem = forced_problem(system, load, sweep)
     solved = [p for p in done if p.stage not in (*OF_PEAK, *SETTLED, "in_time")]

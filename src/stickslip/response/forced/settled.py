@@ -39,7 +39,7 @@ def settle(
     *,
     of_peak: bool = False,
 ) -> Iterator[ForcedPoint]:
-    """Solve points that predictions alone stand for, or speak against, with more harmonics until two levels agree.
+    """Solve points whose verdict rests on a prediction with more harmonics, until two levels agree.
 
     Parameters
     ----------
@@ -48,16 +48,17 @@ def settle(
     accepted
         Points of the response in the order of the branch.
     solved
-        All that was solved, audits among it.
+        All solved points, audits included.
     stored
-        What an interrupted run has yielded, in its order.
+        Points of an interrupted run, in their order.
     of_peak
-        Whether the points that resolve the peak are meant, or all others.
+        Whether to solve the points that resolve the peak, or all others.
 
     Yields
     ------
     ForcedPoint
-        Points not in `stored`: ``settled`` (of a peak ``peak``), which takes the place of what it has more harmonics than; ``compared`` (``check``), to compare.
+        Points not in `stored`: ``settled`` (at a peak ``peak``), which replaces the point with fewer harmonics; ``compared`` (``check``),
+        for comparison.
     """
     if not problem.strategy.verifies:
         return
@@ -151,7 +152,7 @@ class _Settling:
     spent: int = 0  # solutions of the point that is being settled
 
     def settle_highest(self) -> Generator[ForcedPoint, None, set[int]]:
-        """Compare the highest point with more harmonics, and what is highest then, until that has been compared; return the places of all."""
+        """Compare the highest point with more harmonics, until the highest point has been compared; return the positions of all of them."""
         seen: set[int] = set()
         for _ in range(SOLUTIONS):
             heights = [self.problem.amplitude(p) if p.converged else -np.inf for p in self.known]
@@ -163,7 +164,7 @@ class _Settling:
         return seen
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
-        """Raise the harmonics of a point until the motion stays, a solution after the other."""
+        """Yield solutions of a point with more and more harmonics until the motion no longer changes."""
         lost, levels = 0, _levels(self.problem)
         limit, self.spent = AGREE * self.problem.strategy.threshold, 0
         for support in (*levels.standing, *levels.beyond):

@@ -18,10 +18,10 @@ from stickslip.solve.newton_method import Solution, charged, newton
 
 
 def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
-    """Go through equally spaced or listed frequencies and let the strategy choose the harmonics of each.
+    """Solve equally spaced or listed frequencies in order; the strategy chooses the harmonics of each.
 
-    A frequency whose solution asks for more is solved again with what it had and what it asks for; the last solution counts. One
-    that is not found is looked for once more with the reference support, and at the end once more from the frequency after it.
+    A frequency is solved again with additional harmonics as long as the strategy requests them; the last solution counts. A failed
+    frequency is tried once more with the reference harmonics, and at the end from the frequency after it.
 
     Parameters
     ----------

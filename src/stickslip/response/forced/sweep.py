@@ -32,7 +32,7 @@ SELECTION = "guarded_alert"  # what chooses harmonics where nothing else is said
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """How a forced response is computed.
+    """Options of a forced response.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Sweep:
     direction
         ``up``: from the first frequency to the last; ``down``: from the last to the first, which finds other motions beside folds.
     peak_points
-        Most points added to resolve the peak.
+        Largest number of points added to resolve the peak.
     rescue
         ``off``: a frequency is looked for by the corrector alone, from its neighbours, the bonded vibration and few harmonics; listed
         frequencies by no branch in between either. ``in_time``: then from the motion in time, if that repeats itself; if it does not, the
@@ -181,7 +181,7 @@ class Sweep:
 
     @property
     def strategy(self) -> Strategy:
-        """How harmonics are chosen."""
+        """Strategy that chooses harmonics."""
         if not isinstance(self.selection, str):
             return self.selection
         strategy = strategy_named(self.selection)
