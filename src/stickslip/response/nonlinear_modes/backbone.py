@@ -45,31 +45,30 @@ class ModePoint:
     Attributes
     ----------
     amplitude
-        Of the followed coordinate in the first harmonic, m.
+        Amplitude of the followed coordinate in the first harmonic, m.
     omega
-        rad/s; of a decaying motion ``|λ|``.
+        Frequency, rad/s; for a decaying motion ``|λ|``.
     ratio
-        Damping ratio ``ξ / 2ω``, linear damping included: that at which the motion decays where nothing feeds it; of a decaying motion
-        ``-Re λ / |λ|``.
+        Damping ratio ``ξ / 2ω`` of the free decay, linear damping included; for a decaying motion ``-Re λ / |λ|``.
     coefficients
         (H+1, n) displacement of all dofs at that amplitude, m, static term included.
     modal_amplitude
         ``sqrt(X_1^H M X_1)``, kg^0.5 m.
     energy
-        Twice the mean kinetic energy of all harmonics, J, of a wheel that of one sector: the whole energy, where springs are linear.
+        Twice the mean kinetic energy of all harmonics, J, on a wheel of one sector. With linear springs this is the total energy.
     order
         Highest harmonic.
     status
         How the solver ended; a point that did not converge is no motion.
     slipping
-        Share of the contact points that slip or open at some time; a contact of several sliders counts with the share of them that slip.
+        Share of the contact points that slip or open at some time; a contact with several sliders counts by its share of slipping ones.
     open_for
         Largest share of the period for which a contact point is open.
     change
-        Relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make; with the
-        most harmonics that which fewer make; NaN with one set of harmonics.
+        Larger predicted relative change of frequency and damping ratio by more harmonics; on the last level the change from fewer
+        harmonics; NaN with one set of harmonics.
     sticking
-        Share of the contact points that can slip and stick all the time.
+        Share of the contact points that stick all the time, among those that can slip.
     """
 
     amplitude: float
@@ -93,20 +92,20 @@ class ModePoint:
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
-    """A nonlinear mode: its motions over the amplitude.
+    """Nonlinear mode: its periodic motions over the amplitude.
 
     Attributes
     ----------
     system, load
-        What vibrates, and its static load.
+        System, and its static load.
     mode
-        The linear mode from which it starts.
+        Linear mode at small amplitudes.
     dof
         The followed coordinate.
     points
-        In the order of the curve; the amplitude turns back at a fold.
+        Points in the order of the curve; the amplitude turns back at a fold.
     end
-        How it ended, in words.
+        Reason for the end of the curve, in words.
     """
 
     system: System
@@ -124,26 +123,26 @@ class Backbone:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeSweep:
-    """Over which amplitudes a nonlinear mode is followed, and with how many harmonics.
+    """Amplitudes and harmonics of a nonlinear mode.
 
     Parameters
     ----------
     span
-        First and last amplitude, m: of the coordinate as long as the motion has the shape of the linear mode, else of the motion of the
-        same kinetic energy over the square of its frequency. None: from half of that at which slip begins to 300 times
-        that, or on to gross slip; contacts of which none slips or opens need a span.
+        First and last amplitude of the coordinate, m, while the motion has the shape of the linear mode; otherwise amplitude of equal
+        kinetic energy over the square of the frequency. None: from half the amplitude at the onset of slip to 300 times that
+        amplitude, or to gross slip. Contacts that never slip or open need a span.
     points
-        Least number of points.
+        Smallest number of points.
     most_harmonics
-        Up to which harmonics are raised, to twice as many and one, where frequency or damping ratio would change by more than the
-        `tolerance`; as many as there are, or fewer: none is raised.
+        Highest harmonic. Harmonics are raised from h to 2 h + 1 where frequency or damping ratio would change by more than the
+        `tolerance`; at or below the first number of harmonics: no raise.
     tolerance
-        Relative.
+        Relative change of frequency or damping ratio.
     to_gross_slip
-        Whether the curve ends where every contact that can slip has slipped, of several sliders all of them, or opened.
+        Whether the curve ends where every contact that can slip has opened or slipped with all its sliders.
     concept
-        What motions it is made of: ``periodic`` ones that a level of damping keeps going (Krack 2015), or those that are ``decaying`` as
-        they are, ``e^{λt}`` and its powers (Laxalde & Thouverez 2009).
+        ``periodic``: motions sustained by negative damping (Krack 2015); ``decaying``: free decaying motions, ``e^{λt}`` and its powers
+        (Laxalde & Thouverez 2009).
     """
 
     span: tuple[float, float] | None = None
@@ -154,7 +153,7 @@ class ModeSweep:
     concept: Concept = "periodic"
 
     def require_span(self, interface: Interface, name: str = "ModeSweep.span") -> None:
-        """Raise `InputError` if the span, called `name`, is left out and no contact says where it begins and ends."""
+        """Raise `InputError` if the span, called `name` in the message, is missing and no contact can slip or open."""
         if self.span is None and not np.any(leaving(interface)):
             raise input_error(
                 name,
@@ -165,14 +164,14 @@ class ModeSweep:
 
 @dataclass(frozen=True, eq=False)
 class ModeWay:
-    """A nonlinear mode that is to be followed; `mode_way` makes one.
+    """Continuation of a nonlinear mode; `mode_way` makes one.
 
     Parameters
     ----------
     curve, route
-        The motions, and from where to where.
+        Equations of the motions, and range of the amplitude.
     to_gross_slip
-        Whether it ends there.
+        Whether the mode ends at gross slip.
     """
 
     curve: ModeCurve
@@ -180,7 +179,7 @@ class ModeWay:
     to_gross_slip: bool
 
     def follow(self, done: Sequence[Followed] = ()) -> Iterator[Followed]:
-        """Yield what is found on the way to the end of the mode, or to where it is lost for good, and is not in `done`, what an interrupted run has yielded."""
+        """Yield results up to the end of the mode, or until it is lost, except those in `done` from an interrupted run."""
         every = [one for one in done if one.kind != "between"]
         for one in self._followed(tuple(every)):
             every.append(one)
@@ -204,7 +203,7 @@ class ModeWay:
                 return
 
     def backbone(self, every: Iterable[Followed]) -> Backbone:
-        """Return the mode from all that was found on the way."""
+        """Return the mode from all results of `follow`."""
         own, found = self.curve.problems[0], branch_of(every)
         made = tuple(mode_point(self.curve, f) for f in found)
         end = _end(made, found[-1], self.route.last, stops=self.to_gross_slip)
@@ -247,22 +246,22 @@ def nonlinear_mode(
     Parameters
     ----------
     system
-        What vibrates and its contacts; of a wheel, with the wave number of the mode as its engine order.
+        System with contacts; on a wheel the wave number of the mode is its engine order.
     load
         Static forces.
     mode
         One of `stuck_modes`.
     dof
-        The coordinate whose amplitude is told.
+        Coordinate of the reported amplitude.
     how
-        Harmonics, samples, solver; the least number of harmonics where these are raised.
+        Harmonics, samples, solver; the initial harmonics where these are raised.
     sweep
-        Amplitudes, and how far harmonics are raised.
+        Range of amplitudes, and highest harmonic.
 
     Raises
     ------
     InputError
-        If a contact is rigid, a harmonic load acts, the coordinate is none of the mode, or nothing slips and there is no span.
+        If a contact is rigid, a harmonic load acts, the coordinate is at rest in the mode, or the span is missing and no contact slips.
     """
     way = mode_way(system, load, mode, dof, how, sweep)
     return way.backbone(tuple(way.follow()))
@@ -276,7 +275,7 @@ def mode_way(
     how: Discretisation | None = None,
     sweep: ModeSweep | None = None,
 ) -> ModeWay:
-    """Return the way of a nonlinear mode from its first amplitude to its last, for `nonlinear_mode`, whose parameters these are."""
+    """Set up the continuation of a nonlinear mode from its first amplitude to its last; parameters as in `nonlinear_mode`."""
     along = sweep or ModeSweep()
     along.require_span(system.interface)
     problem = self_excited_motions(system, load, mode, dof, how or Discretisation())
@@ -293,7 +292,7 @@ def mode_way(
 
 
 def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
-    """Return what a point of the curve tells."""
+    """Return a point of the curve as a `ModePoint`."""
     problem, y = curve.problems[found.level], found.point.x
     scale = float(np.exp(found.p))
     order = problem.balance.order

@@ -34,18 +34,19 @@ SHORTEST = 1e-3  # of ln a: points are not set closer
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a harmonic of a mode passes the frequency of another mode.
+    """Crossing of a harmonic of a mode with the frequency of another mode.
 
     Attributes
     ----------
     harmonic
-        Which one.
+        Number of the harmonic.
     first, last
-        Indices of the points between which it does.
+        Indices of the points on either side.
     share
-        By how much the speed of that harmonic changes between them, over that of the first one: a mode that takes part turns its sign there.
+        Change of the velocity amplitude of that harmonic between them, over that of the first harmonic; a mode that takes part changes
+        its sign.
     width
-        Of the interval, of ln a.
+        Length of the interval in ln a.
     """
 
     harmonic: int
@@ -67,7 +68,7 @@ class _Place:
 
 @dataclass(eq=False)
 class Closer:
-    """Looks for points between those of a branch.
+    """Refinement of a branch by points between its points.
 
     Parameters
     ----------

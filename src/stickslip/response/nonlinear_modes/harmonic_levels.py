@@ -34,7 +34,7 @@ SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
 
 @dataclass(frozen=True, eq=False)
 class ModeCurve(Curve):
-    """The motions of a mode over ``ln a``.
+    """Motions of a mode over ``ln a`` with several levels of harmonics.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class ModeCurve(Curve):
     tolerance
         Relative change of frequency or damping ratio beyond which harmonics are raised.
     decaying
-        Whether motions are those that decay as they are, at the complex frequency λ, not steady ones that a level of damping keeps going.
+        Whether motions are free decays at the complex frequency λ. Otherwise they are steady motions sustained by negative damping.
     """
 
     problems: tuple[SelfExcited, ...]
@@ -90,19 +90,19 @@ class ModeCurve(Curve):
         return own.over_amplitude(family, held=by_energy(own), linear_alone=True)
 
     def judging(self, level: int) -> tuple[SelfExcited, PeriodicProblem] | None:
-        """Return the mode and its equation with the harmonics towards which motions of a level are judged; None where a wheel has no such waves."""
+        """Return the mode and its equation with the judging set of harmonics of a level; None where a wheel lacks these waves."""
         if level not in self.wider:
             made = self.problems[level].judging()
             self.wider[level] = None if made is None else (made, self._equation(made))
         return self.wider[level]
 
     def linear(self, level: int, y: FloatArray) -> DynamicStiffness:
-        """Return what vibrates as a motion feels it."""
+        """Return the dynamic stiffness in a motion."""
         own = self.problems[level]
         return (own.decaying if self.decaying else own.damped)(float(y[-1])).linear
 
     def frequency_and_damping(self, level: int, y: FloatArray) -> tuple[float, float]:
-        """Return frequency, rad/s, and damping ratio of a motion; of one that decays |λ| and -Re λ / |λ|."""
+        """Return frequency, rad/s, and damping ratio of a motion; for a decaying motion |λ| and -Re λ / |λ|."""
         own = self.problems[level]
         omega, ratio = own.omega(y), own.ratio(y)
         if not self.decaying:
@@ -121,7 +121,7 @@ class ModeCurve(Curve):
         return self.equations[level]
 
     def following(self, level: int) -> Following:
-        """Return how its branch is followed: lengths are those of the vibration, the frequency and the level, not of the mean."""
+        """Return the continuation options of a level: step lengths count vibration, frequency and damping level, not the mean."""
         own = self.problems[level]
         weights = np.ones(own.balance.size + 2)
         weights[: own.balance.linear.n] = 0.0
@@ -152,7 +152,7 @@ class ModeCurve(Curve):
         return 1.0 + self.problems[level].balance.size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Foretell by a Newton step with the harmonics towards which motions are judged what these change of frequency and damping ratio; with the most harmonics the difference from fewer counts, too."""
+        """Predict by a Newton step the change of frequency and damping ratio by the judging set; on the last level also from fewer harmonics."""
         if level + 1 == self.levels > 1:
             last = self.at_the_cap(level, point)
             return last if last.bound > self.tolerance else Judged(np.fmax(last.bound, self._foretold(level, point)))
@@ -171,7 +171,7 @@ class ModeCurve(Curve):
         return np.inf if step is None else SAFETY * self._change(level, more, more + step)
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
-        """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
+        """Bound the error on the last level by the difference from the previous level, which is larger if the series converges."""
         fewer = self.problem(level - 1)
         start = self.lifted(point.x, level, level - 1)
         found = newton(lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton)
@@ -180,7 +180,7 @@ class ModeCurve(Curve):
         return Judged(self._change(level, self.lifted(found.x, level - 1, level), point.x))
 
     def quiet(self, level: int, judged: Judged) -> bool:
-        """Whether a bound is below the tolerance, or nobody can tell."""
+        """Whether a bound is below the tolerance, or unknown."""
         return not judged.bound > self.tolerance
 
     def agree(self, fewer: Followed, more: Followed) -> bool:
@@ -188,7 +188,7 @@ class ModeCurve(Curve):
         return self._between(fewer, more) <= AGREE * self.tolerance
 
     def near(self, fewer: Followed, more: Followed) -> bool:
-        """Whether two motions differ by so little that they cannot stand on different sheets."""
+        """Whether two motions are too close to lie on different sheets of the curve."""
         return self._between(fewer, more) <= SAME_SHEET_RTOL
 
     def height(self, found: Followed) -> float:
@@ -196,7 +196,7 @@ class ModeCurve(Curve):
         return self.frequency_and_damping(found.level, found.point.x)[1]
 
     def slips_grossly(self, found: Followed) -> bool:
-        """Whether every contact that can slip has slipped or opened in a motion."""
+        """Whether every contact that can slip slips or opens in a motion."""
         own = self.problems[found.level]
         return contacts_of(own, found.point.x, float(np.exp(found.p))).slipping == 1.0
 
@@ -219,54 +219,54 @@ def _lifted(own: SelfExcited, other: SelfExcited, x: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Size:
-    """``sum_h X_h^H W X_h`` over all harmonics above zero is one, in the scale of the problem.
+    """Amplitude condition: ``sum_h X_h^H W X_h`` over all harmonics above zero is one, in the scale of the problem.
 
     Parameters
     ----------
     weight
-        (n, n) Hermitian.
+        (n, n) Hermitian matrix W, a mass.
     """
 
     weight: ComplexArray
 
     def value(self, state: State) -> float:
-        """Return what is zero where it holds."""
+        """Return the residual of the condition."""
         x = _vibration(state)
         return float(np.vdot(x, x @ self.weight.T).real - 1.0)
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its derivative by the unknowns."""
+        """Return the derivative of the residual by the unknowns."""
         slope = 2.0 * _vibration(state) @ self.weight.T
         return _row(state, slope)
 
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """The share of the linear mode in the first harmonic is real: time begins where it is largest.
+    """Phase condition: the share of the linear mode in the first harmonic is real.
 
     Parameters
     ----------
     row
-        (n,) the product of which with the first harmonic is that share.
+        (n,) vector whose product with the first harmonic is that share.
     """
 
     row: ComplexArray
 
     def value(self, state: State) -> float:
-        """Return what is zero where it holds."""
+        """Return the residual of the condition."""
         return float((self.row @ _vibration(state)[0]).imag)
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its derivative by the unknowns."""
+        """Return the derivative of the residual by the unknowns."""
         slope = np.zeros_like(_vibration(state))
         slope[0] = 1j * self.row.conj()
         return _row(state, slope)
 
 
 def by_energy(problem: SelfExcited) -> tuple[Size, Phase]:
-    """Return size and phase of the motions of a mode by the mass of all that moves; of the linear mode, size one is an amplitude of one of its coordinate.
+    """Return amplitude and phase conditions of a mode from its kinetic energy; size one of the linear mode is amplitude one of its coordinate.
 
-    The mass is condensed at the frequency of the linear mode.
+    The mass matrix is condensed at the frequency of the linear mode.
     """
     linear, mode = problem.balance.linear, problem.mode
     own = problem.system.structure.of_harmonic(1)

@@ -33,13 +33,13 @@ def refined(
     backbone
         As `nonlinear_mode` found it.
     load
-        What drives it.
+        Static and harmonic load, N.
     how
-        Samples and solver; harmonics are as many as the backbone has at most.
+        Samples and solver; the highest harmonic is that of the backbone.
     tolerance
-        Relative, of what is foretold in the middle of two points.
+        Relative error of the interpolation midway between two points.
     most
-        Points added at most, where the curve is the least known first.
+        Largest number of added points; the largest errors come first.
     """
     known = list(backbone.solutions)
     if len(known) < MIN_BACKBONE_POINTS:
@@ -77,7 +77,7 @@ class _Solver:
         return cls(ModeCurve.of(own, (1.0, np.e), 1), by_energy(own)[0])
 
     def between(self, before: ModePoint, after: ModePoint) -> ModePoint | None:
-        """Return the motion of a size between those of two points."""
+        """Return the motion with a modal amplitude between those of two points."""
         own, equation = self.curve.problems[0], self.curve.problem(0)
         sizes = [self._size(p) for p in (before, after)]
         motions = [self._retained(p) / s for p, s in zip((before, after), sizes, strict=True)]

@@ -29,7 +29,7 @@ JUDGED_PEAK_SHARE = 0.5  # share of the peak above which a passage is judged
 
 @dataclass(frozen=True, kw_only=True)
 class Swept:
-    """How the frequency of the force changes.
+    """Frequency sweep of the force.
 
     Parameters
     ----------
@@ -72,19 +72,20 @@ class Passage:
     Parameters
     ----------
     time
-        s.
+        Time, s.
     omega
         Frequency of the force, rad/s.
     place
-        On the backbone.
+        Positions on the backbone.
     amplitude
         Modal amplitude, kg^0.5 m.
     phase
-        Of the motion against that of the backbone, in the phase of the force, rad.
+        Phase of the motion against that of the backbone, relative to the force, rad.
     finished
-        Whether the end was reached; otherwise the motion grew beyond the backbone.
+        Whether the last frequency was reached; otherwise the motion grew beyond the backbone.
     change
-        Largest relative change of the complex amplitude in a radian of the vibration while it is above half its peak: the equation wants that small.
+        Largest relative change of the complex amplitude per radian of the vibration, while it is above half its peak. The method assumes
+        that it is small.
     """
 
     time: FloatArray
@@ -113,7 +114,7 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
     level
         Factor on the harmonic load.
     sweep
-        Range and rate. The passage begins with the steady motion at the first frequency; of several with the smallest.
+        Range and rate. The passage begins with the steady motion at the first frequency, the smallest if there are several.
 
     Raises
     ------

@@ -32,7 +32,7 @@ INSIDE = 24  # places between two points at which the force is looked at
 
 @dataclass(frozen=True, eq=False)
 class Oscillation:
-    """The oscillator at some places of its backbone, all arrays (p,).
+    """Oscillator at points of its backbone, all arrays (p,).
 
     Parameters
     ----------
@@ -87,24 +87,24 @@ class Oscillation:
 
 @dataclass(frozen=True, eq=False)
 class ModalOscillator:
-    """A backbone and a load on it; `modal_oscillator` makes one.
+    """Backbone under a load; `modal_oscillator` makes one.
 
-    Places on the backbone are counted in the change of ln a from its beginning, so that one that turns back is no exception.
+    Positions on the backbone are measured by the accumulated change of ln a from its beginning, also where the amplitude turns back.
 
     Parameters
     ----------
     backbone
         The nonlinear mode.
     load
-        What drives it at the level 1.
+        Load at level 1.
     place
-        (p,) growing places of the points.
+        (p,) ascending positions of the points.
     motion
-        (p, H+1, n) displacements of the points, m; the phases of the first harmonic are such that the shape does not turn along the backbone.
+        (p, H+1, n) displacements of the points, m. The phase of the first harmonic is continuous along the backbone.
     begins
-        Place at which the backbone itself begins; before it, the linear mode.
+        Position of the first point of the backbone; the linear mode precedes it.
     change
-        (p,) relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make.
+        (p,) larger predicted relative change of frequency and damping ratio by more harmonics.
     """
 
     backbone: Backbone
@@ -128,14 +128,14 @@ class ModalOscillator:
         )
 
     def needed(self, place: FloatArray) -> FloatArray:
-        """Return the least level that keeps the amplitudes at places."""
+        """Return the smallest load level for the amplitudes at positions on the backbone."""
         here = self.at(place)
         own = np.abs(here.stiffness(here.resonance())) * here.amplitude
         with np.errstate(divide="ignore"):
             return np.asarray(own / np.abs(here.force))
 
     def by_harmonics(self, place: float) -> float:
-        """Return the relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make at the points of the backbone on either side of a place; NaN where nobody can tell."""
+        """Return the larger predicted relative change of frequency and damping ratio by more harmonics near a position; NaN if unknown."""
         if place < self.begins:
             return 0.0
         after = int(np.clip(np.searchsorted(self.place, place), 1, self.place.size - 1))
@@ -143,13 +143,13 @@ class ModalOscillator:
 
     @cached_property
     def table(self) -> FloatArray:
-        """Places with the points of the backbone among them, and enough between for whatever varies."""
+        """Positions of the points of the backbone, with enough positions between them for interpolation."""
         gaps = np.linspace(self.place[:-1], self.place[1:], INSIDE, endpoint=False)
         return np.append(gaps.T.reshape(-1), self.place[-1])
 
     @cached_property
     def needed_in_table(self) -> FloatArray:
-        """What the places of the table need."""
+        """Smallest load levels at the positions of `table`."""
         return self.needed(self.table)
 
     @cached_property
@@ -184,7 +184,7 @@ class ModalOscillator:
         return np.asarray((operator @ flat.T).T.reshape(*motion.shape[:2], -1))
 
     def coarser(self) -> "ModalOscillator":
-        """Return the oscillator by every second point of the backbone, to see what the others were good for."""
+        """Return the oscillator from every second point of the backbone, to estimate the interpolation error."""
         points = self.backbone.points
         kept = [p for i, p in enumerate(points) if i % 2 == 0 or i == len(points) - 1]
         return modal_oscillator(replace(self.backbone, points=tuple(kept)), self.load)
@@ -204,8 +204,8 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
     Raises
     ------
     InputError
-        If the load drives another harmonic than the first or not the mode, its static part is another one, or the backbone has too few
-        points that converged.
+        If the load drives another harmonic than the first, does not drive the mode or has another static part, or the backbone has too
+        few converged points.
     """
     points = [p for p in backbone.points if p.status.converged]
     if len(points) < MIN_BACKBONE_POINTS:

@@ -60,7 +60,7 @@ class OtherModes:
     right: ComplexArray
 
     def answer(self, omega: FloatArray, force: ComplexArray, rows: Matrix) -> ComplexArray:
-        """Return the (p, k) answer of the other modes to forces (p, n) at frequencies (p,), in the `rows` (k, n) of what is looked at."""
+        """Return the (p, k) response of the other modes to forces (p, n), N, at frequencies (p,), rad/s, in the output `rows` (k, n)."""
         taken = (force @ self.left.T) / (1j * omega[:, None] - self.poles)
         here = self.oscillator.at(np.array([self.oscillator.ends[0]]))
         shape = self.oscillator.motion[0, 1] / here.amplitude[0]
@@ -106,7 +106,7 @@ class Isolation:
 
     @property
     def foreign(self) -> float:
-        """About the relative error of the amplitude that the other modes make."""
+        """Approximate relative error of the amplitude from neglecting the other modes."""
         if self.linear:
             return 0.0
         share = max(self.output, self.gaps)
@@ -136,10 +136,10 @@ def other_modes(oscillator: ModalOscillator) -> OtherModes:
 
 
 def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
-    """Return the (p, n) forces that the equations of motion still ask for at synthesised points: zero along the mode itself.
+    """Return the (p, n) residual forces of the equations of motion at synthesised points, N, which are zero along the mode itself.
 
-    Motions of the backbone go on with damping of the mass in place of the load and the other frequency; what both do to the other modes
-    is not the same.
+    Motions of the backbone have mass-proportional damping instead of the load, and another frequency. The two act differently on
+    the other modes.
     """
     structure = oscillator.backbone.system.structure.of_harmonic(1)
     here = oscillator.at(found.place)
@@ -268,16 +268,16 @@ def _dense(matrix: Matrix) -> Matrix:
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """The other modes along a response, all arrays (p,).
+    """Contribution of the other modes along a response, all arrays (p,).
 
     Parameters
     ----------
     amplitude
-        Of the output in the first harmonic with what the other modes add, m.
+        Amplitude of the output in the first harmonic, other modes included, m.
     share
-        Motion of the other modes over that of the mode, in the output or in the gaps of the contacts, whichever is larger.
+        Motion of the other modes over that of the mode, the larger value of output and contact gaps.
     change
-        About the relative change of the amplitude at its frequency, if the contacts feel what the others add to the gaps.
+        Approximate relative change of the amplitude at its frequency by the effect of the other modes on the contacts.
     linear
         Whether nothing slips: the response is exact.
     """
@@ -294,7 +294,7 @@ class Along:
 
 
 def along(others: OtherModes, found: Synthesised, dof: int) -> Along:
-    """Return what the other modes do along a synthesised response.
+    """Return the contribution of the other modes along a synthesised response.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def along(others: OtherModes, found: Synthesised, dof: int) -> Along:
 
 
 def slips_from(oscillator: ModalOscillator) -> float:
-    """Return the first place at which the mode is no longer the linear one; infinite where it stays so."""
+    """Return the first position at which the mode differs from the linear one; infinite if it never does."""
     if oscillator.begins <= 0.0:
         return -np.inf
     here = oscillator.at(oscillator.table)

@@ -46,11 +46,11 @@ class Synthesised:
     phase
         Of the motion against that of the backbone, rad.
     curve
-        0: that which comes from small amplitudes; 1 and so on: detached ones.
+        0: the curve from small amplitudes; 1 and so on: detached curves.
     stable
-        Whether slow changes of amplitude and phase of this mode die out.
+        Whether slow changes of amplitude and phase of this mode decay.
     resonances
-        Where the sides of its curves meet.
+        Points at which the sides of the curves meet.
     """
 
     level: float
@@ -83,7 +83,7 @@ class Synthesised:
 
 @dataclass(frozen=True)
 class Resonance:
-    """A place at which the level is just enough, where both sides of a curve meet.
+    """Point at which both sides of a response curve meet: the level is the smallest for its amplitude.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Resonance:
 
 @by_one_thread
 def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
-    """Return the resonances of a level in the order of the backbone; none where its end does not need so much.
+    """Return the resonances of a level in the order of the backbone; none if the level exceeds that at its end.
 
     Parameters
     ----------
@@ -282,20 +282,20 @@ def checked_level(level: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PeakCurve:
-    """All resonances of a mode along its backbone, all arrays (p,).
+    """Resonances of a mode along its backbone, all arrays (p,).
 
     Parameters
     ----------
     place
-        On the backbone.
+        Positions on the backbone.
     level
-        Of the load that makes each of them.
+        Load level of each resonance.
     omega
         Frequency, rad/s.
     amplitude
-        Of the output in the first harmonic, m.
+        Amplitude of the output in the first harmonic, m.
     top
-        Whether it is a peak: a little more of the load makes a little more amplitude.
+        Whether the resonance is a peak: the amplitude grows with the level.
     """
 
     place: FloatArray
@@ -308,15 +308,15 @@ class PeakCurve:
     def per_load(self) -> FloatArray:
         """Peak over level, m.
 
-        Where all contact laws are homogeneous this is also the curve of a damper's pull: a static load s times as large under the same
-        vibration load has the peak of the level 1/s, s times as large.
+        For homogeneous contact laws this is also the curve over a damper's static load: s times the static load under the same vibration
+        load gives s times the peak of level 1/s.
         """
         return self.amplitude / self.level
 
 
 @by_one_thread
 def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
-    """Return the resonances of all levels, without solving for any of them: each place of the backbone needs one level."""
+    """Return the resonances of all levels from the backbone alone: each of its points is the resonance of one level."""
     after = oscillator.table >= oscillator.begins
     place, level = oscillator.table[after], oscillator.needed_in_table[after]
     here = oscillator.at(place)
@@ -325,10 +325,10 @@ def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
 
 
 def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = None) -> bool:
-    """Whether contact forces are twice as large where all displacements are: laws without a preload, gap or limit of their own.
+    """Whether contact forces are proportional to displacements: laws without a preload, gap or limit of their own.
 
-    Static and vibration loads that grow by a factor then make everything grow by it, and one backbone serves all static loads. This is looked
-    at in the motion of the largest amplitude.
+    A factor on static and vibration loads is then a factor on the motion, and one backbone serves all static loads. The motion of the
+    largest amplitude is tested.
     """
     backbone = oscillator.backbone
     balance = (how or Discretisation()).balance(backbone.system, oscillator.load, np.array([backbone.dof]))

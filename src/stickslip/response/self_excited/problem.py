@@ -61,11 +61,11 @@ class Held:
     target: float
 
     def value(self, state: State) -> float:
-        """Return what is zero where it holds."""
+        """Return the residual of the condition."""
         return float(state.x[self._place(state)] - self.target)
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its derivative by the unknowns."""
+        """Return the derivative of the residual by the unknowns."""
         out = np.zeros(state.y.size)
         out[self._place(state)] = 1.0
         return out
@@ -228,7 +228,7 @@ def self_excited_motions(
     Parameters
     ----------
     system
-        What vibrates and its contacts; of a wheel, with the wave number of the mode as its engine order.
+        System with contacts; on a wheel the wave number of the mode is its engine order.
     load
         Static forces; harmonic ones are none of a self-excited motion.
     mode
