@@ -106,7 +106,7 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
 
 
 def alike(data: xr.Dataset) -> list[list[int]]:
-    """Return the cases of a dataset in groups of equal content, labels apart. The varied key may not affect an analysis."""
+    """Return the cases of a dataset in groups of equal content, labels apart; a varied key need not affect every analysis."""
     plain = data.drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
     groups: list[list[int]] = []
     for i in range(data.sizes["case"]):

@@ -43,7 +43,7 @@ class Answer:
     largest, least, mean, rms, extreme
         (n_outputs,) statistics, see `Statistics`; NaN if unknown.
     spread, periods, seconds
-        Relative difference between windows in the later half; number of periods integrated; CPU time, s.
+        Relative difference between windows in the later half; number of periods integrated; time of the computation, s.
     settled
         Whether the windows agree.
     periodic
