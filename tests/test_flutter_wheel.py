@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, SECTORS, TWO_UNSTABLE, flutter_wheel
+from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, REFERENCE, SECTORS, TWO_UNSTABLE, flutter_wheel
 
 import stickslip as ss
 from stickslip.errors import InputError
@@ -50,6 +50,17 @@ def test_modes_of_all_waves_have_the_damping_that_the_fluid_gives_them() -> None
     assert [k for k, ratio in enumerate(ratios) if ratio < 0] == [2]
     still = [stuck_modes(flutter_wheel(k, 1, TWO_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)]
     assert [k for k, ratio in enumerate(still) if ratio < 0] == [1, 2]
+
+
+@pytest.mark.parametrize("wave", [0, 5])
+def test_a_mode_has_the_force_of_its_own_frequency(wave: int) -> None:
+    """A force in quadrature and in proportion to the frequency is a dashpot, which the matrices hold without a table."""
+    span = np.array([0.1, 3.0])
+    rising = np.concatenate([share * ONE_UNSTABLE.values for share in span], axis=1)
+    table = replace(ONE_UNSTABLE, values=rising, frequencies=REFERENCE * span)
+    mode, other = (stuck_modes(flutter_wheel(wave, 1, fluid)[0], MODE)[-1] for fluid in (table, ONE_UNSTABLE))
+    assert mode.omega == pytest.approx(other.omega, rel=1e-5)
+    assert mode.ratio == pytest.approx(other.ratio, rel=1e-3)
 
 
 def test_the_smaller_cycle_of_the_only_unstable_wave_is_that_of_all_sectors_in_time() -> None:
