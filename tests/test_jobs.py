@@ -175,6 +175,18 @@ def test_job_that_takes_too_long_is_set_aside_at_once(tmp_path: Path) -> None:
     assert "took more than 5 s" in read_sealed(made.sealed, made.analysis.record)[1]["set aside"]["text"]
 
 
+def test_losses_are_counted_anew_where_a_job_has_gone_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twice at the same place is too often; a worker that was lost further on is the first one there."""
+    monkeypatch.setattr(jobs, "reached", lambda left: (left,))
+    loss, begun, early = jobs.Loss(), [], []
+    for left in ([1], [1, 1], [1, 1, 2], [1, 1, 2], [1, 1, 2, 2]):
+        loss.count(left)  # type: ignore[arg-type]
+        begun.append(loss.begun)
+        early.append(loss.early)
+    assert begun == [1, 2, 1, 1, 2]
+    assert early == [0, 0, 0, 1, 1]
+
+
 # ---- files of several processes
 
 
