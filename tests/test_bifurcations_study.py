@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from typer.testing import CliRunner
 
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
@@ -17,6 +16,7 @@ from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.study.models.study import read_study
+from stickslip.study.store.netcdf import read_tree
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "impacting_mass" / "study.toml"
 
@@ -28,8 +28,8 @@ def ran(tmp_path_factory):
     shutil.copy(EXAMPLE, folder)
     found = CliRunner().invoke(app, ["run", str(folder / EXAMPLE.name)])
     results = folder / "results"
-    with xr.open_dataset(results / "result.nc", group="forced_response") as data:
-        return found.output, data.load(), (results / "report.html").read_text()
+    data = read_tree(results / "result.nc")["forced_response"].to_dataset()
+    return found.output, data, (results / "report.html").read_text()
 
 
 def test_the_dataset_holds_bifurcations_and_the_branches_that_leave(ran):

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from blocks import two_planes
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,6 +20,7 @@ from stickslip.errors import InputError
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.study.models.study import read_study
+from stickslip.study.store.netcdf import read_tree
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "root_joint"
 _spec = importlib.util.spec_from_file_location("make_decks", EXAMPLE / "make_decks.py")
@@ -92,7 +92,7 @@ def blocks(folder, lower, upper, more, held=("top",), quadratic=False):
 def answered(path, analysis="forced_response"):
     found = CliRunner().invoke(app, ["run", str(path), "--no-report"])
     assert found.exit_code == 0, found.output
-    return xr.load_datatree(path.parent / "results" / "result.nc", engine="h5netcdf")[analysis]
+    return read_tree(path.parent / "results" / "result.nc")[analysis]
 
 
 def misses(folder, pairing, more, held, quadratic=False):
@@ -178,7 +178,7 @@ def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     study.write_text(text, encoding="utf-8")
     assert "static equilibrium: 192 of 192 contact points are pressed" in command("check", study)
     command("run", study)
-    data = xr.load_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf")["forced_response"]
+    data = read_tree(tmp_path / "results" / "result.nc")["forced_response"]
     # both flanks together carry the pull
     force = np.einsum("pxd,pd->px", data["contact_frame"].values, data["static_force"].values[0])
     np.testing.assert_allclose(force.sum(axis=0), [0.0, 0.0, -5000.0], atol=1e-6)
