@@ -7,7 +7,9 @@ import math
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -155,6 +157,12 @@ def write_example_deck(folder: Path, changes: Mapping[str, str] | None = None) -
 
 def write_sector_deck(path: Path) -> None:
     """Write a deck of one of eight sectors; nodes of its low shroud face are no partners of those of the high one."""
+    path.write_text(_sector_deck(), encoding="ascii")
+
+
+@cache
+def _sector_deck() -> str:
+    """Return its text, of one mesh for all tests."""
     geometry = BladedSector(
         sectors=8,
         disk_size=0.05,
@@ -164,8 +172,10 @@ def write_sector_deck(path: Path) -> None:
         shroud=Shroud(face_angle=math.radians(-20)),
     )
     mesh = shifted(mesh_sector(geometry), "shroud_low")
-    run = CalculixRun(n_modes=2)
-    write_deck(mesh, Material(), path, sectors=geometry.sectors, run=run)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "sector.inp"
+        write_deck(mesh, Material(), path, sectors=geometry.sectors, run=CalculixRun(n_modes=2))
+        return path.read_text(encoding="ascii")
 
 
 def shifted(mesh: SolidMesh, face: str, by: float = 0.2) -> SolidMesh:
