@@ -16,8 +16,10 @@ import pytest
 import xarray as xr
 from fault_readers import damaged
 from small_v2 import write_four_masses
+from typer.testing import CliRunner
 
 from stickslip.api.result import Result
+from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
@@ -206,8 +208,8 @@ def test_letters_that_the_output_lacks_are_replaced_and_controls_are_told(tmp_pa
 
 
 def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
-    """Two processes: the second is refused before it removes anything, and the first goes on to its end."""
-    study = write_four_masses(tmp_path)
+    """Two processes, of which this is one: the second is refused before it removes anything, and the first goes on to its end."""
+    study = write_four_masses(tmp_path, {"forced_response.stability": '"off"'})
     command = [sys.executable, "-u", "-m", "stickslip", "run", str(study), "--no-report", "-v"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as first:
         assert first.stdout is not None
@@ -215,11 +217,11 @@ def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
             if "point " in line:
                 break
         first.send_signal(signal.SIGSTOP)
-        second = subprocess.run([*command, "--fresh"], capture_output=True, text=True, check=False)
+        second = CliRunner().invoke(app, ["run", str(study), "--no-report", "-v", "--fresh"])
         first.send_signal(signal.SIGCONT)
         first.stdout.read()
         at_work = first.wait(60)
-    assert second.returncode == 2
+    assert second.exit_code == 2
     assert "another run is at work in it. Wait for it, or stop it." in second.stderr
     assert at_work == 0
     assert Result.open(tmp_path / "results").data.attrs["complete"] == 1
