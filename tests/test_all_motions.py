@@ -232,7 +232,7 @@ def test_motions_of_a_third_of_the_frequency_are_an_isola_and_those_of_two_harmo
     omega = 4.2
     system, load = one_mass(CubicSpring(cubic_t=1.0, k_t=1e-12), THIRD_C, THIRD_F)
     search = MotionSearch(
-        omega_range=(3.9, 4.4), at=(omega,), periods=3, harmonics=1, samples=32, points=8, tries=18, starts=0, seed=1
+        omega_range=(3.9, 4.4), at=(omega,), periods=3, harmonics=1, samples=32, points=8, tries=8, starts=0, seed=1
     )
     found = all_motions(system, load, search).at[0].motions
     sizes = [np.abs(m.coefficients[:, 0]) for m in found]
