@@ -338,7 +338,8 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
 
 
 def test_of_always_low_the_remedy_names_the_selection_and_says_what_was_compared() -> None:
-    few = lifted(low=1, high="auto", selection="always_low", points=4, peak_points=0)
+    # the side of the resonance where the contact begins to open: fifteen points, of which two miss more than 5 %
+    few = lifted(omega_range=(1.3, 1.45), low=1, high="auto", selection="always_low", points=2, peak_points=0)
     data = dataset(solved(replace(few, checks=frozenset({"verify_harmonics"}))))
     at = int(np.nanargmax(data.reference_error_percent.values))
     assert "up to 15 harmonics instead of H = 1 are predicted to change it" in data.verdict_reason[at].item()
