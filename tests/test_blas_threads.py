@@ -19,6 +19,7 @@ from stickslip.response import (
     self_excited,
     stability,
 )
+from stickslip.response.rigid import rigid_response
 
 LAYER = (
     ss.forced_response,
@@ -27,7 +28,7 @@ LAYER = (
     ss.response.integrate,
     ss.response.shoot,
     ss.response.track_peak,
-    ss.response.rigid_response,
+    rigid_response,
     stability.stability,
     stability.hill_stability,
     bifurcations.bifurcations,

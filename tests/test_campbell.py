@@ -8,6 +8,7 @@ import scipy.linalg
 import scipy.sparse
 
 import stickslip as ss
+from stickslip.response.rotating.cyclic_campbell import cyclic_campbell
 
 SPIN = np.array([[0.0, -1.0], [1.0, 0.0]])
 TWO_PI = 2 * np.pi
@@ -210,19 +211,19 @@ def test_waves_of_both_senses_are_the_whole_wheel():
 
 def test_engine_orders_meet_the_wave_they_excite():
     # orders 2 and 5 excite waves 2 and 5: backward and forward with two nodal diameters on seven sectors
-    diagrams = ss.response.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True)
+    diagrams = cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True)
     assert [d.wave_number for d in diagrams] == [2, 5]
     assert [d.nodal_diameter for d in diagrams] == [2, 2]
     assert {c.engine_order for c in diagrams[0].crossings} == {2, 9}
     assert {c.engine_order for c in diagrams[1].crossings} == {5}
-    merged = ss.response.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9))
+    merged = cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9))
     assert [d.wave_number for d in merged] == [2]
     assert {c.engine_order for c in merged[0].crossings} == {2, 5, 9}
 
 
 def test_waves_may_be_named_and_watched():
     seen = []
-    diagrams = ss.response.cyclic_campbell(
+    diagrams = cyclic_campbell(
         turning_ring,
         [0.0, 0.5, 1.0],
         1,
@@ -235,7 +236,7 @@ def test_waves_may_be_named_and_watched():
     assert not diagrams[0].crossings + diagrams[1].crossings  # order 2 excites neither
     assert seen == [(0, 0.5), (0, 1.0), (6, 0.5), (6, 1.0)]
     with pytest.raises(ss.InputError, match=r"wave_numbers: must be from 0 to 6, got 7"):
-        ss.response.cyclic_campbell(turning_ring, [0.0], 1, (), wave_numbers=(7,))
+        cyclic_campbell(turning_ring, [0.0], 1, (), wave_numbers=(7,))
 
 
 def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
@@ -247,7 +248,7 @@ def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
 
     # each sector has its share of the hub, here all of its mass and stiffness: frequencies do not change
     speeds = np.linspace(0.0, 8.0, 5)
-    backward, forward = ss.response.cyclic_campbell(hub, speeds, 1, (1, 4), coriolis=True)
+    backward, forward = cyclic_campbell(hub, speeds, 1, (1, 4), coriolis=True)
     np.testing.assert_allclose(backward.frequencies_hz[:, 0] * TWO_PI, 10 + speeds, rtol=1e-9)
     np.testing.assert_allclose(forward.frequencies_hz[:, 0] * TWO_PI, 10 - speeds, rtol=1e-9)
     for diagram in (backward, forward):

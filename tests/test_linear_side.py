@@ -16,7 +16,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
-from stickslip.contact.neighbours import neighbour_gaps
+from stickslip.contact.neighbours import neighbour_gaps, neighbour_interface
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -376,7 +376,7 @@ def test_rigid_contacts_between_the_sectors_of_a_wheel():
     assert np.any(one.state == 1)
     assert np.any(one.state == 0)
     whole = reduced_wheel(sector, np.concatenate([low, high]), sector.independent.size - 6)
-    pairs = ss.contact.neighbour_interface(whole.structure, sectors, law, **PLACE)
+    pairs = neighbour_interface(whole.structure, sectors, law, **PLACE)
     structure, gap = ss.reduction.in_relative_coordinates(whole.structure, pairs.gap_operator, pairs.names)
     load = whole.load(force, m)
     turned = structure.basis.T @ load

@@ -7,6 +7,7 @@ import pytest
 from test_relative import relative, two_flexible_bodies
 
 import stickslip as ss
+from stickslip.response.rigid import rigid_response
 
 TWO_MASSES = ss.model.lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]]))
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
@@ -22,7 +23,7 @@ def rubbing(law=None):
 
 def at(omega, order, samples=None):
     how = ss.response.Discretisation(order=order, samples=samples or 32 * order)
-    (point,) = ss.response.rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
+    (point,) = rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
     assert point.converged
     return point
 
@@ -50,7 +51,7 @@ def test_sticking_motions_of_benchmark_b5(omega, first, stick):
 
 def test_response_through_resonance_until_the_contact_sticks():
     how = ss.response.Discretisation(order=5, samples=160)
-    points = list(ss.response.rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
+    points = list(rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
     assert all(p.converged for p in points)
     assert (points[0].omega, points[-1].omega) == (0.45, 2.2)
     heights = [abs(p.coefficients[1, 1]) for p in points]
@@ -72,10 +73,10 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
     laws = tuple(ss.RigidCoulomb(mu=0.3, preload=20.0) for _ in system.interface.laws)
     system = replace(system, interface=replace(system.interface, laws=laws))
     with pytest.raises(ss.InputError, match="in_relative_coordinates"):
-        next(ss.response.rigid_response(system, load, (330.0, 330.0)))
+        next(rigid_response(system, load, (330.0, 330.0)))
     other, load = relative(system, load)
     how = ss.response.Discretisation(order=3, samples=96)
-    (point,) = ss.response.rigid_response(other, load, (330.0, 330.0), discretisation=how)
+    (point,) = rigid_response(other, load, (330.0, 330.0), discretisation=how)
     assert point.converged
     assert set(np.unique(point.state)) == {0, 1}
     limit = np.max(np.abs(point.contact_force[:, :2]))
@@ -84,7 +85,7 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
 
 def test_messages():
     with pytest.raises(ss.InputError, match="omega_range: goes from 2 to 1 rad/s"):
-        next(ss.response.rigid_response(rubbing(), LOAD, (2.0, 1.0)))
+        next(rigid_response(rubbing(), LOAD, (2.0, 1.0)))
     soft = rubbing(ss.RigidCoulomb(mu=0.9, preload=9.0).softened(10.0))
     with pytest.raises(ss.InputError, match="no contact is rigid"):
-        next(ss.response.rigid_response(soft, LOAD, (1.0, 2.0)))
+        next(rigid_response(soft, LOAD, (1.0, 2.0)))

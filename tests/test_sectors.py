@@ -12,6 +12,7 @@ import stickslip as ss
 from evidence.models.lumped_disks import RING_HOLD, TIP, friction_ring
 from evidence.validation.case_b9_friction_ring import RETENTION, damped_wheel
 from stickslip.analyses.forced_response.stability.in_time import integrated
+from stickslip.contact.neighbours import neighbour_gaps
 from stickslip.errors import InputError
 from stickslip.response.time.sectors import SectorsInTime, all_sectors
 from stickslip.response.time.shooting import ShootingResult, shoot
@@ -79,7 +80,7 @@ def test_contacts_between_sectors_in_either_coordinates(relative: bool | None) -
     static, force = np.zeros((2, free.n))
     static[low], force[high] = (0.2, -0.1, 0.15), (1.5, 1.0, -0.5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    between, following = ss.contact.neighbour_gaps(sector.structure, 3, **place)
+    between, following = neighbour_gaps(sector.structure, 3, **place)
     ground = scipy.sparse.csr_array((np.ones(3), (np.arange(3), low)), shape=between.shape)
     gaps = (scipy.sparse.vstack([between, ground]).tocsr(), scipy.sparse.vstack([following, 0.0 * ground]).tocsr())
     wheel, operator = ss.reduction.tuned_wheel(sector, 1, order, gaps, relative=relative)

@@ -12,6 +12,7 @@ from test_reduced_wheel import TILTED, shrouded
 import stickslip as ss
 from evidence.integrator.transient import TimeStepping, integrate
 from evidence.models.lumped_disks import TIP, blisk_with_ring, friction_ring
+from stickslip.contact.neighbours import neighbour_gaps, neighbour_interface
 from stickslip.harmonic.travelling import condense_waves
 
 # literature benchmark B9: tip amplitude in m; odd harmonics up to 1, 3 and 13
@@ -80,7 +81,7 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
         assert point.converged
         return answer_at(problem, point)
 
-    gaps = ss.contact.neighbour_gaps(sector.structure, sectors, **place)
+    gaps = neighbour_gaps(sector.structure, sectors, **place)
     wheel, operator = ss.reduction.tuned_wheel(
         sector, engine_order, order, gaps, keep=keep, n_modes=modes, names=("shroud",)
     )
@@ -89,7 +90,7 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
     assert one.energy[0] > 1e-3  # else nothing slips
 
     whole = ss.reduction.reduced_wheel(sector, keep, modes)
-    pairs = ss.contact.neighbour_interface(whole.structure, sectors, law, **place)
+    pairs = neighbour_interface(whole.structure, sectors, law, **place)
     wave = ss.reduction.excited_wave(engine_order, sectors)
     load = ss.HarmonicLoad(whole.load(static).real, {1: whole.load(force, wave)})
     all_sectors = solved(whole.structure, pairs, load)
@@ -122,7 +123,7 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
     force[high] = 1.5, 1.0, -0.5
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
     wheel, operator = ss.reduction.tuned_wheel(
-        sector, engine_order, order, ss.contact.neighbour_gaps(sector.structure, sectors, **place)
+        sector, engine_order, order, neighbour_gaps(sector.structure, sectors, **place)
     )
     system = ss.System(wheel, ss.Interface(("shroud",), (law,), operator), np.arange(wheel.n))
     load = ss.HarmonicLoad(wheel.project(static, 0).real, {1: wheel.project(force, 1)})
@@ -137,7 +138,7 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
     assert np.abs(balanced.forces[2]).max() > 1e-2 * np.abs(balanced.forces[1]).max()
 
     whole = ss.reduction.wheel(sector)
-    pairs = ss.contact.neighbour_interface(whole, sectors, law, **place)
+    pairs = neighbour_interface(whole, sectors, law, **place)
     phases = np.exp(2j * math.pi * engine_order * np.arange(sectors) / sectors)
     f = np.zeros((2, whole.n), dtype=complex)
     for n, phase in enumerate(phases):
@@ -193,7 +194,7 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
         system.condensed(ss.HarmonicLoad(load.static, {5: load.harmonics[1]}), 3)
     sector, (low, high) = shrouded(5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    gaps = ss.contact.neighbour_gaps(sector.structure, 5, **place)
+    gaps = neighbour_gaps(sector.structure, 5, **place)
     with pytest.raises(ss.InputError, match=r"keep: lacks node\d+.x, on which .* 3 such dofs in all"):
         ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=low, n_modes=5)
     assert ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n == 11
@@ -205,7 +206,7 @@ def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
     """Without the look at what it returns: an AttributeError, or gaps in the wrong coordinates."""
     sector, (low, high) = shrouded(5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    gaps = ss.contact.neighbour_gaps(sector.structure, 5, **place)
+    gaps = neighbour_gaps(sector.structure, 5, **place)
     keep = np.append(high, low)
 
     def tuned(reduce):

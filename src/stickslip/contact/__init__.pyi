@@ -8,8 +8,6 @@ from .laws.iwan import FourParameter as FourParameter
 from .laws.iwan import UniformBand as UniformBand
 from .loop_fit import LoopFit as LoopFit
 from .loop_fit import fit_loops as fit_loops
-from .neighbours import neighbour_gaps as neighbour_gaps
-from .neighbours import neighbour_interface as neighbour_interface
 from .pairing import Pairing as Pairing
 from .pairing import node_to_node as node_to_node
 from .pairing import node_to_segment as node_to_segment

@@ -179,7 +179,7 @@ def tuned_wheel(  # noqa: PLR0913
         Highest temporal harmonic.
     gaps
         Two operators (3 n_contacts, n) on the displacements of a sector in its own axes: ``gap = own u^(0) + next u^(1)``,
-        rows t, w, n of each contact. The second is None for contacts inside a sector; see `neighbour_gaps`.
+        rows t, w, n of each contact. The second is None for contacts inside a sector; see `stickslip.contact.neighbours`.
     keep
         (k,) dofs of the sector that stay physical in the reduction, including those of the contacts and none of the high
         face; None: nothing is reduced.

@@ -21,12 +21,9 @@ from .resonances.tracking import follow_peaks as follow_peaks
 from .resonances.tracking import later_peaks as later_peaks
 from .resonances.tracking import smallest_peak as smallest_peak
 from .resonances.tracking import track_peak as track_peak
-from .rigid import RigidPoint as RigidPoint
-from .rigid import rigid_response as rigid_response
 from .rotating.campbell import Campbell as Campbell
 from .rotating.campbell import Crossing as Crossing
 from .rotating.campbell import campbell as campbell
-from .rotating.cyclic_campbell import cyclic_campbell as cyclic_campbell
 from .rotating.flutter import FlutterOfWave as FlutterOfWave
 from .rotating.flutter import flutter_of_wave as flutter_of_wave
 from .rotating.safe import Interference as Interference
