@@ -70,7 +70,7 @@ class ParameterPoint:
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     omega
         Frequency, rad/s.
     coefficients
@@ -103,7 +103,7 @@ def parameter_family(
     first: float,
     made: Callable[[System, HarmonicLoad], HarmonicBalance],
 ) -> BalanceAt:
-    """Return the balances of `made` as a function of a parameter; see `branch_in_parameter` for what that may be."""
+    """Return the balances of `made` as a function of a parameter, as defined in `branch_in_parameter`."""
     if callable(parameter):
         build = parameter
         return rebuilt(lambda value: made(*build(value)), first)
@@ -181,7 +181,7 @@ def branch_in_parameter(
 
 
 def system_at(system: System, parameter: Parameter, value: float, balance: HarmonicBalance) -> System:
-    """Return the system that a member of a family is the `balance` of."""
+    """Return the system behind the `balance` of a value of the parameter."""
     changed = parameter(value)[0] if callable(parameter) else system
     return replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
 

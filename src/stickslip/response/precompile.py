@@ -73,17 +73,17 @@ TASKS: dict[str, Callable[[], None]] = {
 
 
 def compile_ahead(workers: int) -> Iterator[str]:
-    """Compile everything that is kept on disk, and say what is done.
+    """Compile all kernels that are cached on disk.
 
     Parameters
     ----------
     workers
-        Processes.
+        Number of processes.
 
     Yields
     ------
     str
-        What is compiled.
+        Name of each compiled part.
     """
     for law in LAWS.values():  # compiled here, and not in each process
         _ = law.kernel  # type: ignore[attr-defined]

@@ -13,7 +13,7 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Harmonics 0..order of everything that is reported.
+    """Harmonics 0 to order of all reported quantities.
 
     Attributes
     ----------
@@ -70,20 +70,20 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
 
 
 def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the damping ratio of a linear oscillator that loses as much: at a peak, half the inverse of the quality factor.
+    """Return the damping ratio of a linear oscillator with the same loss: at a peak, half the inverse of the quality factor.
 
-    ``ζ = W / (4π U)`` with the work W of the harmonic loads in a cycle, which at a steady motion is all that friction, structure and fluid
-    take, and the largest energy U that structure and contacts store of the vibration: twice its mean. NaN where nothing vibrates.
+    ``ζ = W / (4π U)`` with the work W of the harmonic loads in a cycle, which equals the total dissipation of a steady motion. U is the
+    largest vibration energy stored in structure and contacts, twice its mean. NaN without a vibration.
     """
     work, _, stored = _work_and_energy(problem, point)
     return work / (4.0 * np.pi * stored) if stored > 0.0 else float("nan")
 
 
 def damped_share(problem: ForcedProblem, point: ForcedPoint, ratio: float) -> float:
-    """Return the energy that a damping `ratio` would take in a cycle, over the most that the loads could give to the motion at any phase.
+    """Return the dissipation of a damping `ratio` in a cycle over the largest work of the loads at any phase.
 
-    Far below 1 the loads balance stiffness and inertia, and so small a damping turns the motion by this angle, rad, without changing its
-    size. Near 1 or above damping alone decides the size. NaN where no load moves.
+    Far below 1 the loads balance stiffness and inertia. Such damping shifts the phase of the motion by this angle, rad, and not its
+    size. Near 1 or above, damping determines the size. NaN where the loads do no work.
     """
     _, most, stored = _work_and_energy(problem, point)
     return 4.0 * np.pi * ratio * stored / most if most > 0.0 else float("nan")

@@ -26,7 +26,7 @@ class System:
     Parameters
     ----------
     structure
-        What vibrates: blades joined with dampers, reduced; or one sector of a tuned wheel; or `Unreduced`, with thousands of contacts.
+        Linear structure: reduced blades and dampers, one sector of a tuned wheel, or `Unreduced` for thousands of contacts.
     interface
         Contacts on the structure's dofs.
     outputs
@@ -36,7 +36,7 @@ class System:
     free
         Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
     peak_of
-        Positions among the outputs of which the largest amplitude is that of the response, as that of all blades; None: the first one.
+        Positions of the outputs whose largest amplitude is that of the response, such as all blades; None: the first output.
     """
 
     structure: LinearSide
@@ -88,19 +88,22 @@ class System:
         return tuple(labels[i] for i in self.retained)
 
     def at(self, omega: float) -> "System":
-        """Return the system as it is at a frequency in rad/s; another one only along an engine-order line, at the speed of the frequency."""
+        """Return the system at a frequency, rad/s. It changes only along an engine-order line, with the speed."""
         side = self.structure.at_frequency(omega)
         return self if side is self.structure else replace(self, structure=side)
 
     def condensed(self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS) -> DynamicStiffness:
-        """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`; of a wheel that has them for all waves towards which these are judged."""
+        """Return structure and load condensed to the retained dofs and `more`, for harmonics up to `order`.
+
+        On a wheel it includes the waves of the judging set, where the wheel has them.
+        """
         side, retained = self.structure, np.union1d(self.retained, more)
         order = max(order, min(REACH * order, side.harmonics or 0))
         return condensed(side, retained, load, order)
 
     @property
     def plain_structure(self) -> Structure:
-        """The structure, where one and the same vibrates in all harmonics; see `one_structure`."""
+        """Structure that is the same in all harmonics; see `one_structure`."""
         return one_structure(self.structure, "this analysis")
 
     def with_retention(self, stiffness: float) -> "System":

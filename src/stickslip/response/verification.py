@@ -35,14 +35,14 @@ SAME_RTOL = 0.02  # difference of what two steps say, with which they say the sa
 
 @dataclass(frozen=True, slots=True)
 class SupportCheck:
-    """What harmonics beyond those of a solved point would change.
+    """Predicted change of a solved point by further harmonics.
 
     Attributes
     ----------
     omega
         Frequency, rad/s.
     kept, harmonics
-        Harmonics of the point, and those it was held against.
+        Harmonics of the point, and those of the comparison.
     error
         Predicted relative change, a fraction; infinite where the enlarged Jacobian is singular.
     harmonic
@@ -65,7 +65,7 @@ class SupportCheck:
 
 @by_one_thread
 def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor: int = 2) -> tuple[SupportCheck, ...]:
-    """Predict at every solved point what all harmonics up to a multiple of the reference order, and those of its judging set, would change.
+    """Predict the change of every solved point by all harmonics up to a multiple of the reference order, and by its judging set.
 
     Two Newton steps a point: two contact evaluations and two linear solutions. The first keeps the contact states of the point; the second asks the
     contacts where the first leads. Where it changes what is predicted by more than a fiftieth, the motion is solved with these harmonics (up to `MAX_ROWS`); where that
@@ -102,7 +102,7 @@ def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor:
 
 
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Predict what the harmonics of its judging set would change in a solution, a fraction: what was said of it on the way, else by Newton steps.
+    """Return the predicted relative change of a solution by its judging set: the estimate from the continuation, otherwise from Newton steps.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     Returns
     -------
     float
-        0 where nothing acts on these harmonics; NaN where that cannot be told, or the point did not converge.
+        A fraction; 0 without forces on these harmonics; NaN if unknown, or for a point that did not converge.
     """
     if not point.converged:
         return float("nan")
@@ -229,7 +229,7 @@ class HarmonicContributions:
 
 
 def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goal = "motion") -> HarmonicContributions:
-    """Estimate what each missing harmonic of the reference would change in the outputs at a solved point.
+    """Estimate the change of the outputs at a solved point by each missing harmonic of the reference.
 
     Residuals of the missing harmonics weighted by the adjoints of the outputs (Becker & Rannacher 2001, section 2), with the
     mean Jacobian of two or three evaluations with all harmonics; nothing is iterated.
@@ -241,7 +241,7 @@ def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goa
     point
         A converged point of the response.
     goal
-        What of a change counts: ``motion``, amplitude and phase; or ``amplitude``, its real part alone.
+        Measure of the change: ``motion``, amplitude and phase; or ``amplitude``, its real part only.
 
     Returns
     -------

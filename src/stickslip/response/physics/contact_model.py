@@ -33,7 +33,7 @@ FEWEST_HALVED = 8  # points of a contact below which half of them would hold it 
 
 @dataclass(frozen=True)
 class StiffnessSlope:
-    """What a relative change of all contact stiffnesses does to a peak.
+    """Sensitivity of a peak to a relative change of all contact stiffnesses.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def stiffer(interface: Interface, factor: float) -> Interface:
     interface
         Contacts.
     factor
-        On the stiffnesses along t, w and n; a negative preload, which is a gap, is one on the gap's stiffness.
+        Factor on the stiffnesses along t, w and n. A negative preload, which represents a gap, is multiplied as well.
     """
     return replace(interface, laws=tuple(_stiffer(law, factor) for law in interface.laws))
 
@@ -82,9 +82,9 @@ def stiffness_slope(
     point
         A converged point of it.
     output
-        Number of the output whose amplitude counts.
+        Number of the output.
     resonance
-        Whether a peak lies beside the point; else the slope is that at its frequency.
+        Whether to take the slope at the peak beside the point. Otherwise it is the slope at the frequency of the point.
 
     Returns
     -------
@@ -165,16 +165,16 @@ def halved(system: System, groups: Sequence[str], position: FloatArray, area: Fl
     system
         With contacts on meshes.
     groups
-        (p,) which contact each point belongs to.
+        (p,) name of the contact of each point.
     position
-        (p, 3) in m.
+        (p, 3) positions, m.
     area
-        (p,) in m²; NaN where a point stands for no facets.
+        (p,) areas, m²; NaN for points without facets.
 
     Notes
     -----
-    A point that stays takes the weight of the neighbour that goes, by their stuck stiffness, and its gap is the mean of both by that weight: it lies
-    between them, so that a contact is as stiff as before against displacements and does not move to one side.
+    A remaining point takes over the stuck stiffness of its removed neighbour. Its gap is the mean of both gaps, weighted by that
+    stiffness. The contact keeps its stiffness against displacements and its centre.
     """
     own = system.interface
     stiffness = own.stuck_stiffness().reshape(-1, 3).sum(axis=1)

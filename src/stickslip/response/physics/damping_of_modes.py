@@ -39,9 +39,9 @@ class Friction:
     Attributes
     ----------
     limits
-        (n_contacts, 2) force along t and w that a contact slips at, N: a quarter of what it dissipates in a long cycle, over the amplitude.
+        (n_contacts, 2) slip force along t and w, N: a quarter of the dissipation in a long cycle over its amplitude.
     variable
-        (n_contacts,) whether the limit follows a normal gap that moves.
+        (n_contacts,) whether the limit changes with the normal gap.
     """
 
     limits: FloatArray
@@ -61,10 +61,10 @@ class Friction:
 
 
 def friction_of(interface: Interface, static_gap: FloatArray, static_force: FloatArray) -> Friction:
-    """Return the friction of contacts that stand at the static gaps (n_contacts, 3), m, under the forces (n_contacts, 3), N.
+    """Return the friction of contacts at static gaps (n_contacts, 3), m, under static forces (n_contacts, 3), N.
 
-    Every law is taken round a cycle of great amplitude in t and then in w, its normal gap at rest: what it dissipates is four times its limit
-    times the amplitude. Springs that never slip have no limit, nor have contacts that are open.
+    Every law is evaluated over a cycle of large amplitude in t and then in w, with its normal gap at rest. The dissipation is four times
+    the slip force times the amplitude. Springs without slip and open contacts have no limit.
     """
     n = interface.n_contacts
     compiled = interface.compiled()
@@ -107,21 +107,21 @@ class RangeMode:
     Attributes
     ----------
     harmonic
-        Of the load.
+        Harmonic of the load.
     number
-        Of the mode, from 1.
+        Number of the mode, from 1.
     omega
-        Frequency of the excitation whose harmonic is that of the mode, rad/s.
+        Excitation frequency at which this harmonic meets the mode, rad/s.
     ratio
         Damping ratio without friction.
     force
-        Of the harmonic on the mode, N on unit modal mass; 0 where the load stands at a node.
+        Modal force of the harmonic, N for unit modal mass; 0 where the load acts at a node of the mode.
     gaps
         (n_contacts, 3) motion of the contacts at unit modal mass.
     strain
-        Share of its strain energy in contact springs.
+        Share of the strain energy in contact springs.
     part, kinetic
-        The part that moves most, and its share of the kinetic energy.
+        Part with the largest kinetic energy, and its share of it.
     """
 
     harmonic: int
@@ -136,12 +136,12 @@ class RangeMode:
 
     @property
     def undamped(self) -> bool:
-        """Whether the load drives it and nothing damps it while no contact slips."""
+        """Whether the load drives the mode and it has no damping without slip."""
         return self.force > 0.0 and self.ratio < UNDAMPED_RATIO
 
     @property
     def resonance(self) -> float:
-        """Modal amplitude at its resonance, m √kg, with at least the damping ratio `UNDAMPED_RATIO`."""
+        """Modal amplitude at the resonance of the mode, m √kg, with at least the damping ratio `UNDAMPED_RATIO`."""
         return self.force / (2.0 * (self.harmonic * self.omega) ** 2 * max(self.ratio, UNDAMPED_RATIO))
 
     @property
@@ -155,9 +155,9 @@ class RangeMode:
         return self.strain > ALONE and self.kinetic > ALONE
 
     def excess(self, friction: Friction) -> float:
-        """Return the force over 4/π of the Coulomb limit projected on the mode: above 1 friction bounds no mode without damping.
+        """Return the modal force over 4/π times the modal Coulomb limit. Above 1 friction alone cannot bound the resonance.
 
-        Infinite without friction, zero where the limit follows a normal gap that moves in the mode, as it then grows with the motion.
+        It is infinite without friction, and zero where the limit changes with the normal motion of the mode and so grows with it.
         """
         size, along = np.abs(self.gaps), np.abs(self.gaps[:, :2])
         grows = size[:, 2] * along.max(axis=1, initial=0.0)
@@ -168,18 +168,18 @@ class RangeMode:
 
 
 def springs_of(system: System, holds: BoolArray, sliding: BoolArray | None = None) -> FloatArray:
-    """Return the (3 n_contacts,) springs of contacts that hold (n_contacts,), N/m, without those of `sliding` directions (3 n_contacts,)."""
+    """Return the (3 n_contacts,) spring stiffnesses of sticking contacts `holds` (n_contacts,), N/m, without `sliding` directions."""
     springs = np.where(np.repeat(holds, 3), system.springs.stuck_stiffness(), 0.0)
     return springs if sliding is None else np.where(sliding, 0.0, springs)
 
 
 def range_modes(system: System, load: HarmonicLoad, within: Range, springs: FloatArray) -> list[RangeMode]:
-    """Return the modes that harmonics of a load pass in a range, with linear springs in place of the contacts.
+    """Return the modes that harmonics of a load meet in a range of frequencies, with linear springs in place of contacts.
 
     Parameters
     ----------
     system
-        What vibrates; along an engine-order line at the middle of the range.
+        System; along an engine-order line it is taken at the middle of the range.
     load
         Periodic load.
     within
@@ -245,7 +245,7 @@ def _most_moved(structure: Structure, mode: StuckMode) -> tuple[str, float]:
 
 
 def complex_stiffness(ratio: float) -> complex:
-    """Return the stiffness of a spring with a slider over that of the spring: its first harmonic at an amplitude of `ratio` times that at which it slips."""
+    """Return the describing function of a spring with a slider over the spring stiffness, at `ratio` times the amplitude of first slip."""
     if ratio <= 1.0:
         return 1.0 + 0.0j
     angle = np.arccos(1.0 - 2.0 / ratio)
@@ -254,16 +254,16 @@ def complex_stiffness(ratio: float) -> complex:
 
 @dataclass(frozen=True)
 class DampedMode:
-    """What friction can do to a mode.
+    """Largest damping of a mode by friction.
 
     Attributes
     ----------
     stuck, ends
-        Frequency of the excitation with contacts stuck and with contacts that slide freely, rad/s.
+        Frequency of the excitation with stuck contacts and with freely sliding contacts, rad/s.
     best
-        Where friction damps it most, rad/s.
+        Frequency of the largest damping, rad/s.
     ratio
-        Damping ratio by friction there.
+        Largest damping ratio by friction.
     """
 
     stuck: float
@@ -272,7 +272,7 @@ class DampedMode:
     ends: float
 
     def apart(self, omega: float) -> float:
-        """Return how far a frequency in rad/s lies from those between sticking and sliding."""
+        """Return the distance of a frequency, rad/s, from the range between sticking and sliding."""
         low, high = sorted((self.stuck, self.ends))
         return max(low - omega, omega - high, 0.0)
 
@@ -285,20 +285,20 @@ class DampedMode:
 def damped_modes(
     system: System, friction: Friction, springs: FloatArray, harmonic: int, within: Range
 ) -> list[DampedMode]:
-    """Return what friction can do to the modes that pass a range of frequencies.
+    """Return the largest damping by friction of the modes in a range of frequencies.
 
     Parameters
     ----------
     system
-        What vibrates; along an engine-order line at the middle of the range.
+        System; along an engine-order line it is taken at the middle of the range.
     friction
-        Of its contacts.
+        Coulomb limits of the contacts.
     springs
-        (3 n_contacts,) stiffnesses with contacts stuck, N/m.
+        (3 n_contacts,) stiffnesses with stuck contacts, N/m.
     harmonic
-        That drives the modes.
+        Harmonic of the load that drives the modes.
     within
-        Frequencies of the excitation.
+        Range of excitation frequencies.
 
     Notes
     -----

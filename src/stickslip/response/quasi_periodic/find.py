@@ -31,18 +31,18 @@ NARROW = 1e-6  # half width of the range about a frequency that is solved alone
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What was found beside a forced motion.
+    """Result of a search for a second tone.
 
     Attributes
     ----------
     motion
-        With a second tone; None where there is none.
+        Motion with a second tone; None without one.
     forced
-        The motion without it.
+        Forced motion without a second tone.
     ratio
-        Damping ratio of the second tone at small amplitudes, of the last that was looked at and grows if one does; NaN where none was.
+        Damping ratio of the last examined second tone at small amplitudes, of a growing one if there is any; NaN if none was examined.
     near
-        The frequency near which that was, rad/s; NaN where none was.
+        Frequency near that tone, rad/s; NaN if none was examined.
     """
 
     motion: TorusMotion | None
@@ -60,13 +60,13 @@ def tone_beside(
     Parameters
     ----------
     problem
-        Nothing acts with the second frequency.
+        Problem without a load at the second frequency.
     omega
-        ω1, rad/s.
+        Frequency ω1 of the load, rad/s.
     guesses
-        Frequencies near which the tone is looked for, rad/s.
+        Estimates of the frequency of the second tone, rad/s.
     starts
-        (H + 1, n_retained) coefficients from which the forced motion is tried, one after the other, where it is not found from stuck contacts, m.
+        Further starts (H + 1, n_retained), m, for the forced motion, if it is not found from stuck contacts.
     """
     forced = forced_motion(problem, omega)
     for start in starts if not forced.converged else ():
@@ -92,7 +92,7 @@ def tone_beside(
 
 
 def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[ComplexArray]:
-    """Yield the forced motions of a single structure at a frequency that branches from below and from above lead to, (H + 1, n_retained), m."""
+    """Yield the forced motions (H + 1, n_retained), m, of a single structure at a frequency, on branches from below and from above."""
     retained = problem.balance.side.first.retained
     ways: tuple[tuple[float, Literal["up", "down"]], ...] = ((1 - WIDE, "up"), (1 + WIDE, "down"))
     for far, direction in ways:
@@ -117,12 +117,12 @@ def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[Compl
 
 
 def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[list[float], str]:
-    """Return the frequencies (rad/s) that the multipliers of the forced motion of a single structure say.
+    """Return the frequencies, rad/s, of growing disturbances of the forced motion of a single structure, from its multipliers.
 
     Returns
     -------
     list[float], str
-        The frequencies, and why the multipliers do not show that all disturbances die; empty where they do.
+        The frequencies, and why the multipliers do not prove stability; empty where they do.
     """
     sweep = Sweep(
         omega_range=((1.0 - NARROW) * omega, (1.0 + NARROW) * omega),
@@ -147,22 +147,22 @@ def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[
 
 
 def tones_of_multipliers(multipliers: ComplexArray, omega: float, highest: int, count: int = 1) -> list[float]:
-    """Return the frequencies (rad/s) of the disturbances that grow most, each beside every harmonic of the motion.
+    """Return the possible frequencies, rad/s, of the disturbances that grow most, one beside every harmonic of the motion.
 
     Parameters
     ----------
     multipliers
         Floquet multipliers of a motion.
     omega
-        Its frequency, rad/s.
+        Frequency of the motion, rad/s.
     highest
-        Harmonic up to which a frequency is looked for.
+        Highest harmonic h of the frequencies.
     count
-        Pairs of multipliers.
+        Number of pairs of multipliers.
 
     Notes
     -----
-    The angle φ of a multiplier leaves open how many turns the disturbance makes in a period: ``|h ω ± φ ω / 2π|`` are all the same to it.
+    The angle φ of a multiplier determines the frequency of the disturbance only up to multiples of ω: ``|h ω ± φ ω / 2π|``.
     """
     grow = [
         value

@@ -30,26 +30,26 @@ FAINT = 1e-3  # of the largest peak: what is below is not told
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A motion over many periods of a frequency that need not be its own.
+    """Time history over many periods of a reference frequency, which need not be that of the motion.
 
     Attributes
     ----------
     omega
-        That frequency, rad/s.
+        Reference frequency, rad/s.
     samples
         (periods, KEPT, outputs) displacements, m.
     largest, least
-        (periods, outputs) of all steps of a period, m.
+        (periods, outputs) largest and smallest displacement in each period, m.
     mean, square
         (periods, outputs) mean, and mean of the square, m and m².
     final
         State at the end.
     overflowed
-        Whether it grew beyond all numbers; the periods end before.
+        Whether the motion overflowed; the history ends before.
     seconds
-        That the march took; nothing depends on them.
+        Computing time, s.
     steps, angle
-        In a period, and by which the fastest contact that opens or closes turns in one of them, rad.
+        Steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
     """
 
     omega: float
@@ -71,7 +71,7 @@ class Course:
 
     @property
     def periods(self) -> int:
-        """How many."""
+        """Number of periods."""
         return len(self.mean)
 
     @property
@@ -82,7 +82,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """What the later half of a course is like.
+    """Statistics of the second half of a time history.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Statistics:
     hertz, peaks
         (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum, NaN where there are fewer.
     periods
-        In the later half.
+        Number of periods in the second half.
     """
 
     largest: FloatArray
@@ -112,7 +112,7 @@ class Statistics:
 
     @property
     def settled(self) -> bool:
-        """Whether its windows are alike."""
+        """Whether the statistics have settled: all windows are alike."""
         return self.spread <= ALIKE
 
 
@@ -130,24 +130,24 @@ def course(  # noqa: PLR0913
     least: int = MIN_PERIODS,
     most: int = MAX_PERIODS,
 ) -> Course:
-    """March until windows of the later half are alike, or the work is done.
+    """Integrate in time until windows of the second half are alike, or the work is spent.
 
     Parameters
     ----------
     structure, contacts, load
         One structure, or all sectors of a wheel.
     omega
-        rad/s; the load repeats itself with it.
+        Frequency of the load, rad/s.
     outputs
-        Dofs that are told of.
+        Reported dofs.
     start
         State at t = 0.
     steps
-        In a period, at least: twice as many, and so on, where contacts open and close that are too stiff for the step.
+        Smallest number of steps in a period. It is doubled while contacts that open and close are too stiff for the step.
     work
-        Floating point operations, as `step_work` counts them, after which no more periods are begun: the same on an idle machine and a busy one.
+        Budget of floating point operations, as counted by `step_work`, which does not depend on the load of the machine.
     least, most
-        Periods, in any case and at most.
+        Smallest and largest number of periods.
     """
     steps = -(-steps // KEPT) * KEPT
     marcher = with_enough_steps(
@@ -193,7 +193,7 @@ def _course(
 
 
 def statistics(motion: Course) -> Statistics:
-    """Return statistics of the later half of a course; NaN where there are too few periods to compare."""
+    """Return statistics of the second half of a time history; NaN with too few periods to compare."""
     outputs = motion.mean.shape[1]
     half = motion.periods // 2
     half -= half % WINDOWS

@@ -53,11 +53,11 @@ class TorusMotion:
     residual
         Largest entry of the scaled residual.
     slip
-        By how much the second phase in the contacts is off after a turn of the first, rad.
+        Error of the second phase in the contacts after one cycle of the first, rad.
     unsettled
-        Contacts whose state did not repeat on a characteristic.
+        Number of contacts whose state did not repeat on a characteristic.
     left_out
-        By how much a Newton step with those left out changes the motion, root mean square over that of the motion, of the coordinate that it changes most; NaN where nobody asked.
+        Largest relative change of a coordinate (root mean square) by a Newton step with further combined frequencies; NaN if not computed.
     """
 
     indices: Indices
@@ -94,14 +94,14 @@ class TorusMotion:
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """How the amplitude of a motion with two frequencies goes up and down.
+    """Amplitude modulation of a motion with two frequencies.
 
     Attributes
     ----------
     phase
-        (n,) of the second frequency where a turn of the first begins, rad.
+        (n,) phase of the second frequency at the beginning of a cycle of the first, rad.
     amplitude
-        (n, outputs) half of peak to peak over that turn, m.
+        (n, outputs) half of peak to peak over that cycle, m.
     rms
         (outputs,) root mean square about the mean, m.
     """
@@ -122,7 +122,7 @@ class Envelope:
 
 
 def envelope(motion: TorusMotion, dofs: IntArray, phases: int = 96) -> Envelope:
-    """Return half of peak to peak over one period of the first frequency, for every phase of the second where it may begin."""
+    """Return half of peak to peak over one period of the first frequency, as a function of the initial phase of the second."""
     ratio = motion.omegas[1] / motion.omegas[0]
     a_turn = max(256, int(32 * motion.order * max(1.0, ratio)))
     along = 2.0 * np.pi * np.arange(a_turn + 1) / a_turn
@@ -166,7 +166,7 @@ class TwoTones:
         return closed_path(ratio, self.balance.order, refine)
 
     def motion(self, x: FloatArray, omegas: tuple[float, float], solution: Solution, path: TorusPath) -> TorusMotion:
-        """Return what unknowns are."""
+        """Return the motion of unknowns."""
         balance = self.balance
         full = balance.side.recover(balance.indices, omegas, balance.coefficients(x))
         return TorusMotion(
@@ -206,9 +206,9 @@ class TwoTones:
         omegas
             ω1 and ω2.
         start
-            Unknowns to begin from; None: contacts stuck, and where that does not lead to a solution the second load from nothing up.
+            Initial unknowns; None: stuck contacts, and if that fails a second load that grows from zero.
         path
-            How the torus is sampled; None: as `path` says.
+            Sampling of the torus; None: from `path`.
         """
         check_frequencies(omegas)
         path = path or self.path(omegas[1] / omegas[0])
@@ -219,7 +219,7 @@ class TwoTones:
         return self.motion(solution.x, omegas, solution, path)
 
     def corrected(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath) -> Solution:
-        """Return what Newton's method comes to from the unknowns `x`."""
+        """Return the result of Newton's method from the unknowns `x`."""
 
         def evaluate(v: FloatArray) -> _Evaluation:
             at = self.balance.linearise(v, omegas, path)
@@ -298,7 +298,7 @@ def torus_side(
     waves: tuple[int, int] | None = None,
     more: IntArray = NO_DOFS,
 ) -> TorusSide:
-    """Condense what vibrates; the rest as in `two_tones`."""
+    """Condense the linear structure; arguments as in `two_tones`."""
     structure = system.structure
     retained = np.union1d(system.retained, more)
     zero = HarmonicLoad(np.zeros(structure.n))

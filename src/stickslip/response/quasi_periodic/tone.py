@@ -38,19 +38,19 @@ class Beginning:
     Attributes
     ----------
     problem
-        With all combined frequencies; nothing acts with the second one.
+        Problem with all combined frequencies, without a load at the second one.
     omegas
-        ω1 and the frequency near which the second tone is, rad/s.
+        ω1 and an estimate of the second frequency, rad/s.
     forced
-        Unknowns of the forced motion; the second tone does not take part.
+        Unknowns of the forced motion without a second tone.
     shape
         Unknowns of the second tone, of unit amplitude at `position`.
     position
-        Of the retained coordinate whose amplitude stands for it.
+        Position of the retained coordinate whose amplitude is prescribed.
     defect
-        Smallest singular value over the largest of what the second tone obeys; zero at a Neimark-Sacker point.
+        Smallest over largest singular value of the linearised equations of the second tone; zero at a Neimark-Sacker point.
     share
-        Of the second frequency itself in the shape.
+        Share of the second frequency itself in the shape.
     """
 
     problem: TwoTones
@@ -64,16 +64,16 @@ class Beginning:
 
 @dataclass(frozen=True, eq=False)
 class ToneOfAmplitude:
-    """A second tone of a given amplitude, kept going by a level of damping.
+    """Second tone of prescribed amplitude, sustained by a level of damping.
 
     Attributes
     ----------
     amplitude
-        Of the coordinate that stands for it, m.
+        Amplitude of the prescribed coordinate, m.
     omega
-        Its frequency, rad/s.
+        Frequency of the second tone, rad/s.
     ratio
-        Damping ratio that it has: below zero it grows.
+        Damping ratio of the second tone; below zero it grows.
     x
         Unknowns of the motion.
     converged
@@ -96,7 +96,7 @@ class _Evaluation:
 
 @by_one_thread
 def forced_motion(problem: TwoTones, omega: float, start: ComplexArray | None = None) -> TorusMotion:
-    """Return the periodic motion under the first load alone, as a motion of two frequencies of which the second takes no part.
+    """Return the periodic motion under the first load alone, as a motion of two frequencies with no second tone.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
 
 @by_one_thread
 def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
-    """Yield second tones of growing amplitude, up to where they go on by themselves or are lost."""
+    """Yield second tones of growing amplitude, up to the self-sustained one or to the end of the branch."""
     balance = beginning.problem.balance
     size = float(np.max(np.abs(balance.coefficients(beginning.forced)[1:])))
     amplitude, factor = FIRST * size, STEP
@@ -181,7 +181,7 @@ def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
 
 @by_one_thread
 def second_tone(beginning: Beginning) -> TorusMotion | None:
-    """Return the motion whose second tone goes on by itself; None where no amplitude has one."""
+    """Return the motion with a self-sustained second tone; None if there is none at any amplitude."""
     last: ToneOfAmplitude | None = None
     for tone in over_amplitude(beginning):
         if not tone.converged:
@@ -225,13 +225,13 @@ def solve_free(
     Parameters
     ----------
     problem
-        Nothing acts with the second frequency.
+        Problem without a load at the second frequency.
     x
-        Unknowns to begin from, a second tone among them.
+        Initial unknowns with a second tone.
     omegas
-        ω1, and near ω2, rad/s.
+        ω1 and an estimate of ω2, rad/s.
     path
-        How the torus is sampled; None: as follows from the frequencies, chosen once more when ω2 is known.
+        Sampling of the torus; None: from the frequencies, and once more after ω2 is known.
     """
     balance = problem.balance
     own = balance.coefficients(x)[balance.indices.index((0, 1))]

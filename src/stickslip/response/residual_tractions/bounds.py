@@ -55,15 +55,15 @@ class Bound:
     Attributes
     ----------
     amplitude
-        Norm of the output over the harmonics that the load drives, m.
+        Norm of the output over the driven harmonics, m.
     coefficients
         (H+1, n) displacement of all dofs, m.
     sliders
-        (n_springs, 2) where the springs of `TractionBounds.springs` started, m.
+        (n_springs, 2) initial slider positions of the springs of `TractionBounds.springs`, m.
     multipliers
         (n_springs, 2) tractions along t and w at t = 0 as shares of the friction limit there; NaN where a spring does not stick all the time.
     error
-        Relative change of the output that the harmonics of its judging set are predicted to make; 0 where nothing acts on them, NaN where nobody can tell.
+        Predicted relative change of the output by the harmonics of its judging set; 0 without forces on them, NaN if unknown.
     """
 
     amplitude: float
@@ -74,7 +74,7 @@ class Bound:
 
     @property
     def stuck(self) -> int:
-        """Number of springs that stick all the time, and so keep a traction."""
+        """Number of springs that stick all the time and so keep a residual traction."""
         return int(np.count_nonzero(np.isfinite(self.multipliers)))
 
 
@@ -93,9 +93,10 @@ class TractionBounds:
     springs
         Names of the contacts to which the rows of sliders belong.
     solves, failures
-        Motions that were solved for, and starts from which none was found.
+        Number of solved motions, and of starts without a solution.
     branches
-        Motions from the model's own start: more than one where sweeps up and down met others at this frequency. The bounds hold them all.
+        Number of motions from the model's own start, above one where sweeps up and down met other branches at this frequency. The
+        bounds include them all.
     """
 
     omega: float
@@ -109,12 +110,12 @@ class TractionBounds:
 
     @property
     def converged(self) -> bool:
-        """Whether a motion was found; else all its numbers are NaN."""
+        """Whether a motion was found; otherwise all numbers are NaN."""
         return bool(np.isfinite(self.reference.amplitude))
 
     @property
     def unique(self) -> bool:
-        """Whether both bounds are one."""
+        """Whether both bounds coincide."""
         return self.most.amplitude - self.least.amplitude <= EQUAL * self.most.amplitude
 
 
@@ -172,8 +173,8 @@ def traction_bounds(
 ) -> Iterator[TractionBounds]:
     """Find the smallest and the largest amplitude of an output over all residual tractions of contacts that stick.
 
-    Where a law is more than friction under a constant normal load, the response may be multi-valued: a sweep up and one down through a wider range
-    look for other branches, and the bounds are those over all motions that these meet. Detached branches they do not meet.
+    With laws other than friction under a constant normal load, the response may be multi-valued. Sweeps up and down through a wider
+    range then search for other branches, and the bounds hold over all motions that they meet. They do not meet isolated branches.
 
     Parameters
     ----------
@@ -182,25 +183,25 @@ def traction_bounds(
     load
         Static and harmonic forces on all dofs, N.
     omegas
-        Frequencies, rad/s, in an order in which neighbours help each other.
+        Frequencies, rad/s, with neighbours next to each other: each starts from the previous one.
     output
-        Which of the outputs of `system`.
+        Number of the output of `system`.
     discretisation
         Harmonics, samples, solver.
     search
-        How hard extremes are looked for.
+        Options of the search for extremes.
     near
-        Bounds at a frequency before the first one, from which an interrupted search goes on.
+        Bounds at the frequency before the first one, from which an interrupted search continues.
 
     Yields
     ------
     TractionBounds
-        Of each frequency; where no motion is found from the model's own start, one that is not `converged`.
+        Bounds at each frequency; not `converged` where no motion is found from the model's own start.
 
     Raises
     ------
     InputError
-        If a contact is rigid or a law does not say where its springs start, or a frequency or the output is none.
+        If a contact is rigid, a law has no initial slider positions, a frequency is not positive, or the output does not exist.
     """
     setup = _setup(system, load, omegas, output, discretisation)
     if may_be_several(system.interface):
@@ -250,7 +251,7 @@ def resonance_bounds(
     Raises
     ------
     InputError
-        If nothing is known.
+        If `known` has no converged bounds.
     """
     known = [b for b in known if b.converged]
     if not known:
@@ -386,7 +387,7 @@ def both_ways(
 def crossings(
     branches: Sequence[Sequence[Followed]], balance: HarmonicBalance, omega: float, options: Newton
 ) -> Iterator[FloatArray]:
-    """Yield the unknowns of every motion in which a branch passes a frequency; the same one as often as it is met."""
+    """Yield the unknowns of every crossing of a branch with a frequency; the same motion may occur several times."""
     for branch in branches:
         for one, other in pairwise(branch):
             if not (one.converged and other.converged) or (one.p - omega) * (other.p - omega) > 0.0:

@@ -30,15 +30,15 @@ class Confirmation:
     Attributes
     ----------
     resolved
-        Amplitude where the springs start from their sliders and forces are marched over samples, m; NaN where no motion was found.
+        Amplitude by sampled contact forces from the same initial sliders, m; NaN without a solution.
     transient
-        Amplitude of the motion in time that began with the bound's state and tractions, m; NaN where it diverged or was not followed.
+        Amplitude by time integration from the bound's state and tractions, m; NaN where it diverged or was not run.
     status
-        How the motion in time ended; empty where it was not followed.
+        Status of the time integration; empty where it was not run.
     periods
-        Of that motion.
+        Number of integrated periods.
     agrees
-        Whether both are the bound's, but for the error of sampling and of the harmonics left out.
+        Whether both agree with the bound, apart from errors of sampling and of the neglected harmonics.
     """
 
     resolved: float
@@ -67,9 +67,9 @@ def confirmed(
     omega
         Frequency of the bound, rad/s.
     bound
-        One of the two of a `TractionBounds`.
+        Bound `least` or `most` of a `TractionBounds`.
     stepping
-        Of the time integration. One sector of a tuned wheel is not followed in time.
+        Options of the time integration. One sector of a tuned wheel is not integrated in time.
     """
     how = discretisation or Discretisation()
     interface = starts_of(system.interface).started(bound.sliders)

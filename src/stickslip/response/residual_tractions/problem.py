@@ -104,7 +104,7 @@ class TractionState:
 
     @property
     def error(self) -> float:
-        """Relative change of the output that the harmonics of the judging set are predicted to make; 0 where nothing acts on them, NaN where a wheel has no such waves."""
+        """Predicted relative change of the output by the judging set; 0 without forces on it, NaN where a wheel lacks these waves."""
         problem = self.problem
         low = problem.at(self.sliders)
         high = judging_balance(low)
@@ -159,7 +159,7 @@ class TractionState:
 
 @dataclass(slots=True)
 class Spent:
-    """What a search has cost so far."""
+    """Cost of a search so far."""
 
     solves: int = 0
     failures: int = 0
@@ -167,7 +167,7 @@ class Spent:
 
 @dataclass(frozen=True, eq=False)
 class TractionProblem:
-    """A periodic problem, the springs of its contacts that have a start, and the amplitude that is asked for.
+    """Periodic problem as a function of the initial sliders of its springs, with the amplitude of one output.
 
     Parameters
     ----------

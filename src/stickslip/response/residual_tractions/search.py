@@ -26,15 +26,15 @@ ALL_CORNERS = 4  # springs up to which every corner is a start
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TractionSearch:
-    """How hard extremes are looked for.
+    """Options of the search for extremes.
 
     Parameters
     ----------
     starts
-        Starts drawn at random beside those that are always taken: the model's own, all springs at one end of their intervals and all at the
-        other, and every corner where there are few springs.
+        Number of random starts, in addition to the fixed ones: the model's own, all springs at one end of their intervals and all at
+        the other, and every corner for few springs.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
     """
 
     starts: int = quantity("random starts", default=4, least=0, usual=10_000)

@@ -35,22 +35,22 @@ STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
 
 @dataclass(frozen=True, eq=False)
 class PeakSearch:
-    """Which resonance is followed, and by what condition.
+    """Resonance to follow, and its defining condition.
 
     Parameters
     ----------
     system, load, parameter, omega_range, by, output, how
         As in `track_peak`, `how` its discretisation.
     harmonic
-        Whose amplitude peaks, as that of a superharmonic resonance; None: those that the load drives.
+        Harmonic whose amplitude peaks, such as that of a superharmonic resonance; None: the driven harmonics.
     periods
-        Of the load after which the motion repeats itself: 2 or more are subharmonic resonances. Harmonics, energies and phases are then
-        those of the lower frequency, and the lowest harmonic peaks unless another one is named; frequencies are those of the load.
+        Periods of the load after which the motion repeats; 2 or more for subharmonic resonances. Harmonics, energies and phases then
+        refer to the lower frequency, and the default harmonic is the lowest one. Frequencies are those of the load.
 
     Raises
     ------
     InputError
-        If the condition, the output or the harmonic is unknown, or the range is none.
+        If the condition, the output or the harmonic is unknown, or the range is empty.
     """
 
     system: System
@@ -163,12 +163,12 @@ class Start:
 
 
 def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
-    """Return the peaks of the response at a value of the parameter, the highest first, and what evaluations the sweep took.
+    """Return the peaks of the response at a value of the parameter, the highest first, and the number of evaluations of the sweep.
 
     Raises
     ------
     InputError
-        If the range holds no peak.
+        If there is no peak in the range.
     """
     if not np.isfinite(value):
         raise input_error("values", "are empty or not finite", "Give numbers.")
@@ -197,7 +197,7 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
 
 
 def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]:
-    """Return whether a sweep goes over each of some peaks at one value of the parameter.
+    """Return for each peak at one value of the parameter whether a sweep passes over it.
 
     Parameters
     ----------

@@ -31,12 +31,12 @@ class PeakPoint:
     curvature
         ``d² ln(amplitude) / d(ln ω)²`` of the response: negative at a maximum.
     energy
-        That the harmonic load puts in per period of the first harmonic, J: what is dissipated.
+        Work of the harmonic load per period of the first harmonic, J, equal to the total dissipation.
     friction
-        Part of it that the contacts take, J.
+        Dissipation of the contacts, J.
     below
-        How much higher the maximum beside it is, relatively, by slope and curvature of the response: 0 at a horizontal tangent; NaN where
-        no maximum can be seen.
+        Relative amount by which the nearby maximum is higher, from slope and curvature of the response; 0 at a horizontal tangent, NaN
+        without a maximum.
     coefficients
         (order+1, n) complex displacement of all dofs of the structure, m.
     status
@@ -44,8 +44,7 @@ class PeakPoint:
     iterations
         Newton steps.
     evaluations
-        Evaluations of the periodic problem that were needed; those of slope and curvature are included, and in the first point
-        those of the sweep.
+        Number of evaluations of the periodic problem, including those of slope and curvature, and in the first point those of the sweep.
     peak
         Number of the peak, from 0, where several are followed: 0 is the highest at the first value.
     """
@@ -79,7 +78,7 @@ class PeakPoint:
 def peak_point(
     problem: PeakProblem, force: float, value: float, solution: Solution, evaluations: int, peak: int = 0
 ) -> PeakPoint:
-    """Return what is told of a solution of the peak problem.
+    """Return a solution of the peak problem as a `PeakPoint`.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def motions_of_several_periods(
     Parameters
     ----------
     system
-        What `balance` was made of.
+        System of `balance`.
     balance
         Of the lower frequency.
     omega_range

@@ -57,7 +57,7 @@ class Tracker:
         return self.told(self.problem, value, solution, spent)
 
     def told(self, problem: PeakProblem, value: float, solution: Solution, spent: int) -> PeakPoint:
-        """Return what is told of a solution of the equation."""
+        """Return a solution of the equation as a `PeakPoint`."""
         point = peak_point(problem, self.force, value, solution, spent, self.number)
         return replace(point, omega=self.periods * point.omega)
 
@@ -176,7 +176,7 @@ def _sign_change(rate: Callable[[float], float], at: float, step: float) -> floa
 
 
 def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
-    """Return the highest peaks at a value of the parameter, at most so many, ready to be followed; the first one has paid for the sweep."""
+    """Return trackers of the `most` highest peaks at a value of the parameter; the first one has the cost of the sweep."""
     starts, spent = first_peaks(search, value)
     made: list[Tracker] = []
     for start in starts:
@@ -268,7 +268,7 @@ def track_peak(
     Yields
     ------
     PeakPoint
-        One a value. After one that is not found the next is tried from the last that was.
+        One point for each value. After a failed value the next one starts from the last point found.
 
     Raises
     ------
@@ -290,18 +290,19 @@ def follow_peaks(
     Parameters
     ----------
     search
-        Of what, and by which condition.
+        Resonance and condition.
     values
         Values of the parameter, in the order in which they are to be visited.
     most
         Number of peaks, the highest of the first value; fewer where it has fewer.
     done
-        What an interrupted run has yielded; it is not computed again.
+        Points of an interrupted run, which are not computed again.
 
     Yields
     ------
     PeakPoint
-        Not in `done`, one a value and peak, all peaks of a value before the next. Where two become one, one of them ends: that which had the longer way to it.
+        Points not in `done`, one for each value and peak, all peaks of a value before the next value. Where two peaks merge, the one with
+        the longer step ends.
 
     Raises
     ------
@@ -371,7 +372,7 @@ def later_peaks(
     search, values, most, done
         As in `follow_peaks`.
     known
-        What that has yielded.
+        Points from `follow_peaks`.
 
     Yields
     ------

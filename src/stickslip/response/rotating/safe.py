@@ -100,7 +100,7 @@ def nodal_diameter_map(
     Raises
     ------
     InputError
-        If there is no such nodal diameter, or fewer modes than asked for.
+        If a nodal diameter does not exist, or there are fewer modes than requested.
     """
     half = sector.sectors // 2
     diameters = np.arange(half + 1) if nodal_diameters is None else np.asarray(nodal_diameters)
@@ -184,7 +184,7 @@ class Safe:
     engine_orders
         Considered.
     allowed
-        Margin asked for.
+        Required margin.
     points
         Every pair of engine order and mode, the closest first.
     """
@@ -197,14 +197,14 @@ class Safe:
 
     @property
     def resonances(self) -> tuple[Interference, ...]:
-        """Points whose margin is smaller than the one asked for."""
+        """Points whose margin is below the required one."""
         return tuple(p for p in self.points if abs(p.margin) <= self.allowed)
 
     @property
     def not_judged(self) -> tuple[int, ...]:
         """Engine orders that reach, with the margin, above the highest computed mode of the waves that they excite.
 
-        What lies there may be near and is not among the points, unless the map holds all modes that there are.
+        Close frequencies there are missing from `points`, unless the map has all modes.
         """
         top = self.speed_range[1] * (1 + self.allowed) / (2 * math.pi)
         return tuple(m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0))

@@ -38,12 +38,12 @@ class AmplitudePoint:
     Parameters
     ----------
     amplitude
-        Of the coordinate that stands for the motion, in its first harmonic, m.
+        Amplitude of the prescribed coordinate in the first harmonic, m.
     omega
-        rad/s.
+        Frequency, rad/s.
     level
-        Damping ratio of the motion: negative where it is fed with energy, so that its amplitude grows; or the value of the parameter
-        at which it goes on by itself.
+        Damping ratio of the motion, negative where its amplitude grows; or the value of the parameter at which the motion is
+        self-sustained.
     order
         Highest harmonic.
     unknowns
@@ -189,7 +189,7 @@ def parameter_over_amplitude(
     span: tuple[float, float],
     points: int = 40,
 ) -> list[AmplitudePoint]:
-    """Follow limit cycles over their amplitude: the value of a parameter at which each goes on by itself.
+    """Follow limit cycles over their amplitude, with the value of a parameter as the unknown.
 
     Parameters
     ----------

@@ -33,23 +33,23 @@ BRACKETED = 1.0  # times the distance of the two amplitudes by which a cycle may
 
 @dataclass(frozen=True, eq=False)
 class LimitCycle:
-    """A periodic motion that goes on by itself.
+    """Self-sustained periodic motion.
 
     Parameters
     ----------
     amplitude
-        Of the coordinate that stands for the motion, in its first harmonic, m.
+        Amplitude of the prescribed coordinate in the first harmonic, m.
     omega
-        rad/s.
+        Frequency, rad/s.
     slope
         ``dζ / d ln √E`` with the kinetic energy E of the first harmonic, which is the amplitude of its mode: positive where friction grows
         faster than what feeds the motion, so that it is attracting.
     order
         Highest harmonic.
     change
-        Of the amplitude or the frequency, relative and the larger, by the last raise of the harmonics; NaN where there was none.
+        Larger relative change of amplitude and frequency by the last raise of the harmonics; NaN without a raise.
     enough
-        Whether that is below what was asked for.
+        Whether the change is below the tolerance.
     coefficients
         (order + 1, n_retained) complex amplitudes, m.
     unknowns
@@ -67,7 +67,7 @@ class LimitCycle:
 
     @property
     def attracting(self) -> bool:
-        """Whether motions of its own family with nearby amplitudes come to it."""
+        """Whether motions of the same mode with nearby amplitudes approach the limit cycle."""
         return self.slope > 0.0
 
 
@@ -82,10 +82,10 @@ def limit_cycles(
     problem
         The mode.
     curve
-        Its damping over the amplitude, in the order of the branch.
+        Damping over the amplitude, in the order of the branch.
     most_harmonics
-        Harmonics are raised, to twice as many and one at a time, while they change the amplitude by more than the `tolerance`, relative,
-        up to so many; fewer than there are: none is raised.
+        Highest harmonic. Harmonics are raised from h to 2 h + 1 while the relative change of the amplitude is above the `tolerance`; below
+        the first number of harmonics: no raise.
     """
     found: list[LimitCycle] = []
     for before, after in crossings(with_extremes(problem, curve)):
@@ -273,11 +273,11 @@ class CycleStability:
     Parameters
     ----------
     stability
-        Of all disturbances but that along the cycle, which only moves the beginning of time.
+        Stability against all disturbances except the one along the cycle, which only shifts time.
     along
-        Multiplier of that one, which is 1: how far it is off tells how good the motion is.
+        Multiplier of the disturbance along the cycle. Its exact value is 1, and the difference indicates the error of the motion.
     wave
-        Of a wheel: the disturbance whose multiplier decides; None for a single structure, and where nothing is known.
+        Disturbance of a wheel whose multiplier decides the stability; None for a single structure, and where it is unknown.
     """
 
     stability: Stability
@@ -289,7 +289,7 @@ class CycleStability:
 def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
     """Return the stability of a limit cycle of a problem with as many harmonics.
 
-    What half as many harmonics change in each multiplier is its error, and so is the distance of the one along the cycle from 1.
+    The error of each multiplier is its change with half as many harmonics, plus the distance from 1 of the multiplier along the cycle.
 
     Raises
     ------

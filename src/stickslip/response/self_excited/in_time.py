@@ -78,7 +78,7 @@ def march_periods(  # noqa: PLR0913
     *,
     settles: float = 0.0,
 ) -> Marched:
-    """March a structure with its contacts over so many periods of a frequency that need not be its own.
+    """Integrate a structure with contacts over `periods` periods of a reference frequency, which need not be that of the motion.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def march_periods(  # noqa: PLR0913
     omega
         rad/s.
     outputs
-        Dofs that are told of.
+        Reported dofs.
     start
         State at t = 0.
     periods
@@ -95,7 +95,7 @@ def march_periods(  # noqa: PLR0913
     steps
         Steps in a period.
     settles
-        What may be left of the change of the largest amplitude, relative, where the march ends before; 0: it does not.
+        Remaining relative change of the largest amplitude at which the integration ends early; 0: it never does.
     """
     steps = -(-steps // KEPT) * KEPT
     marcher = prepared(structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights)
@@ -157,7 +157,7 @@ class WaveHistory:
 
     @property
     def outcome(self) -> Outcome:
-        """What has become of the motion."""
+        """Outcome of the motion."""
         total = np.sqrt(np.sum(self.amplitude**2, axis=1))
         if len(total) < 3 or not np.all(np.isfinite(total)):
             return "grows" if len(total) and not np.all(np.isfinite(total)) else "not settled"
@@ -172,7 +172,7 @@ class WaveHistory:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Outcome in words."""
         waves = self.waves
         named = " and ".join(str(k) for k in waves[:4])
         return {
@@ -192,8 +192,8 @@ class WaveHistory:
 def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
     """Return the waves of a motion from outputs at the same place of all sectors, in their order.
 
-    In each window of so many periods the motion of a wave number is split by the sign of its frequency: wave k and wave -k have the same
-    shape at one time, and turn in opposite directions.
+    In each window of `window` periods the motion of a wave number is split by the sign of its frequency. Waves k and -k have the same
+    shape at one instant, and travel in opposite directions.
     """
     sectors = marched.samples.shape[1]
     length = window * KEPT

@@ -45,7 +45,7 @@ class StuckMode:
 
     @property
     def unstable(self) -> bool:
-        """Whether small vibrations grow."""
+        """Whether small vibrations in the mode grow."""
         return self.ratio < 0.0
 
 
@@ -56,9 +56,9 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     Parameters
     ----------
     system
-        What vibrates, and its contacts.
+        Structure with contacts.
     count
-        How many; fewer where there are fewer, or some of them do not vibrate.
+        Number of modes; fewer are returned if the structure has fewer, or some do not oscillate.
     holds
         (n_contacts,) contact points that stick under the static loads; None: all.
 
@@ -92,7 +92,7 @@ def sprung_modes(
     springs
         (3 n_contacts,) stiffnesses t, w, n of each contact, N/m.
     harmonic
-        What vibrates in it: on a wheel the harmonics of a load travel as different waves.
+        Harmonic whose matrices are used: on a wheel the harmonics of a load travel as different waves.
     whole
         Coordinates up to which eigenvalues are those of all motions.
     """

@@ -44,7 +44,7 @@ FAR = 1e6  # m: whatever can slip has slipped there, of a model without dimensio
 
 @dataclass(frozen=True)
 class Held:
-    """A real part of the amplitude of a coordinate in the first harmonic has a given value, in the scale of the problem.
+    """Condition: a real part of a coordinate's first harmonic has a given value, in the scale of the problem.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Held:
     row
         1: the cosine part, 2: the sine part.
     target
-        What it is.
+        Prescribed value.
     """
 
     position: int
@@ -100,13 +100,13 @@ class SelfExcited:
     balance: HarmonicBalance
 
     def with_order(self, order: int) -> "SelfExcited":
-        """Return the same with harmonics up to `order`, which the system has to have."""
+        """Return the problem with harmonics up to `order`, which the system must provide."""
         samples = max(self.how.samples, SAMPLES_A_HARMONIC * order)
         how = replace(self.how, order=order, samples=samples)
         return self_excited_motions(self.system, self.load, self.mode, self.dof, how)
 
     def judging(self) -> "SelfExcited | None":
-        """Return the same with the harmonics towards which its motions are judged; None where a wheel has no such waves."""
+        """Return the problem with the judging set of harmonics; None where a wheel lacks these waves."""
         harmonics = judging_set_of(self.balance)
         try:
             made = self.with_order(harmonics[-1])
@@ -120,12 +120,12 @@ class SelfExcited:
         return int(self.balance.linear.retained[self.position])
 
     def damped(self, level: float) -> HarmonicBalance:
-        """Return the balance at 1 m with a level of damping taken away: `level` times ω_0 times the mass."""
+        """Return the balance at 1 m without a level of damping: `level` · ω_0 · M is subtracted from the damping matrix."""
         rate = -level * self.mode.omega
         return replace(self.balance, linear=self.balance.linear.with_mass_damping(rate))
 
     def decaying(self, level: float) -> HarmonicBalance:
-        """Return the balance at 1 m of motions that decay by themselves, at the rate of half a level of damping."""
+        """Return the balance at 1 m of free decaying motions, whose decay rate is half the level of damping."""
         rate = 0.5 * level * self.mode.omega
         return replace(self.balance, linear=DecayingStiffness(self.balance.linear, rate))
 
@@ -139,8 +139,8 @@ class SelfExcited:
     ) -> PeriodicProblem:
         """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping.
 
-        What is `held`, size and phase of the motion over `a`, is that of the coordinate unless other conditions are given. A level that changes
-        nothing but linear forces (`linear_alone`), as damping, costs no evaluation of contacts.
+        The conditions `held` on amplitude and phase refer to the coordinate by default. A level that changes linear forces only
+        (`linear_alone`), such as damping, costs no evaluation of contacts.
         """
         members = family or self.damped
 
@@ -289,12 +289,12 @@ class Contacts:
     Attributes
     ----------
     slipping
-        Share of the contact points that can slip or open and do so, or close, at some time; NaN where none can. A contact of several
-        sliders counts with the share of them that slip: it is 1 in gross slip alone.
+        Share of the contact points that change their state at some time, among those that can slip or open; NaN without such points. A
+        contact with several sliders counts by its share of slipping ones, which is 1 in gross slip only.
     sticking
-        Share of those that stick all the time, of several sliders likewise.
+        Share of these contact points that stick all the time, with several sliders counted in the same way.
     open_for
-        Largest share of the period for which one is open.
+        Largest share of the period for which a contact point is open.
     """
 
     slipping: float
@@ -303,7 +303,7 @@ class Contacts:
 
 
 def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contacts:
-    """Return what contacts do in a motion given by its unknowns over an amplitude, m."""
+    """Return slip, stick and opening of the contacts in a motion, from its unknowns over an amplitude, m."""
     balance = problem.at_amplitude(problem.balance, float(np.log(amplitude)))
     period = balance.contacts(y[:-2], problem.omega(y))
     state, leaves = period.state, leaving(problem.system.interface)

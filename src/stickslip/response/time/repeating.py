@@ -40,28 +40,28 @@ PARTED = 0.05  # distance, of the size of the motion, that is no longer small
 
 @dataclass(frozen=True, eq=False)
 class Repetition:
-    """What a march tells of whether a motion repeats itself.
+    """Periodicity of a motion from time integration.
 
     Attributes
     ----------
     motion
         (order + 1, n) harmonics of all coordinates in the last period, m.
     change
-        (periods - 1,) of the harmonics of all gaps from period to period, of their size.
+        (periods - 1,) relative change of the harmonics of all gaps from period to period.
     every
-        Periods after which it repeats itself; 0: it does not.
+        Number of periods after which the motion repeats; 0: it does not repeat.
     wander
-        Largest change of the first harmonic of the outputs from one period to the next over the last ones, of its size.
+        Largest relative change of the first harmonic of the outputs between two of the last periods.
     growth
-        Factor by which a small difference grows in a period; NaN where that was not looked at.
+        Growth factor of a small difference in a period; NaN where it was not computed.
     opened
         Share of the time in which contacts are open, in the last period.
     steps, angle
-        In a period; by which the fastest contact that opens or closes turns in one of them, rad.
+        Steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
     kept
-        Share that a period leaves of the slowest motion of the structure with all contacts stuck; NaN where that was not asked for.
+        Decay factor per period of the slowest motion of the structure with all contacts stuck; NaN where it was not computed.
     finer
-        The same with half the step; None where every period is like the one before.
+        Result with half the step; None where every period is like the previous one.
     """
 
     motion: ComplexArray
@@ -77,17 +77,17 @@ class Repetition:
 
     @property
     def periods(self) -> int:
-        """Marched."""
+        """Number of integrated periods."""
         return len(self.change) + 1
 
     @property
     def finite(self) -> bool:
-        """Whether it did not grow beyond all numbers."""
+        """Whether the motion did not overflow."""
         return bool(np.all(np.isfinite(self.change)))
 
     @property
     def alone(self) -> Told:
-        """What it tells without the finer march."""
+        """Verdict without the integration with half the step."""
         if self.every == 1:
             return "periodic"
         if self.every:
@@ -105,12 +105,12 @@ class Repetition:
 
     @property
     def verdict(self) -> Told:
-        """What both tell, if they agree."""
+        """Common verdict of both step lengths, if they agree."""
         return self.alone if self.finer is None or self.agrees else "not known"
 
     @property
     def agrees(self) -> bool:
-        """Whether half the step follows the contacts and tells of the same motion."""
+        """Whether half the step resolves the contacts and gives the same motion."""
         finer = self.finer
         if finer is None or finer.alone != self.alone:
             return False
@@ -132,7 +132,7 @@ def repetition(
     order: int,
     steps: int = STEPS,
 ) -> Repetition:
-    """Return whether the motion from rest becomes periodic; one that does not at first is marched with half the step, too, until both agree.
+    """Return whether the motion from rest becomes periodic. Otherwise it is integrated again with half the step, until both agree.
 
     Parameters
     ----------
@@ -145,7 +145,8 @@ def repetition(
     order
         Highest harmonic.
     steps
-        In a period, at least; doubled until the finer march follows the impacts, see `stickslip.response.time.stepping.step_choice`.
+        Smallest number of steps in a period, doubled until half the step resolves the impacts, see
+        `stickslip.response.time.stepping.step_choice`.
     """
 
     def made(steps: int) -> Marcher:

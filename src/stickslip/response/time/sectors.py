@@ -32,14 +32,14 @@ REAL = 1e-8  # of the largest entry: imaginary parts below it are rounding
 
 @dataclass(frozen=True, eq=False)
 class WaveMotion:
-    """A motion that all sectors make, each a share of the period after another.
+    """Travelling motion: all sectors move alike, each a share of the period after another.
 
     Parameters
     ----------
     sectors
         n: number of sectors, and of shares of the period.
     ahead
-        After a share T/n of the period a sector does what the sector so many places further on does now.
+        Number of places: after a share T/n of the period a sector has the present state of the sector so many places further on.
     """
 
     sectors: int
@@ -60,7 +60,7 @@ class SectorsInTime:
     structure, contacts, load
         Of all sectors, one after the other. Dofs of sector 0 have the numbers that they have in the wheel.
     motion
-        What the wave does.
+        Symmetry of the travelling motion.
     wheel
         The wheel of one sector.
     """
@@ -90,7 +90,7 @@ class SectorsInTime:
 
     @property
     def count(self) -> int:
-        """Number of sectors that are here, those that stand for others alone where not `every` one was asked for."""
+        """Number of integrated sectors; without `every` only those that stand for the others."""
         return self.structure.n // _kept(self.wheel)
 
 
@@ -157,7 +157,7 @@ def whole_wheel(system: System) -> SectorsInTime:
 
 @dataclass(frozen=True, eq=False)
 class InTime:
-    """What disturbances of a periodic motion act on; `all_in_time` makes one.
+    """Structure and gaps of a periodic motion for its disturbances; `all_in_time` makes one.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class InTime:
 
 
 def all_in_time(system: System, gaps: ComplexArray) -> InTime:
-    """Return what is marched in time, and the gaps of a motion there.
+    """Return the structure to integrate in time, and the gaps of a motion on it.
 
     Parameters
     ----------
@@ -203,13 +203,13 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
-    """Return the number of sectors that do different things, and the divisor that engine order and sectors have in common."""
+    """Return the number of sectors with distinct motions, and the greatest common divisor of engine order and number of sectors."""
     common = gcd(wheel.engine_order, wheel.sectors)
     return wheel.sectors // common, common
 
 
 def sectors_in_time(system: System) -> int:
-    """Return how many sectors a forced motion is marched with: those of a tuned wheel that do different things, with every wave all; else 1."""
+    """Return the number of sectors in time integration: on a tuned wheel the distinct ones, with every wave all; otherwise 1."""
     wheel = system.structure.wheel
     if wheel is None:
         return 1

@@ -60,7 +60,7 @@ def period_harmonics(began: FloatArray, samples: FloatArray, order: int) -> Comp
 
 @dataclass(slots=True)
 class Progress:
-    """What is known after some periods; the only state of the march besides that of the motion."""
+    """Progress of a time integration; its only state besides that of the motion."""
 
     harmonics: ComplexArray  # (n_h + 1, n_outputs) of the last period; NaN before the first
     unknown: FloatArray  # (n,) NaN: a drift that cannot be told

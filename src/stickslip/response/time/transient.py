@@ -48,7 +48,7 @@ class TimeStepping:
     harmonics
         Highest harmonic reported.
     min_periods
-        Go on for so many periods, however settled the motion is: a disturbance may need them to show.
+        Smallest number of periods, also for a settled motion: a disturbance may need them to grow.
     every_harmonic
         Judge all reported harmonics but the mean, not those that the load drives alone: of a motion over several periods of the load the
         others hold what is its own.
@@ -91,7 +91,7 @@ class TransientResult:
     change
         Largest relative change of the driven harmonics from one period to the next over the last few periods.
     remaining
-        What is left to come of such changes if they go on decaying as they did (see `stickslip.response.time.settling`).
+        Sum of the changes still to come, if they continue to decay at the same rate (see `stickslip.response.time.settling`).
     decay
         Largest such change of the last third of the periods over that of the third before: what goes on ringing has 1, what grows
         more. NaN where the periods are too few.
@@ -110,8 +110,8 @@ class TransientResult:
     gap, contact_force
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     step_angle
-        By which the fastest contact that opens or closes in the last period turns within a step, rad: frequency of its stiffness on the mass
-        that moves with it alone, times the step. See `stickslip.response.time.stepping.step_choice`.
+        Phase angle per step, rad, of the fastest contact that opens or closes in the last period: the frequency of its stiffness and the
+        mass that moves with it, times the step. See `stickslip.response.time.stepping.step_choice`.
     """
 
     status: SettlingStatus
