@@ -24,14 +24,15 @@ class Stability:
     Parameters
     ----------
     floquet
-        Multipliers of the structure's states and of the sliders that move; those of `resting` sliders, which are 1, are left out.
+        Multipliers of the structure's states and of the moving sliders, without those of `resting` sliders, which are 1.
     errors
         (n_states,) how far each multiplier may be from that of the motion with all harmonics: what more harmonics change in it, and
         its change when the step was halved, where laws are known by sampled tangents. Not finite where nothing is known.
         The part of the step is too small where friction stops a light mass within a step, by up to twenty times in cases measured,
         and where planar contacts close into stick, by up to ten.
     resting
-        Number of tangential springs, those of planar contacts among them, whose sliders rest for the whole period: each is a parameter of the motion, not a state.
+        Number of tangential springs, planar contacts included, whose sliders rest for the whole period. Each slider is a parameter of the
+        motion, not a state.
     grazing
         Number of these that have reached their limit before and rest since: the multipliers are those of the side on which they rest.
     transitions
@@ -87,12 +88,12 @@ class Stability:
 
     @property
     def multiplier_error(self) -> float:
-        """How far that modulus may be from that of the motion with all harmonics."""
+        """Error bound of that modulus against the motion with all harmonics."""
         return self._decisive[1]
 
     @property
     def reason(self) -> str:
-        """What the verdict rests on: which multiplier and its error, or what was not known."""
+        """Basis of the verdict: the deciding multiplier and its error, or the missing information."""
         size, error = self._decisive
         if np.isnan(size):
             return (

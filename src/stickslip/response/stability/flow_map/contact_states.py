@@ -82,14 +82,14 @@ class _Spring:
 
 
 def located_part(law: ContactLaw) -> PiecewiseLinear | None:
-    """Return what of a law has transitions that can be located: all of it, the normal contact of planar friction, or nothing."""
+    """Return the part of a law with locatable transitions: the whole law, the normal contact of planar friction, or None."""
     if isinstance(law, PiecewiseLinear):
         return law
     return law.normal_contact() if isinstance(law, NormalContact) else None
 
 
 def is_located(law: ContactLaw) -> bool:
-    """Whether all transitions of a law can be located: planar contacts without friction have none but those of their normal springs."""
+    """Whether all transitions of a law can be located. Planar contacts without friction have only those of their normal springs."""
     frictionless = isinstance(law, NormalContact) and law.mu == 0.0 and law.normal_contact() is not None
     return isinstance(law, PiecewiseLinear) or frictionless
 

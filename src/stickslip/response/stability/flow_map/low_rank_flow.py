@@ -40,7 +40,7 @@ class Flow(Protocol):
     gaps: FloatArray  # (3 n_contacts, k) gaps of the first k coordinates
 
     def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
-        """Return what becomes of the states (2n, k) after `length` within an interval, all sliders (n_sliders, k) being where they are."""
+        """Return the states (2n, k) after `length` within an interval, with all sliders (n_sliders, k) fixed."""
         ...
 
 

@@ -108,7 +108,7 @@ class ContactTangent:
 
 
 def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, list[ContactTangent]]:
-    """Return what contacts are to a disturbance, from their states over a period.
+    """Return the tangent of the contacts for a disturbance, from their states over a period.
 
     Returns
     -------

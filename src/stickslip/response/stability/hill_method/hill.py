@@ -66,7 +66,7 @@ class HillStability:
 
     @property
     def reason(self) -> str:
-        """What the verdict rests on."""
+        """Basis of the verdict."""
         if self.stability.verdict == "unstable":
             return self.stability.reason
         if self.missing is None:

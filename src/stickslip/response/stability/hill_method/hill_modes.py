@@ -174,7 +174,7 @@ class HillSide:
         return 0 if wheel is None else (wave + harmonic * wheel.engine_order) % wheel.sectors
 
     def modes(self, wave: int, harmonic: int) -> HillModes:
-        """Return what a harmonic of a disturbance of a wave vibrates as."""
+        """Return the linear structure for a harmonic of a disturbance of a wave."""
         number = self.wave_of(wave, harmonic)
         if number not in self.known:
             self.known[number] = self._made(number)
