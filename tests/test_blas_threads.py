@@ -9,7 +9,7 @@ import stickslip as ss
 from evidence.models.lumped import griffin
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.model import blas_threads
-from stickslip.model.blas_threads import LARGE, by_one_thread, one_loaded_blas_thread, threads_for
+from stickslip.model.blas_threads import MIN_THREADED_ROWS, by_one_thread, one_loaded_blas_thread, threads_for
 from stickslip.response import (
     all_motions,
     bifurcations,
@@ -89,10 +89,10 @@ def test_a_large_matrix_has_all_threads_but_in_a_study(counts: list[int]) -> Non
         with threads_for(rows):
             return list(counts)
 
-    assert factorise(LARGE - 1) == [1, 1]
-    assert factorise(LARGE) == [5, 7]
+    assert factorise(MIN_THREADED_ROWS - 1) == [1, 1]
+    assert factorise(MIN_THREADED_ROWS) == [5, 7]
     with one_loaded_blas_thread():
-        assert factorise(LARGE) == [1, 1]
+        assert factorise(MIN_THREADED_ROWS) == [1, 1]
     assert counts == [5, 7]
 
 

@@ -18,7 +18,7 @@ from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.spectral import ModeTerms, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
-from stickslip.harmonic.travelling import LARGE, condensed_once
+from stickslip.harmonic.travelling import MIN_CACHED_DOFS, condensed_once
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 
@@ -492,10 +492,14 @@ def test_load_of_another_structure_is_refused():
 
 def test_a_structure_is_condensed_once_until_its_matrices_change():
     rng = np.random.default_rng(0)
-    half = rng.standard_normal((LARGE, LARGE))
-    stiffness = half @ half.T + LARGE * np.eye(LARGE)
-    own = Structure(np.eye(LARGE), 1e-3 * stiffness, stiffness, table(tuple(f"a{i}" for i in range(LARGE))))
-    first, second = (HarmonicLoad(np.zeros(LARGE), {1: rng.standard_normal(LARGE) + 0j}) for _ in range(2))
+    half = rng.standard_normal((MIN_CACHED_DOFS, MIN_CACHED_DOFS))
+    stiffness = half @ half.T + MIN_CACHED_DOFS * np.eye(MIN_CACHED_DOFS)
+    own = Structure(
+        np.eye(MIN_CACHED_DOFS), 1e-3 * stiffness, stiffness, table(tuple(f"a{i}" for i in range(MIN_CACHED_DOFS)))
+    )
+    first, second = (
+        HarmonicLoad(np.zeros(MIN_CACHED_DOFS), {1: rng.standard_normal(MIN_CACHED_DOFS) + 0j}) for _ in range(2)
+    )
     retained = np.arange(3)
     one, two = (condensed_once(own, retained, load) for load in (first, second))
     assert two.spectral is one.spectral

@@ -83,7 +83,7 @@ def test_positive_matrices_front_by_front(kind, monkeypatch):
     check(found, matrix)
     with pytest.raises(SingularError, match="not positive definite"):
         factorise(draw((23, 22), -0.3), backend="multifrontal")
-    monkeypatch.setattr(factorisation, "LARGE", 100)
+    monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
     monkeypatch.setattr(factorisation, "HUGE", 500)
     monkeypatch.setattr(factorisation, "find_spec", lambda name: None)
     assert factorise(matrix).backend == "multifrontal"
@@ -96,7 +96,7 @@ def test_positive_matrices_front_by_front(kind, monkeypatch):
 
 @pytest.mark.parametrize("kind", [float, complex])
 def test_general_matrices_go_to_superlu(kind, monkeypatch):
-    monkeypatch.setattr(factorisation, "LARGE", 100)
+    monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
     skew = scipy.sparse.csr_array(np.eye(506, k=3) - np.eye(506, k=-3))
     matrix = laplacian((23, 22), 0.3) + skew
     if kind is complex:  # complex symmetric: a loss factor
@@ -110,13 +110,13 @@ def test_general_matrices_go_to_superlu(kind, monkeypatch):
 
 @needs_feral
 def test_large_hermitian_matrices_go_to_the_package(monkeypatch):
-    monkeypatch.setattr(factorisation, "LARGE", 500)
+    monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 500)
     assert factorise(laplacian((23, 22), 0.3)).backend == "feral"
     assert factorise(laplacian((21, 22), 0.3)).backend == "superlu"
 
 
 def test_without_the_package_superlu_does_it(monkeypatch):
-    monkeypatch.setattr(factorisation, "LARGE", 100)
+    monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
     monkeypatch.setattr(factorisation, "find_spec", lambda name: None)
     assert factorise(laplacian((23, 22), 0.3)).backend == "superlu"
 
@@ -225,7 +225,7 @@ def young(monkeypatch):
     """Put a package in the place of feral that has the faults asked for, for matrices of more than 100 rows."""
 
     def put(**faults):
-        monkeypatch.setattr(factorisation, "LARGE", 100)
+        monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
         monkeypatch.setattr(factorisation, "DENSE", 50)
         monkeypatch.setattr(factorisation, "find_spec", lambda _: SimpleNamespace(origin="there"))
         monkeypatch.setitem(sys.modules, "feral", Young(**faults))
@@ -274,7 +274,7 @@ def test_superlu_takes_its_place_where_the_package_errs(young, caplog, draw, fau
 @pytest.mark.parametrize("limit", [1000, 100])
 def test_counts_are_checked_with_superlu(young, caplog, monkeypatch, limit):
     """Up to a size beyond which its factors do not fit."""
-    monkeypatch.setattr(factorisation, "CHECKED", limit)
+    monkeypatch.setattr(factorisation, "MAX_CHECKED_ROWS", limit)
     young(miscounted=1)
     matrix = laplacian((13, 12), -0.3)
     right = np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)

@@ -39,7 +39,7 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.gmres import gmres
-from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance
+from stickslip.solve.krylov import MIN_WORN_ITERATIONS, Automatic, Krylov, to_tolerance
 from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
@@ -260,7 +260,7 @@ def test_few_coordinates_take_one_loop_and_many_one_harmonic_at_a_time(name, mon
         jac = replace(balance, jacobian="structured").linearise(x, omega).jac
         told = []
         for small in (0, 1000):
-            monkeypatch.setattr(structured_module, "SMALL", small)
+            monkeypatch.setattr(structured_module, "MAX_SMALL_BLOCK", small)
             kept = replace(balance, jacobian="structured").linearise(x, OMEGA).jac.preconditioner()
             assert (kept.inverses is None) == (small == 0)
             solve, product = jac.preconditioned_by(kept)
@@ -363,8 +363,8 @@ def test_preconditioner_holds_all_below_the_harmonics(relative):
 @pytest.fixture
 def shared(monkeypatch):
     monkeypatch.setattr(structured_module, "SHARED", 0)
-    monkeypatch.setattr(matrix_products_module, "SMALL", 0)  # small matrices are not formed
-    monkeypatch.setattr(shared_factor_module, "REACH", 0.0)  # as many modes as there may be
+    monkeypatch.setattr(matrix_products_module, "MAX_SMALL_BLOCK", 0)  # small matrices are not formed
+    monkeypatch.setattr(shared_factor_module, "MODE_RANGE", 0.0)  # as many modes as there may be
 
 
 @pytest.mark.parametrize("name", STATES)
@@ -388,7 +388,7 @@ def test_solution_by_a_shared_factor_is_that_of_lu(name, shared):
 @pytest.mark.parametrize("at_other", [OMEGA, 1.3 * OMEGA])
 def test_shared_factor_with_all_modes_is_exact_at_every_frequency(at_other, shared, monkeypatch):
     monkeypatch.setattr(shared_factor_module, "LEAST_MODES", 1000)
-    monkeypatch.setattr(shared_factor_module, "MOST_MODES", 1)
+    monkeypatch.setattr(shared_factor_module, "MIN_COORDINATES_PER_MODE", 1)
     balance, x = state("stick")
     kept = balance.linearise(x, OMEGA).jac.preconditioner()
     jac = balance.linearise(x, at_other).jac
@@ -413,7 +413,7 @@ def test_transposed_system_takes_the_shared_factor(name, shared):
 
 def test_harmonics_above_all_modes_have_factors_of_their_own(monkeypatch):
     monkeypatch.setattr(structured_module, "SHARED", 0)
-    monkeypatch.setattr(matrix_products_module, "SMALL", 0)
+    monkeypatch.setattr(matrix_products_module, "MAX_SMALL_BLOCK", 0)
     balance, x = state("lift-off")  # the third harmonic is above a quarter of the modes
     kept = balance.linearise(x, OMEGA).jac.preconditioner()
     assert isinstance(kept, HarmonicFactors)
@@ -446,7 +446,7 @@ def test_harmonics_have_factors_of_their_own_where_a_shared_one_does_not_do(shar
 
 
 def test_shared_factor_turns_to_double_precision_where_single_tells_too_little(shared, monkeypatch):
-    monkeypatch.setattr(shared_factor_module, "SHARP", 1e-10)
+    monkeypatch.setattr(shared_factor_module, "MAX_SINGLE_RESIDUAL", 1e-10)
     balance, x = state("lift-off")
     kept = balance.linearise(x, OMEGA).jac.preconditioner()
     assert kept.factor.lu.dtype == np.float64
@@ -592,7 +592,7 @@ def test_worn_preconditioner_is_made_anew():
     before = krylov.counts.products
     krylov.solve(jac, np.ones(80))
     assert jac.made == 1  # it still served, though badly
-    assert krylov.counts.products - before > YOUNG
+    assert krylov.counts.products - before > MIN_WORN_ITERATIONS
     assert_same(jac.matrix @ krylov.solve(jac, np.ones(80)), np.ones(80), 1e-8)
     assert jac.made == 2
     # one that fails is made anew at once

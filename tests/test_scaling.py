@@ -7,7 +7,7 @@ import pytest
 
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
-from stickslip.solve.iterate import COARSEST
+from stickslip.solve.iterate import MAX_ROUNDING_RESIDUAL
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.status import Status
 
@@ -107,7 +107,7 @@ def test_a_residual_that_only_rounding_leaves_is_a_solution(globalisation):
 @pytest.mark.parametrize("globalisation", GLOBALISATIONS)
 def test_a_residual_that_is_no_rounding_is_none(globalisation):
     # a minimum above zero, below what may be called rounding
-    height = 0.1 * COARSEST
+    height = 0.1 * MAX_ROUNDING_RESIDUAL
 
     def evaluate(x):
         return At(x**2 + height, np.diag(2.0 * x))

@@ -234,7 +234,7 @@ def test_factors_by_harmonic_hold_all_below_the_harmonics():
 
 
 def test_double_precision_where_single_tells_too_little(monkeypatch):
-    monkeypatch.setattr(shared_factor_module, "SHARP", 1e-7)
+    monkeypatch.setattr(shared_factor_module, "MAX_SINGLE_RESIDUAL", 1e-7)
     assert jacobian()[0].preconditioner().factor.dtype == np.float64
 
 

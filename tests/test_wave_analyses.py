@@ -132,7 +132,7 @@ def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
 
 def test_basis_that_is_too_small_is_told(joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # two modes and none to spare, over a range in which the shapes change
-    monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE", 0)
+    monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE_MODES", 0)
     monkeypatch.setattr("stickslip.analyses.waves.doubts.BASIS_ERROR", 1e-9)
     outcome = done(study(tmp_path, {"campbell.engine_orders": "[2]"}), "campbell")
     said = "wave number 2: frequencies between the speeds of the basis are off"

@@ -62,7 +62,7 @@ def test_factors_leave_the_schur_complement_of_the_rows_kept(seventh, number):
 @pytest.mark.parametrize("contacts", [False, True])
 def test_waves_that_share_their_interior_have_the_same_modes(seventh, contacts, monkeypatch):
     """With springs to the neighbour, whose phase the waves have too."""
-    monkeypatch.setattr(wave_family, "LARGE", 100)
+    monkeypatch.setattr(wave_family, "MIN_SHARED_DOFS", 100)
     structure = seventh.structure
     left, right = (scipy.sparse.eye_array(structure.n, format="csr")[structure.dof_set(s)] for s in ("left", "right"))
     springs = np.full(left.shape[0], 3e6)
@@ -87,7 +87,7 @@ def test_waves_that_share_their_interior_have_the_same_modes(seventh, contacts, 
 
 
 def test_what_is_no_family_is_factorised_wave_by_wave(seventh, monkeypatch):
-    monkeypatch.setattr(wave_family, "LARGE", 100)
+    monkeypatch.setattr(wave_family, "MIN_SHARED_DOFS", 100)
     moving = travelling_wave(seventh, 1)
     assert WaveFamily(lambda k: moving, SECTORS, (1,)).shifted(1, moving) == (None, None)
     assert WaveFamily(lambda k: moving, SECTORS, (1, 2)).shifted(1, moving) == (None, None)
@@ -104,7 +104,7 @@ def test_what_is_no_family_is_factorised_wave_by_wave(seventh, monkeypatch):
 
 def test_the_map_of_nodal_diameters_takes_what_waves_share(seventh, monkeypatch):
     plain = nodal_diameter_map(seventh, 4)
-    monkeypatch.setattr(wave_family, "LARGE", 100)
+    monkeypatch.setattr(wave_family, "MIN_SHARED_DOFS", 100)
     shared = nodal_diameter_map(seventh, 4)
     np.testing.assert_allclose(shared.frequencies_hz, plain.frequencies_hz, rtol=1e-9)
     assert np.any(shared.frequencies_hz != plain.frequencies_hz)

@@ -129,7 +129,7 @@ def together(errors: Iterable[InputError]) -> InputError:
     return InputError(first.place, first.problem, first.advice, first.words, others)
 
 
-SHORT = 2  # letters of a word of which no other is a slip
+MAX_SHORT_WORD = 2  # letters of a word of which no other is a slip
 
 
 def nearest(word: str, known: list[str]) -> str:
@@ -139,7 +139,7 @@ def nearest(word: str, known: list[str]) -> str:
     """
     from difflib import get_close_matches
 
-    plain = {one.casefold(): one for one in reversed(known) if len(one) > SHORT}
+    plain = {one.casefold(): one for one in reversed(known) if len(one) > MAX_SHORT_WORD}
     near = get_close_matches(word.casefold(), plain, n=1, cutoff=0.6)
     return plain[near[0]] if near else ""
 
@@ -152,7 +152,7 @@ def did_you_mean(word: str, known: list[str]) -> str:
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 
-MOST_NAMES = 12  # of sets that a message lists
+MAX_NAMES = 12  # of sets that a message lists
 
 
 def nearest_and_known(word: str, known: list[str]) -> str:
@@ -161,8 +161,8 @@ def nearest_and_known(word: str, known: list[str]) -> str:
     if not near.startswith("Did"):
         near = ""
     names = sorted(known)
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    listed = f"Known: {', '.join(names[:MOST_NAMES])}{more}." if names else "There is none."
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    listed = f"Known: {', '.join(names[:MAX_NAMES])}{more}." if names else "There is none."
     return f"{near} {listed}".strip()
 
 

@@ -9,7 +9,7 @@ from stickslip.arrays import FloatArray
 
 # a Newton iteration: its systems by LU, those by a Krylov method, which leaves a hundredth of the residual, and the products of one of these
 BY_ARRAY, BY_PRODUCTS, PRODUCTS = 4, 6, 8
-FEW = 500  # unknowns up to which a whole array is had without asking what it costs
+MAX_CHEAP_ARRAY = 500  # unknowns up to which a whole array is had without asking what it costs
 
 
 class JacobianOperator(Protocol):

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from stickslip.arrays import FloatArray
 from stickslip.contact.hysteresis_fit_warnings import doubts
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.loop_model import RIGID, Loop, LoopModel
+from stickslip.contact.loop_model import RIGID_STIFFNESS, Loop, LoopModel
 from stickslip.errors import input_error
 
 MIN_LOOP_SAMPLES = 8  # samples of a recording
@@ -299,7 +299,7 @@ def _least_stiffness(model: LoopModel, found: _Found) -> float:
     if math.isnan(found.limit) or not model.both_ways(found.slips):
         return math.nan
     sensor = found.fitted - found.slips * found.limit
-    low, high = model.stuck, RIGID * model.stuck
+    low, high = model.stuck, RIGID_STIFFNESS * model.stuck
     known = np.delete(np.arange(size), model.first)
     for _ in range(40):
         middle = math.sqrt(low * high)

@@ -15,7 +15,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.prescribed_gap import forces_along
 
-RIGID = 1e6  # times the force's range over that of the displacement: a spring that slips at once
+RIGID_STIFFNESS = 1e6  # times the force's range over that of the displacement: a spring that slips at once
 Loop = tuple[FloatArray, FloatArray]
 
 
@@ -75,7 +75,7 @@ class LoopModel:
         """(samples,) forces of a rigid contact with limit one: 1 if the last motion was forward, -1 if backward."""
         ahead = [np.argmax(np.diff(x) != 0.0) for x, _ in self.loops]  # the first sample that moves
         held = [np.sign(np.diff(x)[i]) for (x, _), i in zip(self.loops, ahead, strict=True)]
-        return np.sign(self.friction(RIGID * self.stuck, 1.0, held)[0])
+        return np.sign(self.friction(RIGID_STIFFNESS * self.stuck, 1.0, held)[0])
 
     def friction(
         self, stiffness: float, limit: float, held: Sequence[float] | FloatArray

@@ -9,8 +9,8 @@ from stickslip.contact.segmentation import segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
-COVERED = 1e-3  # share of side A that may stand beyond side B
-TINY = 1e-14  # weights below are rounding
+MAX_UNCOVERED = 1e-3  # share of side A that may stand beyond side B
+ROUNDING_WEIGHT = 1e-14  # weights below are rounding
 
 
 def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: BoolArray | None = None) -> Matrix:
@@ -51,7 +51,7 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: Bool
         )
     found = segment_points(a, b, reach=reach)
     whole, covered = float(lumped_areas(a.points, a.facets).sum()), float(found.weight.sum())
-    if covered < (1.0 - COVERED) * whole:
+    if covered < (1.0 - MAX_UNCOVERED) * whole:
         raise input_error(
             "segment_to_segment",
             f"{100 * (1 - covered / whole):.2g} % of side A have nothing of side B opposite to them",
@@ -69,4 +69,4 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: Bool
     weighted = (on_a[:, moves] * found.weight[:, None]).T
     weights = np.zeros((len(a.points), len(b.points)))
     weights[moves] = np.linalg.solve((weighted @ on_a[:, moves]).toarray(), (weighted @ on_b).toarray())
-    return scipy.sparse.csr_array(np.where(np.abs(weights) > TINY, weights, 0.0))
+    return scipy.sparse.csr_array(np.where(np.abs(weights) > ROUNDING_WEIGHT, weights, 0.0))

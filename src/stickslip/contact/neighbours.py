@@ -13,7 +13,7 @@ from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.structure import Structure
 
-FLAT = 1e-3  # thickness of a plane face over its width
+MAX_THICKNESS = 1e-3  # thickness of a plane face over its width
 
 Z_AXIS = Axis()
 
@@ -140,7 +140,7 @@ def _plane_normal(points: FloatArray, axis: Axis, name: str) -> FloatArray:
     """Return the unit normal of the plane through `points`, towards the next sector."""
     spread = points - points.mean(axis=0)
     size, directions = np.linalg.svd(spread, full_matrices=True)[1:]
-    if len(points) < 3 or size[1] < FLAT * size[0] or size[2] > FLAT * size[1]:
+    if len(points) < 3 or size[1] < MAX_THICKNESS * size[0] or size[2] > MAX_THICKNESS * size[1]:
         raise input_error(
             f"neighbours: {name}",
             f"its {len(points)} nodes do not lie in one plane that they define",

@@ -8,8 +8,8 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.facets import REFERENCE_NODES, centres, corner_counts, normals, positions, tangents
 from stickslip.contact.surface import Surface
 
-ROUNDS = 40  # of Gauss-Newton: linear convergence with the ratio gap / radius of curvature
-FAR = 4.0  # reference coordinates beyond this belong to a neighbour: do not follow them further
+MAX_GAUSS_NEWTON = 40  # of Gauss-Newton: linear convergence with the ratio gap / radius of curvature
+MAX_REFERENCE = 4.0  # reference coordinates beyond this belong to a neighbour: do not follow them further
 CONVERGED = 1e-12  # last step, in reference coordinates; the point itself is better than that
 INSIDE = 1e-12  # in reference coordinates
 
@@ -115,11 +115,11 @@ def closest(points: FloatArray, facets: IntArray, target: FloatArray) -> tuple[F
     Gauss-Newton on the distance; if the result lies outside the facet, the closest point of the edges.
     """
     reference = centres(facets)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_GAUSS_NEWTON):
         T = tangents(points, facets, reference)
         miss = np.einsum("pac,pc->pa", T, target - positions(points, facets, reference))
         step = _solve_two(np.einsum("pac,pbc->pab", T, T), miss)
-        moved = np.clip(reference + step, -FAR, FAR)
+        moved = np.clip(reference + step, -MAX_REFERENCE, MAX_REFERENCE)
         change = np.abs(moved - reference).max(initial=0.0)
         reference = moved
         if change < CONVERGED:
@@ -161,10 +161,10 @@ def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatAr
     """
     reference = centres(facets)
     size = np.abs(points[facets] - origin[:, None]).max(axis=(1, 2))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_GAUSS_NEWTON):
         miss = np.einsum("pac,pc->pa", axes, origin - positions(points, facets, reference))
         slope = np.einsum("pac,pbc->pab", axes, tangents(points, facets, reference))
-        moved = np.clip(reference + _solve_two(slope, miss), -FAR, FAR)
+        moved = np.clip(reference + _solve_two(slope, miss), -MAX_REFERENCE, MAX_REFERENCE)
         change = np.abs(moved - reference).max(initial=0.0)
         reference = moved
         if change < CONVERGED:
@@ -197,7 +197,7 @@ def _closest_on_edge(
     start = REFERENCE_NODES[corners][edge]
     along = REFERENCE_NODES[corners][(edge + 1) % corners] - start
     s = np.full(len(facets), 0.5)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_GAUSS_NEWTON):
         at = start + s[:, None] * along
         slope = np.einsum("a,pac->pc", along, tangents(points, facets, at))
         miss = np.einsum("pc,pc->p", slope, target - positions(points, facets, at))

@@ -5,7 +5,7 @@ factor, as on a slower machine, nothing changes: they are compared with each oth
 """
 
 from stickslip.arrays import IntArray
-from stickslip.harmonic.matrix_products import SMALL
+from stickslip.harmonic.matrix_products import MAX_SMALL_BLOCK
 from stickslip.operators import Costs
 
 # an array: a call, each entry, each entry times the unknowns
@@ -47,7 +47,7 @@ def linear_costs(coordinates: int, harmonics: int, derivatives: int, sparse: int
     unknowns = coordinates * (2 * harmonics - 1)
     if sparse:
         one, factors = CALL + SPARSE_PRODUCT * sparse, SPARSE_FACTORS * sparse / harmonics
-    elif coordinates <= SMALL:
+    elif coordinates <= MAX_SMALL_BLOCK:
         one, factors = (LOOP_ENTRY * entries, INVERSE_CALL + INVERSE_FACTOR * coordinates * entries)
     else:
         one, factors = (
@@ -87,6 +87,6 @@ def reduced_cost(coordinates: int, kept: IntArray, *, known: bool) -> float:
     if known:
         return own
     entry = RESTING_ENTRY + RESTING_FACTOR * coordinates
-    if coordinates > SMALL:
+    if coordinates > MAX_SMALL_BLOCK:
         entry += FORMED_ENTRY
     return own + kept.size * (RESTING_HARMONIC + entry * coordinates**2)

@@ -27,7 +27,7 @@ from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigi
 from stickslip.harmonic.rigid_jacobian import GapLaws, RigidJacobian, RigidLinearisation, derivative
 
 LOSS = 1e-13  # of the largest stiffness, as good as none
-LEAST = 5  # harmonics over which the mean is taken: with one alone a resonance would rule it
+MIN_MEAN_HARMONICS = 5  # harmonics over which the mean is taken: with one alone a resonance would rule it
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 
 
@@ -56,7 +56,7 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     order
         Highest harmonic of the problem.
     """
-    highest = max(order, LEAST)
+    highest = max(order, MIN_MEAN_HARMONICS)
     part = linear.condensed(omega, highest)
     h = np.arange(1, highest + 1)
     stiffness = part.stiffness[h]

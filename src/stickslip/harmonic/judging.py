@@ -23,7 +23,7 @@ from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.matrix_products import products
 from stickslip.harmonic.sparse_stiffness import SparseProduct
 
-REACH = 3  # highest harmonic of a judging set over the highest that is kept or driven
+JUDGED_MULTIPLE = 3  # highest harmonic of a judging set over the highest that is kept or driven
 HIGHEST = 63  # harmonic, in multiples of the common divisor, beyond which nothing is looked for: there a motion in time costs less
 SAMPLES_A_HARMONIC = 8  # of the contact forces at least: with fewer, aliasing may hide what acts
 # error of a solution that is not known to be exact, and that a prediction leaves as it is: `exact` is 0, and nothing else is
@@ -41,7 +41,7 @@ def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
         Harmonics of the load.
     """
     own = {*kept, *driven} - {0}
-    return tuple(range(0, REACH * max(own, default=0) + 1, gcd(*own) or 1))
+    return tuple(range(0, JUDGED_MULTIPLE * max(own, default=0) + 1, gcd(*own) or 1))
 
 
 def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
@@ -91,10 +91,10 @@ def covers(low: HarmonicBalance, high: HarmonicBalance) -> bool:
     return set(judging_set_of(low)) <= set(high.harmonics)
 
 
-MOST_RINGING = 4  # harmonics, those with the largest gaps
+MAX_RINGING = 4  # harmonics, those with the largest gaps
 FAINTEST_GAP = 1e-4  # of the vibration of the gaps, below which nothing is made of it
-MOST_ROWS = 400  # of a structure, above which its matrices are not solved with for each harmonic
-MOST_ROWS_TOGETHER = 100  # of matrices that are solved with in one call: 60 harmonics of them take 10 MB
+MAX_RINGING_ROWS = 400  # of a structure, above which its matrices are not solved with for each harmonic
+MAX_STACKED_ROWS = 100  # of matrices that are solved with in one call: 60 harmonics of them take 10 MB
 
 
 def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
@@ -115,12 +115,12 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
     Returns
     -------
     tuple of int
-        Harmonics; empty for a structure with more than `MOST_ROWS` retained coordinates.
+        Harmonics; empty for a structure with more than `MAX_RINGING_ROWS` retained coordinates.
     """
     judged, most = judging_set_of(low), low.linear.most
     step = judged[1] if len(judged) > 1 else 1
     top = step * HIGHEST if most is None else min(step * HIGHEST, most)
-    if low.linear.n > MOST_ROWS or top <= judged[-1]:
+    if low.linear.n > MAX_RINGING_ROWS or top <= judged[-1]:
         return ()
     beyond = tuple(range(judged[-1], top + 1, step))
     enough = replace(low, samples=max(low.samples, SAMPLES_A_HARMONIC * top))
@@ -134,10 +134,10 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
 
 
 def loudest(harmonics: Harmonics, sizes: FloatArray) -> Harmonics:
-    """Return the harmonics at which `sizes` have a local maximum, at most `MOST_RINGING` of them, ascending."""
+    """Return the harmonics at which `sizes` have a local maximum, at most `MAX_RINGING` of them, ascending."""
     before, after = sizes[:-1], np.append(sizes[2:], 0.0)
     tops = 1 + np.flatnonzero((sizes[1:] > before) & (sizes[1:] >= after) & (sizes[1:] > FAINTEST_GAP))
-    chosen = tops[np.argsort(-sizes[tops])][:MOST_RINGING]
+    chosen = tops[np.argsort(-sizes[tops])][:MAX_RINGING]
     return tuple(sorted(harmonics[i] for i in chosen))
 
 
@@ -150,7 +150,7 @@ def _gaps_of_each(
     parts = np.zeros((2 * count, low.linear.n))
     rows.add_forces(np.concatenate([own.real, own.imag]), parts)
     pushed = parts[:count] + 1j * parts[count:]
-    if low.linear.n <= MOST_ROWS_TOGETHER and not isinstance(side, SparseProduct):
+    if low.linear.n <= MAX_STACKED_ROWS and not isinstance(side, SparseProduct):
         contacts = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
         moved = _solved_together(np.array([side.block(h) for h in harmonics]) + contacts, pushed)
     else:

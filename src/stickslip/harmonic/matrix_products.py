@@ -19,7 +19,7 @@ from stickslip.harmonic.harmonic_set import Harmonics, is_full
 from stickslip.harmonic.linear import DynamicStiffness, Products, StiffnessProducts
 from stickslip.harmonic.spectral import Blocks
 
-SMALL = 96  # unknowns a harmonic up to which this is faster than LAPACK and BLAS for each
+MAX_SMALL_BLOCK = 96  # unknowns a harmonic up to which this is faster than LAPACK and BLAS for each
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def matrices(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Ma
 def products(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Products:
     """Return the linear side at one frequency by its products."""
     # small matrices are all formed sooner or later, and cost less at once
-    if isinstance(linear, CondensedStiffness) and linear.n <= SMALL:
+    if isinstance(linear, CondensedStiffness) and linear.n <= MAX_SMALL_BLOCK:
         return matrices(linear, harmonics, omega)
     return linear.products(omega, harmonics)
 

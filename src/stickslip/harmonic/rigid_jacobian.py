@@ -15,7 +15,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.product import harmonic_means
 from stickslip.harmonic.costs import CALL, linear_costs
 from stickslip.harmonic.factors import AnyFactors, factorise
-from stickslip.harmonic.matrix_products import SMALL
+from stickslip.harmonic.matrix_products import MAX_SMALL_BLOCK
 from stickslip.harmonic.structured import StructuredJacobian, Transposed
 from stickslip.operators import Costs
 
@@ -202,7 +202,7 @@ class RigidJacobian:
                 return None
             factors.append(made)
         inverses = None
-        if self.soft.linear.n <= SMALL:
+        if self.soft.linear.n <= MAX_SMALL_BLOCK:
             unit = np.eye(self.soft.linear.n, dtype=complex)
             inverses = np.array([one.solve(unit) for one in factors])
         return RigidFactors(tuple(factors), np.array(rows), inverses)

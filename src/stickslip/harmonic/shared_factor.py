@@ -24,11 +24,11 @@ from stickslip.harmonic.linear import Shareable
 
 Solve = Callable[[FloatArray | ComplexArray], FloatArray | ComplexArray]
 LEAST_MODES = 24
-REACH = 1.2  # times the highest harmonic's frequency up to which modes are wanted ...
-INNER = 0.75  # ... among this share of them: the last ones are not sharp
-MOST_MODES = 4  # coordinates for each mode at least
-ROUNDS = 4  # of the subspace iteration for the modes
-SHARP = 0.01  # residual that single precision may leave of a random right side
+MODE_RANGE = 1.2  # times the highest harmonic's frequency up to which modes are wanted ...
+SHARP_MODE_SHARE = 0.75  # ... among this share of them: the last ones are not sharp
+MIN_COORDINATES_PER_MODE = 4  # coordinates for each mode at least
+SUBSPACE_ITERATIONS = 4  # of the subspace iteration for the modes
+MAX_SINGLE_RESIDUAL = 0.01  # residual that single precision may leave of a random right side
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ def shared_factor(linear: Shareable, means: ComplexArray, rows: SparseRows, scal
         right = np.random.default_rng(1).standard_normal(linear.n)
         high = right - weighted @ (modes.T @ right)
         left = matrix @ _in_its_precision(factor, factor.solve, high) - high
-        if np.linalg.norm(left) <= SHARP * np.linalg.norm(high):
+        if np.linalg.norm(left) <= MAX_SINGLE_RESIDUAL * np.linalg.norm(high):
             count = modes.shape[1]
             gaps = rows.gaps(modes.T.copy()).reshape(count, -1, 3).transpose(1, 2, 0)
             projected = linear.projected(modes)
@@ -149,15 +149,15 @@ def _copied(matrix: Matrix, single: bool) -> Matrix:
 
 def _enough_modes(linear: Shareable, factor: AnyFactors, scale: float) -> tuple[FloatArray, FloatArray] | None:
     """Return low modes beyond the highest harmonic, and M times them; None if that takes too many, or more than the mass has."""
-    wanted = scale * (REACH * linear.harmonics[-1] * linear.omega) ** 2
-    most = linear.n // MOST_MODES
+    wanted = scale * (MODE_RANGE * linear.harmonics[-1] * linear.omega) ** 2
+    most = linear.n // MIN_COORDINATES_PER_MODE
     count = min(LEAST_MODES, most)
     while True:
         found = _low_modes(linear, factor, count)
         if found is None:
             return None
         sizes, modes, weighted = found
-        if sizes[int(INNER * (count - 1))] >= wanted:
+        if sizes[int(SHARP_MODE_SHARE * (count - 1))] >= wanted:
             return modes, weighted
         if count == most:
             return None
@@ -171,7 +171,7 @@ def _low_modes(linear: Shareable, factor: AnyFactors, count: int) -> tuple[Float
     """
     weighted: FloatArray = np.random.default_rng(0).standard_normal((linear.n, count))
     sizes, modes = np.zeros(count), weighted
-    for _ in range(ROUNDS):
+    for _ in range(SUBSPACE_ITERATIONS):
         modes = _in_its_precision(factor, factor.solve, weighted)
         stiffness = modes.T @ weighted
         weighted = linear.mass_product(modes)

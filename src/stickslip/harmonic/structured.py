@@ -28,7 +28,13 @@ from stickslip.contact.product import (
 from stickslip.harmonic.costs import linear_costs, reduced_cost
 from stickslip.harmonic.factors import AnyFactors, as_array, factorise, real_part, with_contacts
 from stickslip.harmonic.linear import Shareable, StiffnessProducts
-from stickslip.harmonic.matrix_products import SMALL, MatrixProducts, SmallBlocks, dynamic_stiffness, small_blocks
+from stickslip.harmonic.matrix_products import (
+    MAX_SMALL_BLOCK,
+    MatrixProducts,
+    SmallBlocks,
+    dynamic_stiffness,
+    small_blocks,
+)
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses, shared_factor
 from stickslip.harmonic.sparse_stiffness import SparseProduct
 from stickslip.harmonic.stuck_contact_elimination import Coupling, Resting, TransposedElimination, coupling, known
@@ -116,7 +122,7 @@ class StructuredJacobian:
     def matvec(self, v: FloatArray) -> FloatArray:
         """Return ``J v``."""
         q = self._by_row(v)
-        small = self.linear.n <= SMALL
+        small = self.linear.n <= MAX_SMALL_BLOCK
         moved = dynamic_stiffness(self.linear).product(q) if small else self.linear.product(q)
         return self.scale * self._add_contacts(self.blocks, q, False, moved)
 
@@ -198,7 +204,7 @@ class StructuredJacobian:
             means.append(mean)
             factors.append(own)
         inverses = None
-        if self.linear.n <= SMALL:
+        if self.linear.n <= MAX_SMALL_BLOCK:
             unit = np.eye(self.linear.n, dtype=complex)
             inverses = small_blocks([np.asarray(own.solve(unit), dtype=complex) for own in factors])
         return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)

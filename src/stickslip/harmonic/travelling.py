@@ -30,7 +30,7 @@ from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.tuned import TunedWheel
 
-LARGE = 300  # dofs from which the eigenproblem of the interior takes much longer than reading the matrices
+MIN_CACHED_DOFS = 300  # dofs from which the eigenproblem of the interior takes much longer than reading the matrices
 
 _last: "WeakKeyDictionary[Structure, tuple[bytes, CondensedStiffness]]" = WeakKeyDictionary()
 
@@ -40,7 +40,7 @@ def condensed_once(structure: Structure, retained: IntArray, load: HarmonicLoad)
 
     A hash of the contents detects matrices that were changed in place.
     """
-    if structure.n < LARGE or load.static.size != structure.n:
+    if structure.n < MIN_CACHED_DOFS or load.static.size != structure.n:
         return condense(structure, retained, load)
     contents = _contents(structure, retained)
     known = _last.get(structure)

@@ -24,7 +24,7 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath, half_plane, torus_basis, torus_rates
 from stickslip.harmonic.two_frequency_side import TorusSide
 
-MOST_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
+MAX_DENSE_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,10 +302,10 @@ def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBal
         raise input_error("quasi_periodic", "nothing acts on the model", "Give a load.")
     indices = half_plane(order)
     unknowns = (2 * len(indices) - 1) * side.n
-    if unknowns > MOST_UNKNOWNS:
+    if unknowns > MAX_DENSE_UNKNOWNS:
         raise input_error(
             "quasi_periodic.harmonics",
-            f"{order} make {unknowns} unknowns of {side.n} coordinates, more than {MOST_UNKNOWNS}",
+            f"{order} make {unknowns} unknowns of {side.n} coordinates, more than {MAX_DENSE_UNKNOWNS}",
             "Keep fewer, or reduce the contacts.",
         )
     compiled = local.compiled("march")

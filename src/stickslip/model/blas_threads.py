@@ -20,7 +20,7 @@ SAID = any(name in os.environ for name in BLAS_THREADS)  # by the user: what com
 # where the wheels of NumPy and SciPy keep OpenBLAS, and what they call its functions
 FOLDERS = ("{0}.libs", "{0}/.dylibs")
 NAMES = ("scipy_openblas_{0}_num_threads64_", "scipy_openblas_{0}_num_threads")
-LARGE = 1500  # rows of a dense matrix whose factors pay for the threads
+MIN_THREADED_ROWS = 1500  # rows of a dense matrix whose factors pay for the threads
 
 Counts = list[tuple[Callable[[], int], Callable[[int], Any]]]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -98,7 +98,7 @@ def one_loaded_blas_thread(*, strict: bool = True) -> Iterator[None]:
 @contextmanager
 def threads_for(rows: int) -> Iterator[None]:
     """Give BLAS all threads again, despite `by_one_thread`, while a large dense matrix with `rows` rows is factorised."""
-    if rows < LARGE or not _BLOCKS.count or _BLOCKS.strict:
+    if rows < MIN_THREADED_ROWS or not _BLOCKS.count or _BLOCKS.strict:
         yield
         return
     _BLOCKS.put()

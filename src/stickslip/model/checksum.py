@@ -7,7 +7,7 @@ from typing import IO
 
 MARK = b"\nstickslip: sha256 of all before: "
 LENGTH = len(MARK) + 2 * sha256().digest_size  # bytes of mark and sum
-LEFT = 8  # bytes of a mark that was cut off by which it is known; shorter ends may be the content's own
+MIN_MARK_BYTES = 8  # bytes of a mark that was cut off by which it is known; shorter ends may be the content's own
 
 
 class Cut(ValueError):  # noqa: N818  it tells what has happened
@@ -63,7 +63,7 @@ def _checked(stream: IO[bytes], size: int, *, required: bool) -> int:
     stream.seek(max(size - LENGTH, 0))
     end = stream.read(LENGTH)
     at = end.rfind(MARK)
-    if at > 0 or any(end.endswith(MARK[:n]) for n in range(LEFT, len(MARK) + 1)):
+    if at > 0 or any(end.endswith(MARK[:n]) for n in range(MIN_MARK_BYTES, len(MARK) + 1)):
         raise Cut("was cut off within the checksum at its end")
     if at == 0:
         stream.seek(0)

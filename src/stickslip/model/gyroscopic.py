@@ -15,8 +15,8 @@ from stickslip.model.modes import Factors, connected_parts, lowest_modes, normal
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
-SPARE = 10  # modes beyond twice as many as are asked for
-RIGID = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
+SPARE_MODES = 10  # modes beyond twice as many as are asked for
+RIGID_SQUARE = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
 STILL = 1e-9  # of the fastest rate: a smaller frequency is that of a motion that creeps, whatever its rounding
 KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
 
@@ -70,7 +70,7 @@ def gyroscopic_modes(
         If more modes are requested than there are dofs, or vectors in the basis.
     """
     movable = int(np.count_nonzero(structure.mass.diagonal()))
-    n_basis = min(2 * n_modes + SPARE if n_basis is None else n_basis, movable)
+    n_basis = min(2 * n_modes + SPARE_MODES if n_basis is None else n_basis, movable)
     if not 0 < n_modes <= n_basis:
         raise input_error(
             "gyroscopic_modes",
@@ -135,4 +135,4 @@ def _enriched(
     basis = np.linalg.qr(np.hstack(columns))[0]
     squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
     # a rigid motion has no strain, but for rounding
-    return np.where(squares < -RIGID * squares[-1], squares, np.maximum(squares, 0.0)), basis @ vectors
+    return np.where(squares < -RIGID_SQUARE * squares[-1], squares, np.maximum(squares, 0.0)), basis @ vectors

@@ -17,9 +17,9 @@ from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
-RIGID = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
+RIGID_STRAIN = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
 FAR = 1e4  # so many times the mean K_ii / M_ii below zero there are no squares
-ABSURD = 1e100  # entries of matrices above, or below its inverse, are no numbers of a model
+LARGEST_ENTRY = 1e100  # entries of matrices above, or below its inverse, are no numbers of a model
 INDEFINITE = 1e-9  # of the largest eigenvalue of a mass matrix: negative ones beyond are no rounding
 SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
@@ -85,7 +85,7 @@ def normal_modes(
     Notes
     -----
     The signs of the pivots of ``K − shift M`` count the squares below the shift, so that none is missed. SuperLU's factors
-    with more than `COUNTED` entries are not examined: then modes with negative squares are found only if they are
+    with more than `MAX_COUNTED_ENTRIES` entries are not examined: then modes with negative squares are found only if they are
     nearer to the shift than the n-th mode; give a shift below them.
     """
     _check_count("normal_modes", structure, n)
@@ -108,7 +108,7 @@ def normal_modes(
         if solve is not None:
             found = values, vectors
             values, vectors = _with_missed(K, M, found, (start, solve), mean, factorised)
-        values[_strain_share(K, vectors) < RIGID] = 0.0
+        values[_strain_share(K, vectors) < RIGID_STRAIN] = 0.0
         whole = np.zeros((structure.n, count), dtype=vectors.dtype)
         whole[part] = vectors
         squares.append(values)
@@ -257,7 +257,7 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
         matrix = getattr(structure, name)
         largest = float(abs(matrix).max()) if structure.n else 1.0
         unstrained = name == "stiffness" and largest == 0.0  # bodies that contacts alone hold
-        if not (1 / ABSURD < largest < ABSURD or unstrained):
+        if not (1 / LARGEST_ENTRY < largest < LARGEST_ENTRY or unstrained):
             raise input_error(
                 f"{place}: {name}",
                 f"has entries up to {largest:.3g}, which no model has",
@@ -272,7 +272,7 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
             "A mass matrix is positive definite: check its source.",
         )
     least = np.where(diagonal > 0, diagonal, np.inf)
-    if structure.n and np.min(least) < 1 / ABSURD:
+    if structure.n and np.min(least) < 1 / LARGEST_ENTRY:
         dof = int(np.argmin(least))
         raise input_error(
             f"{place}: mass",

@@ -18,7 +18,7 @@ from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import BLOCK
 
-RIGID = 1e-4  # of the shift: squares of frequencies below are zero but for rounding
+RIGID_SQUARE = 1e-4  # of the shift: squares of frequencies below are zero but for rounding
 FIRST_GUESS = 16  # modes tried first where a frequency limits them
 
 
@@ -150,7 +150,7 @@ def _modes(body: Body, count: int, say: Say) -> tuple[FloatArray, Matrix]:
         return np.zeros(0), np.zeros((body.dofs.size, 0))
     say(f"{count} modes of {body.dofs.size} dofs")
     squares, shapes = lowest_modes(body.stiffness, body.mass, count, body.solve, body.shift)
-    return np.where(np.abs(squares) < -RIGID * body.shift, 0.0, squares), shapes
+    return np.where(np.abs(squares) < -RIGID_SQUARE * body.shift, 0.0, squares), shapes
 
 
 def _sorted(found: Sequence[tuple[FloatArray, Matrix]]) -> BodyModes:

@@ -24,7 +24,7 @@ from stickslip.reduction.waves import wave
 from stickslip.units import HZ
 
 DEPENDENT = 1e-10  # of the largest eigenvalue of the constraints' Gram matrix: smaller ones say what others say
-RIGID = 1e-6  # of the shift: squares below are those of rigid motions, but for rounding
+RIGID_SQUARE = 1e-6  # of the shift: squares below are those of rigid motions, but for rounding
 
 Wave = tuple[str, int]  # stage and wave number
 
@@ -328,7 +328,7 @@ class _Problem:
 
         say(f"{n} modes of {size} dofs")
         squares, vectors = lanczos(self.mass, n, solve, self.shift, complex)
-        return np.where(np.abs(squares) < RIGID * abs(self.shift), 0.0, squares), vectors
+        return np.where(np.abs(squares) < RIGID_SQUARE * abs(self.shift), 0.0, squares), vectors
 
     def _dense(self, rows: ComplexArray, n: int) -> tuple[FloatArray, ComplexArray]:
         basis = scipy.linalg.null_space(rows) if len(rows) else np.eye(self.mass.shape[0])

@@ -19,7 +19,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates, surviving_sets, with_modal_dofs
 from stickslip.reduction.choice import Reduction
 
-SPARE = 8  # modes at each speed beyond those followed
+SPARE_MODES = 8  # modes at each speed beyond those followed
 DEPENDENT = 1e-10  # eigenvalues of the Gram matrix below are directions that the basis has already
 
 
@@ -75,7 +75,7 @@ def speed_basis(
     # in the middle of the squares, on which the stiffness depends
     speeds = np.array([low, np.sqrt((low**2 + high**2) / 2), high])
     family = [structure_at(float(s)) for s in speeds]
-    count = min(n_modes + SPARE, int(np.count_nonzero(family[0].mass.diagonal())))
+    count = min(n_modes + SPARE_MODES, int(np.count_nonzero(family[0].mass.diagonal())))
 
     def modes(structure: Structure) -> tuple[FloatArray, Matrix]:
         found = (gyroscopic_modes if coriolis else normal_modes)(structure, count)
@@ -106,7 +106,7 @@ def _orthonormal(vectors: Matrix, mass: Matrix) -> ComplexArray:
     return np.asarray((columns / scale) @ (directions[:, kept] / np.sqrt(squares[kept])))
 
 
-COMMON = 0.7  # cosine of the angle between what modes of two states span, above which they are the same ones
+MIN_COMMON_COSINE = 0.7  # cosine of the angle between what modes of two states span, above which they are the same ones
 
 
 class ModesExchangedError(ValueError):
@@ -152,7 +152,7 @@ def on_modes_of_others(
     (other,) = others
     sizes = [np.linalg.norm(_in_mass(m, structure.mass, m), 2) ** 0.5 for m in (modes, other)]
     left, common, right = np.linalg.svd(_in_mass(modes, structure.mass, other))
-    if modes.shape != other.shape or common.min(initial=np.inf) < COMMON * sizes[0] * sizes[1]:
+    if modes.shape != other.shape or common.min(initial=np.inf) < MIN_COMMON_COSINE * sizes[0] * sizes[1]:
         raise ModesExchangedError
     turn = np.eye(small.n, dtype=np.result_type(left, right))
     turn[len(keep) :, len(keep) :] = left @ right

@@ -14,7 +14,7 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, loose_bodies
 
-REACH = 2.0  # frequencies that a poor reduction puts so far above the limit are looked at, too
+SEARCH_FACTOR = 2.0  # frequencies that a poor reduction puts so far above the limit are looked at, too
 
 SEEN = 3  # estimates from which the rate is taken
 FIRST_ORDER = 0.1  # estimates above are a warning, not a number
@@ -171,7 +171,7 @@ def errors_of(
         Number of the structure's frequencies below `up_to_hz`, if known.
     """
     modes = normal_modes(reduced, int(np.count_nonzero(reduced.mass.diagonal())))
-    below: BoolArray = modes.frequencies_hz <= REACH * up_to_hz
+    below: BoolArray = modes.frequencies_hz <= SEARCH_FACTOR * up_to_hz
     squares = modes.squares[below]
     shapes = basis @ modes.shapes[:, below]
     residual = structure.stiffness @ shapes - (structure.mass @ shapes) * squares

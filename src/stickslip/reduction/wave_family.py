@@ -22,7 +22,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import is_hermitian
 from stickslip.reduction.waves import wave
 
-LARGE = 20_000  # dofs below which a wave is factorised by itself: it takes a second
+MIN_SHARED_DOFS = 20_000  # dofs below which a wave is factorised by itself: it takes a second
 ROUNDING_OF_TERMS = 1e-12  # of the terms of an entry: a smaller difference is rounding
 ALIKE = 1e-14  # of the diagonal: the same of sums of entries
 
@@ -194,7 +194,7 @@ class WaveFamily:
 
     def shifted(self, wave_number: int, structure: Structure) -> tuple[float | None, Factors | None]:
         """Return the common shift of all waves and the function that factorises ``K − shift M`` of one; None where a wave is better factorised alone."""
-        if structure.n <= LARGE or len(self.numbers) < 2 or self._shared is None:
+        if structure.n <= MIN_SHARED_DOFS or len(self.numbers) < 2 or self._shared is None:
             return None, None
         shift, shared = self._shared
 

@@ -10,7 +10,7 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.engine_order_line import condensed
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, full_structure, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.modes import with_springs
@@ -98,7 +98,7 @@ class System:
         On a wheel it includes the waves of the judging set, where the wheel has them.
         """
         side, retained = self.structure, np.union1d(self.retained, more)
-        order = max(order, min(REACH * order, side.harmonics or 0))
+        order = max(order, min(JUDGED_MULTIPLE * order, side.harmonics or 0))
         return condensed(side, retained, load, order)
 
     @property

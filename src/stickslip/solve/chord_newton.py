@@ -21,9 +21,9 @@ from stickslip.solve.linear import Dense, LinearSolver, Signed, factorised, fact
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
-SMALLER = 0.5  # part of a correction that the next one by the same factors may be
+MAX_CORRECTION_RATIO = 0.5  # part of a correction that the next one by the same factors may be
 MAX_CHORD_STEPS = 7  # corrections by the same factors
-REFUSED = 2  # trials of one correction after which something else is tried
+MAX_REFUSED_TRIALS = 2  # trials of one correction after which something else is tried
 
 
 class KeptFactors:
@@ -72,7 +72,7 @@ class KeptFactors:
         if solve is None or step is None:
             return Status.SINGULAR
         share = 1.0
-        while work.rejected <= REFUSED:
+        while work.rejected <= MAX_REFUSED_TRIALS:
             trial = work.at(now.x + share * step)
             if trial.norm <= (1.0 - 1e-4 * share) * max(self._norms):
                 return self._corrected(work, solve, step, trial) if share == 1.0 else trial
@@ -93,10 +93,10 @@ class KeptFactors:
                 step = step + after * (one @ step) / (one @ one)
             last = steps[-1]
             along = (last @ step) / (last @ last)
-            if along >= SMALLER:
+            if along >= MAX_CORRECTION_RATIO:
                 break
             step = step / (1.0 - along)
-            if np.linalg.norm(step) > SMALLER * np.linalg.norm(last):
+            if np.linalg.norm(step) > MAX_CORRECTION_RATIO * np.linalg.norm(last):
                 break
             steps.append(step)
             here = work.at(here.x + step)

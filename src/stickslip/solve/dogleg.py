@@ -13,7 +13,7 @@ from stickslip.solve.status import Status
 ACCEPT = 1e-4  # share of the predicted decrease below which a step is refused
 POOR, GOOD = 0.25, 0.75  # shares at which the region shrinks and grows
 TRIALS = 12  # in one region after the other, each a tenth to a half of the last
-FLAT = 1e-13  # cosine between residual and columns below which the residual has a minimum
+STATIONARY_COSINE = 1e-13  # cosine between residual and columns below which the residual has a minimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
     slope = times(now.at.jac, gradient / scale)  # before the factorisation overwrites the Jacobian
     newton = work.newton_step(now)
     steep = float(np.linalg.norm(gradient))
-    if steep <= FLAT * float(np.linalg.norm(residual)) or not np.any(slope):
+    if steep <= STATIONARY_COSINE * float(np.linalg.norm(residual)) or not np.any(slope):
         if newton is None:
             return None
         # nearly singular: the gradient is rounding, the Newton step is not

@@ -17,15 +17,15 @@ Evaluate = Callable[[FloatArray], Evaluation]
 EvaluateAt = Callable[[float], Evaluate]
 
 STEPS_A_POINT = 300  # Newton steps at one value of the parameter, whatever is tried there,
-SMALL = 60  # with so many unknowns; with more in proportion,
-MOST_TIMES = 5.0  # up to so many times as many
+SMALL_UNKNOWNS = 60  # with so many unknowns; with more in proportion,
+MAX_BUDGET_FACTOR = 5.0  # up to so many times as many
 PATIENCE = 15  # iterations of a corrector that has no neighbour to start from
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
 ITERATIONS = 6  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
 ROUGH = 1e-5  # scaled residual along a homotopy, whose points are no solutions of anything wanted
 ROOTLESS = 200  # points of the homotopy that needs no physics and may lead nowhere
 DIFFERENCE = 1e-6  # change of s for the derivative of a family by s
-BEYOND = 1e-9  # how far outside 0..1 rounding may carry s
+MAX_OVERSHOOT = 1e-9  # how far outside 0..1 rounding may carry s
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Homotopy:
 
 def steps_at_most(unknowns: int, share: float = 1.0) -> int:
     """Return the limit of Newton steps of all attempts at one parameter value: `share` times 300 up to 60 unknowns, more for more unknowns."""
-    return int(share * STEPS_A_POINT * min(max(unknowns / SMALL, 1.0), MOST_TIMES))
+    return int(share * STEPS_A_POINT * min(max(unknowns / SMALL_UNKNOWNS, 1.0), MAX_BUDGET_FACTOR))
 
 
 def solve_robustly(
@@ -189,7 +189,7 @@ class ByDifference:
         aside = s + DIFFERENCE if s < 0.5 else s - DIFFERENCE
         other = self.family(aside)(x)
         slope = (other.residual - at.residual) / (aside - s)
-        residual = at.residual if abs(p - s) <= BEYOND else np.full_like(at.residual, np.nan)
+        residual = at.residual if abs(p - s) <= MAX_OVERSHOOT else np.full_like(at.residual, np.nan)
         return _At(residual, at.jac, slope, at.seconds_contact + other.seconds_contact)
 
 

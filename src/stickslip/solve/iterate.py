@@ -14,11 +14,11 @@ from stickslip.solve.linear import LinearSolver, solve_with, whole_array
 from stickslip.solve.status import Status
 
 EPS = float(np.finfo(float).eps)
-LAST = 4.0  # digits that are changed, in units of the last
+PROBED_ULPS = 4.0  # digits that are changed, in units of the last
 PROBES = 6  # changes of the last digits that are tried
 ROUNDING = 2.0  # times the largest change they make, which is still rounding
 FAR = 1e3  # times that change, which is not asked for again until the residual has fallen to a tenth
-COARSEST = 1e-4  # residual that is not called rounding, whatever the last digits do
+MAX_ROUNDING_RESIDUAL = 1e-4  # residual that is not called rounding, whatever the last digits do
 
 
 class Evaluation(Protocol):
@@ -75,7 +75,7 @@ class Work:
         The last digits of the unknowns are changed at random, which changes the residual: by the stiffness of a contact times the rounding of a
         gap, where that exceeds the tolerance. No step can make the residual smaller than that.
         """
-        if not now.norm <= COARSEST:
+        if not now.norm <= MAX_ROUNDING_RESIDUAL:
             return False
         if now.norm > max(0.1 * self.probed, FAR * self.noise):  # asked not long ago, and far from it
             return False
@@ -84,7 +84,7 @@ class Work:
         for _ in range(PROBES):
             if now.norm <= ROUNDING * self.noise:
                 break
-            beside = now.x * (1.0 + EPS * digits.uniform(-LAST, LAST, now.x.size))
+            beside = now.x * (1.0 + EPS * digits.uniform(-PROBED_ULPS, PROBED_ULPS, now.x.size))
             change = float(np.max(np.abs(self.at(beside).at.residual - now.at.residual)))
             self.noise = max(self.noise, change)
         return now.norm <= ROUNDING * self.noise

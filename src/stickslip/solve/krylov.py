@@ -21,12 +21,12 @@ from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Assembling, De
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
-WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
-YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
+MAX_ITERATION_GROWTH = 2.0  # growth of the iterations at which a preconditioner is made anew ...
+MIN_WORN_ITERATIONS = 12  # ... though not below that many iterations, which cost less than new factors
 GAIN = 0.1  # share of the residual of a bordered system above which another correction does not help
 CREDIT = 4.0  # arrays that systems which were cheap by products pay for
 PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first time, and at most
-LEAST = 8  # products that are tried
+MIN_PRODUCTS = 8  # products that are tried
 COARSE = 1e-4  # tolerance above which rounding is no part of what is left
 ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
 
@@ -97,7 +97,7 @@ class _Kept:
         """Take down what a system took: the first one says what is usual."""
         digits = -np.log10(tolerance)
         self.rate = self.rate or products / digits
-        self.worn = products > max(WORN * self.rate * digits, YOUNG)
+        self.worn = products > max(MAX_ITERATION_GROWTH * self.rate * digits, MIN_WORN_ITERATIONS)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -359,7 +359,7 @@ class Automatic:
         counts, before = self.krylov.counts, replace(self.krylov.counts)
         krylov = self.krylov
         if within:  # as long as it is worth it: there is another way
-            worth = max(int(costs.array / costs.product), LEAST)
+            worth = max(int(costs.array / costs.product), MIN_PRODUCTS)
             krylov = replace(krylov, max_products=min(krylov.max_products, worth), lenient=False)
         found = by(krylov, jac)
         products = counts.products - before.products

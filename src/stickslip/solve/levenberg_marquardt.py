@@ -12,10 +12,10 @@ from stickslip.solve.linear import whole_array
 from stickslip.solve.status import Status
 
 FIRST = 1e-3  # damping of the first step, as a share of the squared columns
-LEAST = 1e-14  # smallest damping: below, rounding decides
+MIN_DAMPING = 1e-14  # smallest damping: below, rounding decides
 ACCEPT = 1e-4  # share of the predicted decrease below which a step is refused
 TRIALS = 10  # dampings tried at one iterate; each grows faster than the last
-FLAT = 1e-13  # cosine between residual and columns below which the residual has a minimum
+STATIONARY_COSINE = 1e-13  # cosine between residual and columns below which the residual has a minimum
 ITERATIVE = 1e-4  # relative accuracy of a step found by products only
 
 
@@ -39,11 +39,11 @@ class LevenbergMarquardt:
         scale = self._scale = column_scale(jac, self._scale)
         size = float(np.linalg.norm(residual))
         self._first = self._first or size
-        if np.linalg.norm(transposed_times(jac, residual) / scale) <= FLAT * size:
+        if np.linalg.norm(transposed_times(jac, residual) / scale) <= STATIONARY_COSINE * size:
             return Status.LOCAL_MINIMUM
         trial = None
         for _ in range(TRIALS):
-            damping = max(self._damping * size / self._first, LEAST)
+            damping = max(self._damping * size / self._first, MIN_DAMPING)
             step = work.timed(lambda d=damping: damped_step(jac, -residual, scale, d))  # type: ignore[misc]
             trial = None if step is None else self._trial(work, now, step)
             if trial is not None:
@@ -52,7 +52,7 @@ class LevenbergMarquardt:
             self._growth *= 2.0
         if trial is not None and not slow(trial, now):
             return trial
-        step = work.timed(lambda: damped_step(jac, -residual, scale, LEAST))
+        step = work.timed(lambda: damped_step(jac, -residual, scale, MIN_DAMPING))
         beyond = Status.STALLED if step is None else self._kinks.cross(work, now, step)
         if isinstance(beyond, Status):
             return trial or beyond
@@ -72,7 +72,7 @@ class LevenbergMarquardt:
             work.rejected += 1
             return None
         eased = max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
-        self._damping = max(self._damping * eased, LEAST)
+        self._damping = max(self._damping * eased, MIN_DAMPING)
         self._growth = 2.0
         return trial
 

@@ -14,13 +14,13 @@ SHARES = tuple(0.5**k for k in range(31))  # of a Newton step, longest first
 CREEP = 1.01  # by how much the residual may grow on the far side of a kink
 MAX_CREEP_SHARE = 1.0 / 64.0  # share of a Newton step from which on that is allowed
 MAX_IDLE_CROSSINGS = 10  # crossings in a row without a smaller residual than any before
-SLOW = 0.9  # share of the residual left by a step that hardly helped: usually one that ends at a kink
+SLOW_REDUCTION = 0.9  # share of the residual left by a step that hardly helped: usually one that ends at a kink
 
 
 def slow(after: Iterate, before: Iterate) -> bool:
     """Whether a step hardly reduced the residual."""
     left = np.linalg.norm(after.at.residual) / np.linalg.norm(before.at.residual)
-    return bool(left > SLOW)
+    return bool(left > SLOW_REDUCTION)
 
 
 class Kinks:

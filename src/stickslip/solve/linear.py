@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.operators import (
-    FEW,
+    MAX_CHEAP_ARRAY,
     Bordered,
     Corner,
     Costs,
@@ -226,7 +226,7 @@ def assembled(jac: Jacobian) -> FloatArray | None:
 def whole_array(jac: Jacobian) -> FloatArray | None:
     """Return a Jacobian as an array if it is one, or known by its products and small; None otherwise."""
     array = array_of(jac)
-    return assembled(jac) if array is None and jac.shape[0] <= FEW else array
+    return assembled(jac) if array is None and jac.shape[0] <= MAX_CHEAP_ARRAY else array
 
 
 def is_factorised(jac: Jacobian) -> bool:

@@ -24,7 +24,7 @@ GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {
     "levenberg_marquardt": LevenbergMarquardt,
 }
 
-SLOW = 0.1  # share of the residual left by a step after which it may be rounding
+ROUNDING_REDUCTION = 0.1  # share of the residual left by a step after which it may be rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +140,7 @@ def newton(
         iterations += 1
         best = now if now.norm < best.norm else best
         status = _ended(now, iterations, options)
-        if status is None and now.norm > SLOW * before and work.rounded(best):
+        if status is None and now.norm > ROUNDING_REDUCTION * before and work.rounded(best):
             status = Status.CONVERGED
     if not status.converged and work.rounded(best):
         status = Status.CONVERGED

@@ -14,7 +14,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import InputError, input_error
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.all_motions.basins import not_marched
 from stickslip.response.all_motions.options import MotionSearch, search_problem
@@ -60,7 +60,7 @@ def question_of(case: Case, model: Model) -> Question:
     """
     asked: AllMotionsTable = case.settings.all_motions
     refuse_whole("all_motions", model)
-    assembled = peak_first(assemble(model, REACH * asked.harmonics, case.store))
+    assembled = peak_first(assemble(model, JUDGED_MULTIPLE * asked.harmonics, case.store))
     if not any(np.any(f) for f in assembled.load.harmonics.values()):
         raise input_error(
             "all_motions",

@@ -9,7 +9,7 @@ from stickslip.analyses.forced_response.problem import MORE_THAN_LOW, Question
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import Harmonics, named
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.verification import check_support
 from stickslip.study.file.harmonics import HIGHEST
@@ -115,7 +115,7 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
     high = question.sweep.high_harmonics
     low = always_kept(question.problem.strategy) == "low"
     only = question.sweep.low_harmonics if low else None
-    doubt = ReferenceDoubt(REACH * high[-1], high, question.limit, errors, only=only)
+    doubt = ReferenceDoubt(JUDGED_MULTIPLE * high[-1], high, question.limit, errors, only=only)
     if not checks:
         return doubt
     worst = max(checks, key=lambda c: c.error)

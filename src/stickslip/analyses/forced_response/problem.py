@@ -24,7 +24,7 @@ from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import is_full, named
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
@@ -277,7 +277,7 @@ def question_of(case: Case, model: Model) -> Question:
     _refuse_for_rigid(model, sweep, case.checks)
     check_limits(settings.limits, estimate(model, sweep))
     # solutions are judged towards up to three times the harmonics that are kept
-    harmonics = REACH * sweep.high_harmonics[-1]
+    harmonics = JUDGED_MULTIPLE * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
     assembled = assemble(model, harmonics, case.store)

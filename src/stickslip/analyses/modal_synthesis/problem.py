@@ -25,7 +25,7 @@ from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
@@ -107,7 +107,7 @@ def question_of(case: Case, model: Model) -> Question:
                 f"is {harmonic}, and the mode of [{NAME}] answers to harmonic 1",
                 "Leave the load out, or ask for the forced response.",
             )
-    most = REACH * max(asked.harmonics, asked.most_harmonics)
+    most = JUDGED_MULTIPLE * max(asked.harmonics, asked.most_harmonics)
     refuse_whole(NAME, model)
     assembled = peak_first(assemble(model, most, case.store))
     refuse_rigid(NAME, assembled)

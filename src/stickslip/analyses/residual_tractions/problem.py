@@ -19,7 +19,7 @@ from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.compiled import Evaluator
 from stickslip.contact.initial_sliders import starts_of
 from stickslip.errors import InputError, input_error
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.search import TractionSearch
@@ -118,7 +118,7 @@ def question_of(case: Case, model: Model) -> Question:
     if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
         raise refusal
     refuse_whole("residual_tractions", model)
-    assembled = peak_first(assemble(model, REACH * asked.harmonics, case.store))
+    assembled = peak_first(assemble(model, JUDGED_MULTIPLE * asked.harmonics, case.store))
     if not any(np.any(force) for force in assembled.load.harmonics.values()):
         name = next(iter(model.driven))
         raise input_error(

@@ -17,7 +17,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import input_error
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure
@@ -173,7 +173,7 @@ def question_of(case: Case, model: Model) -> Question:
         sweep = within_limits(turning, sweep, settings.limits)
         check_limits(settings.limits, estimate(turning, sweep))
         # peaks are judged towards up to three times the harmonics that are kept
-        harmonics, tolerance = REACH * sweep.high_harmonics[-1], table.tolerance
+        harmonics, tolerance = JUDGED_MULTIPLE * sweep.high_harmonics[-1], table.tolerance
         found = over_speed(turning, order, table.speeds, harmonics, case.store, tolerance)
         own = peak_first(found.assembled)
         said = found.error, found.static_force, model.coriolis, found.common

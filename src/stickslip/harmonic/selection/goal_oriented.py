@@ -14,7 +14,7 @@ from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 
 GOALS = 8  # outputs with the largest errors by which harmonics are chosen
-NOTHING = 1e-6  # relative change that is no reason to keep a harmonic
+NEGLIGIBLE_CHANGE = 1e-6  # relative change that is no reason to keep a harmonic
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class GoalOriented:
         parts = contributions(low, high, step.omega, outputs.some(worst), found)
         # parts add up in a linear problem: the farther this one is from one, the fewer are left out
         allowed = self.left_out * self.threshold * max(1.0 - found.doubt, 0.0)
-        chosen = chosen_harmonics(parts, missing, max(allowed, NOTHING))
+        chosen = chosen_harmonics(parts, missing, max(allowed, NEGLIGIBLE_CHANGE))
         return tuple(sorted({*low.harmonics, *chosen}))
 
 

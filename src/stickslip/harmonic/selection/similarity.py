@@ -13,7 +13,7 @@ from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.structured import real_matrix
 
 Part = Literal["jacobian", "contact", "missing"]
-NOTHING = 1e-3  # off-diagonal terms of Γ that count as zero, beside ones on the diagonal
+ZERO_ENTRY = 1e-3  # off-diagonal terms of Γ that count as zero, beside ones on the diagonal
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def jacobian_similarity(
     x: FloatArray,
     reference: FloatArray,
     omega: float,
-    tolerance: float = NOTHING,
+    tolerance: float = ZERO_ENTRY,
     scales: FloatArray | None = None,
 ) -> JacobianSimilarity:
     """Compare the Jacobians at a solution with few harmonics and at one with many.

@@ -14,14 +14,14 @@ from stickslip.errors import SingularError, StickslipError, input_error, missing
 from stickslip.model.fe.multifrontal import multifrontal
 
 DENSE = 400  # below this many rows dense algebra is faster than sparse
-LARGE = 3000  # below this many rows SuperLU is as fast as the optional package
+MIN_FERAL_ROWS = 3000  # below this many rows SuperLU is as fast as the optional package
 HUGE = 20_000  # below this many rows SuperLU is as fast as the multifrontal method
 SINGULAR = 1e13  # a condition number above which nothing of a solution is known
 SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
 PIVOTS = 0.01  # SuperLU leaves the diagonal for a pivot more than a hundred times as large
 RESIDUAL = 1e-9  # of each equation, over the sum of its terms: factors of feral that solve no better are not used
-CHECKED = 100_000  # rows up to which SuperLU counts again what feral has counted
-COUNTED = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
+MAX_CHECKED_ROWS = 100_000  # rows up to which SuperLU counts again what feral has counted
+MAX_COUNTED_ENTRIES = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
 BACKENDS = ("auto", "dense", "multifrontal", "superlu", "feral")
 
 LOG = logging.getLogger("stickslip")
@@ -124,7 +124,7 @@ def _chosen(matrix: Matrix, backend: str) -> str:
         return backend
     if matrix.shape[0] <= DENSE or not scipy.sparse.issparse(matrix):
         return "dense"
-    if matrix.shape[0] <= LARGE or not _hermitian(matrix):
+    if matrix.shape[0] <= MIN_FERAL_ROWS or not _hermitian(matrix):
         return "superlu"
     if _has_feral():
         return "feral"
@@ -193,14 +193,14 @@ def _by_superlu(matrix: Matrix) -> int | None:
 
 
 def _by_feral(matrix: Matrix, say: Say) -> int | None:
-    """Count with feral, and up to `CHECKED` rows with SuperLU again, which is believed where they differ."""
+    """Count with feral, and up to `MAX_CHECKED_ROWS` rows with SuperLU again, which is believed where they differ."""
     try:
         found = _feral(matrix).negative
     except (SingularError, _DistrustedError) as error:
         if isinstance(error, _DistrustedError):
             _warn(error)
         return _by_superlu(matrix)
-    if matrix.shape[0] > CHECKED:
+    if matrix.shape[0] > MAX_CHECKED_ROWS:
         say(f"{found} negative pivots by feral alone: too many equations to count them again")
         return found
     again = _by_superlu(matrix)
@@ -220,7 +220,7 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
         raise SingularError(f"factorise: {error}") from error
 
     def count() -> int | None:
-        if lu.nnz > COUNTED:
+        if lu.nnz > MAX_COUNTED_ENTRIES:
             return None
         if np.array_equal(lu.perm_r, lu.perm_c):  # U = D Lᴴ, D real
             return int(np.count_nonzero(lu.U.diagonal().real < 0))

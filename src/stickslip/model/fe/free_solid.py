@@ -8,7 +8,7 @@ from stickslip.errors import SingularError
 from stickslip.model.fe.factorisation import Solve, factorise
 from stickslip.model.fe.rotation import RotatingSolid
 
-RIGID = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it is rounding
+ROUNDING_FORCE = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it is rounding
 # Displacement by which two faces that are tied differ, over the largest of a rigid motion: below, they differ because the file
 # writes few digits of the coordinates (5 or more), above, because the tie hinders the motion (a sector's translation across
 # the axis by 2 sin(pi/n) for n sectors, 3e-3 for 2000)
@@ -89,7 +89,7 @@ def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray
     motions = every[solid.moving]
     stiffness = scipy.sparse.csr_array(solid.structure.stiffness)
     cost = (abs(stiffness) @ np.abs(motions)).max(axis=1, keepdims=True)
-    hindered = [(stiffness @ motions) / (RIGID * cost)]
+    hindered = [(stiffness @ motions) / (ROUNDING_FORCE * cost)]
     if tie is not None:
         hindered.append((motions - tie @ _on(tie, motions)) / MISMATCH)
     allowed = np.vstack(hindered)

@@ -19,7 +19,7 @@ PROBE = 2  # new directions that look for equal frequencies beyond the eight
 STEPS = 5  # with them
 KNOWN = 1e-10  # a change of an eigenvalue above which they have found one
 ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
-NOTHING = (1e-24, 1e-12)  # squared length over the largest, at first and once normalised: only rounding
+ROUNDING_SQUARES = (1e-24, 1e-12)  # squared length over the largest, at first and once normalised: only rounding
 
 
 def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tuple[FloatArray, Matrix]:
@@ -141,7 +141,7 @@ def _orthonormal(
             block = block - known @ (known.conj().T @ heavy)
             heavy = mass @ block
         squares, turn = np.linalg.eigh(block.conj().T @ heavy)
-        weak = squares <= NOTHING[again] * reference
+        weak = squares <= ROUNDING_SQUARES[again] * reference
         turn = turn[:, ~weak] / np.sqrt(squares[~weak])
         block, heavy = block @ turn, heavy @ turn
         if np.any(weak) and not again:

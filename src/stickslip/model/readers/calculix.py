@@ -15,7 +15,7 @@ from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, who
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
-LONGEST = 16  # digits of a node number: no program numbers further
+MAX_NODE_DIGITS = 16  # digits of a node number: no program numbers further
 SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
 
 
@@ -123,7 +123,7 @@ def _read_dof(path: Path) -> tuple[IntArray, list[str]]:
     nodes, components = [], []
     for number, line in enumerate(text.splitlines(), 1):
         node, _, direction = line.strip().partition(".")
-        if not (node.isdecimal() and len(node) < LONGEST and direction in {"1", "2", "3", "4", "5", "6"}):
+        if not (node.isdecimal() and len(node) < MAX_NODE_DIGITS and direction in {"1", "2", "3", "4", "5", "6"}):
             raise input_error(
                 f"{path}: line {number}", f"needs node.direction, got {line[:60]!r}", "Give the .dof file of CalculiX."
             )

@@ -12,7 +12,7 @@ from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.deck_words import PARAMETERS
 from stickslip.model.readers.text import SHOWN, number_table, read_text
 
-MOST_INCLUDES = 200
+MAX_INCLUDES = 200
 DEEPEST_INCLUDE = 10
 LARGEST = 2**53  # no program numbers further
 
@@ -257,7 +257,7 @@ def _included(block: Block, path: Path, stack: list[Path], count: list[int]) -> 
     if not target.is_relative_to(root):
         raise _refused(block, name, f"lies outside the deck's folder {root.name!r}")
     count[0] += 1
-    if count[0] > MOST_INCLUDES or len(stack) >= DEEPEST_INCLUDE:
+    if count[0] > MAX_INCLUDES or len(stack) >= DEEPEST_INCLUDE:
         raise _refused(block, name, "is one of too many, or files include each other")
     return target
 

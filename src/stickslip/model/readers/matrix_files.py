@@ -13,7 +13,7 @@ import scipy
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs, numbered_dofs
-from stickslip.model.modes import ABSURD
+from stickslip.model.modes import LARGEST_ENTRY
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_range, check_symmetric, check_unique
 from stickslip.model.readers.node_table import COMPONENTS, csv_columns, csv_numbers
@@ -21,7 +21,7 @@ from stickslip.model.readers.text import CUT_SHORT, SHOWN, number_table, read_te
 from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
-MOST_EMPTY = 10  # rows an entry above which a size is not believed
+MAX_ROWS_PER_ENTRY = 10  # rows an entry above which a size is not believed
 FIELDS = {"real": 1, "integer": 1, "double": 1, "complex": 2}  # numbers of a value
 SYMMETRIES = ("general", "symmetric", "hermitian", "skew-symmetric")
 
@@ -91,7 +91,7 @@ def _own_size(path: Path, counts: list[int]) -> int:
     """Return the size that a file says, which its entries must fill as those of a stiffness do."""
     n, columns = counts[:2]
     stored = counts[2] if len(counts) > 2 else n * columns
-    if n != columns or not 0 < n <= MOST_EMPTY * stored:
+    if n != columns or not 0 < n <= MAX_ROWS_PER_ENTRY * stored:
         raise input_error(
             str(path), f"is of {n} x {columns} with {stored} entries, no stiffness of a model", "Give a square matrix."
         )
@@ -296,7 +296,7 @@ def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
     values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if not np.isfinite(values).all():
         raise input_error(str(path), f"the {name} has entries that are not finite", "They come from a failed run.")
-    if values.size and abs(values).max() > ABSURD:
+    if values.size and abs(values).max() > LARGEST_ENTRY:
         raise input_error(
             str(path),
             f"the {name} has entries up to {abs(values).max():.3g}, which no model has",
@@ -306,7 +306,7 @@ def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
 
 
 def _check_size(shape: tuple[int, int], n: int | None, stored: int, place: str) -> None:
-    if n is None and shape[0] == shape[1] and 0 < shape[0] <= MOST_EMPTY * stored:
+    if n is None and shape[0] == shape[1] and 0 < shape[0] <= MAX_ROWS_PER_ENTRY * stored:
         return
     if n is None:
         raise input_error(

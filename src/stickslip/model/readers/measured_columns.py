@@ -12,7 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.text import SHOWN, read_text
 
-MOST_ROWS = 2_000_000
+MAX_ROWS = 2_000_000
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 FORCES = {"n": 1.0, "kn": 1e3}
 REPEATED_VALUE_RTOL = 1e-9  # relative difference of two values that are one
@@ -131,8 +131,8 @@ def read_columns(path: Path) -> MeasuredColumns:
         for row in reader:
             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
                 table.append((reader.line_num, [cell.strip() for cell in row]))
-            if len(table) > MOST_ROWS:
-                raise input_error(str(path), f"has over {MOST_ROWS} lines", "Cut or thin it out.")
+            if len(table) > MAX_ROWS:
+                raise input_error(str(path), f"has over {MAX_ROWS} lines", "Cut or thin it out.")
     except csv.Error as error:
         raise input_error(str(path), f"is no CSV file ({error})", "Separate by commas.") from None
     if len(table) < 2:

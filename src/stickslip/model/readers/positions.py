@@ -13,8 +13,8 @@ from stickslip.model.readers.node_table import NodeTable, csv_nodes, deck_nodes,
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 
-BALANCED = 1e-4  # of the sum of a row's entries: rows that a rigid translation does not load
-STRAINED = 5e-3  # of the terms of a rotation; stresses of preload turn with it and leave some 1e-4
+BALANCED_ROW = 1e-4  # of the sum of a row's entries: rows that a rigid translation does not load
+ROTATION_STRAIN = 5e-3  # of the terms of a rotation; stresses of preload turn with it and leave some 1e-4
 MAX_ROWS = 5000  # rows that are looked at
 MIN_FREE_DOFS = 12  # dofs away from supports, from which positions are judged
 READERS = {".inp": deck_nodes, ".frd": frd_nodes, ".csv": csv_nodes}
@@ -67,7 +67,7 @@ def doubt_about_positions(structure: Structure) -> str | None:
     component = np.array(["xyz".index(c) for c in dofs.component])
     translations = np.eye(3)[component]
     row = np.asarray(abs(stiffness) @ np.ones(structure.n))
-    balanced = (np.abs(stiffness @ translations) <= BALANCED * row[:, None]).all(axis=1)
+    balanced = (np.abs(stiffness @ translations) <= BALANCED_ROW * row[:, None]).all(axis=1)
     rows = np.flatnonzero(balanced)
     if len(rows) < MIN_FREE_DOFS:
         return None
@@ -79,6 +79,6 @@ def doubt_about_positions(structure: Structure) -> str | None:
     force = np.linalg.norm(part @ turns[np.arange(structure.n), component] - away)
     arms = np.linalg.norm(position[part.col] - position[rows[part.row]], axis=1)
     scale = np.linalg.norm(np.bincount(part.row, np.abs(part.data) * arms))
-    if force <= STRAINED * scale:
+    if force <= ROTATION_STRAIN * scale:
         return None
     return f"a rigid rotation about these positions strains the model ({force / scale:.0%} of the terms remain)"

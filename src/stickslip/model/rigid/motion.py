@@ -8,9 +8,9 @@ from stickslip.errors import SingularError
 from stickslip.model.dofs import Dofs
 
 ROUNDING = 1e-12  # of the coordinates, below which points lie at one place
-RIGID = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
+RIGID_ENERGY = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
-SHOWN = 5  # node numbers in a message
+SHOWN_NODES = 5  # node numbers in a message
 NAMES = tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz")
 
 
@@ -57,7 +57,7 @@ def _name(dofs: Dofs) -> str:
     nodes = np.unique(dofs.node[dofs.node >= 0])
     if not nodes.size:
         return f"the body of dof {dofs.labels[0]} ({len(dofs)} dofs)"
-    shown = ", ".join(str(n) for n in nodes[:SHOWN]) + (", …" if len(nodes) > SHOWN else "")
+    shown = ", ".join(str(n) for n in nodes[:SHOWN_NODES]) + (", …" if len(nodes) > SHOWN_NODES else "")
     part = f" of {dofs.part[0]}" if dofs.part[0] else ""
     return f"the body of dof {dofs.labels[0]} ({len(nodes)} nodes{part}: {shown})"
 
@@ -116,7 +116,7 @@ def _free_shapes(stiffness: Matrix, dofs: Dofs, judged: int = 1000) -> Matrix:
     scale = float(np.max(np.abs(stiffness.diagonal()), initial=0.0))
     energy = base.conj().T @ (stiffness @ base)
     free, shapes = np.linalg.eigh((energy + energy.conj().T) / 2)
-    return base @ shapes[:, free <= RIGID * scale / len(dofs)]
+    return base @ shapes[:, free <= RIGID_ENERGY * scale / len(dofs)]
 
 
 def _motion_names(six: Matrix, motions: FloatArray, null: Matrix) -> str:

@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.harmonic.harmonic_set import Harmonics, multiples
-from stickslip.harmonic.judging import REACH, SAMPLES_A_HARMONIC
+from stickslip.harmonic.judging import JUDGED_MULTIPLE, SAMPLES_A_HARMONIC
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.along import AGREE, SAFETY, SAME_SHEET_RTOL, SMALL
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
@@ -120,7 +120,7 @@ def _levels(problem: ForcedProblem) -> _Levels:
     beyond = (multiples(high, step * rung) for rung in RUNGS)
     return _Levels(
         tuple(dict.fromkeys((sweep.low_harmonics, high))),
-        tuple(b for b in beyond if high[-1] < b[-1] <= REACH * high[-1]),
+        tuple(b for b in beyond if high[-1] < b[-1] <= JUDGED_MULTIPLE * high[-1]),
     )
 
 

@@ -11,7 +11,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import driven_by, judging_indices
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.travelling import condense_side
-from stickslip.harmonic.two_frequency import MOST_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
+from stickslip.harmonic.two_frequency import MAX_DENSE_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.harmonic.two_frequency_side import TorusSide
 from stickslip.model.blas_threads import by_one_thread
@@ -436,4 +436,4 @@ def _with_free_tone(balance: TorusBalance, x: FloatArray, at: TorusLinearisation
 
 def room(problem: TwoTones) -> int:
     """Return how many combined frequencies may be added."""
-    return MOST_UNKNOWNS // (2 * problem.balance.side.n) - len(problem.balance.indices)
+    return MAX_DENSE_UNKNOWNS // (2 * problem.balance.side.n) - len(problem.balance.indices)

@@ -21,7 +21,7 @@ from stickslip.analyses.forced_response.verdicts.rules import (
 )
 from stickslip.arrays import IntArray
 from stickslip.column import columns_of
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.study.verdict import ALIKE, LEVELS, POINT_LEVELS, UNSTABLE, Level, Verdict, of_all_cases, worst
 
 
@@ -114,7 +114,7 @@ def _examined(case: Curve) -> str:
     for value, about in (
         (np.nan if case.exact[peak] else case.own_error[peak], "predicted error"),
         (case.audit[peak], "difference from more harmonics"),
-        (case.reference[peak], f"predicted change with up to {REACH * case.cap} harmonics"),
+        (case.reference[peak], f"predicted change with up to {JUDGED_MULTIPLE * case.cap} harmonics"),
     ):
         said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
     said += ["attained in time integration"] * bool(case.attained[peak])

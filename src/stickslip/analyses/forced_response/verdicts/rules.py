@@ -10,7 +10,7 @@ from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.problem import ALONE, MORE_THAN_LOW, MOST_IN_TIME, TOO_MANY
 from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
-from stickslip.harmonic.judging import REACH
+from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.sweep import RUNGS
 from stickslip.solve.status import Status
@@ -351,7 +351,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
             why = (
-                f"up to {REACH * case.cap} harmonics instead of H = {case.kept[i]} are predicted to change it, in amplitude or phase, by "
+                f"up to {JUDGED_MULTIPLE * case.cap} harmonics instead of H = {case.kept[i]} are predicted to change it, in amplitude or phase, by "
                 f"{error_text(case.reference[i])}"
             )
             remedy = f"{_more(case, int(i))}."
