@@ -17,9 +17,9 @@ from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.accepted import accepted_points
+from stickslip.response.forced.choices import Passages
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.response import forced_response
-from stickslip.response.forced.sweep import Passages
 from stickslip.solve.newton_method import Newton, newton
 
 THRESHOLD = 0.05

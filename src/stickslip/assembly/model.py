@@ -36,7 +36,7 @@ from stickslip.reduction.basis import in_coordinates, surviving_sets
 from stickslip.reduction.coupled_stages import Multistage
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
-from stickslip.response.forced.sweep import AmplitudeOf
+from stickslip.response.forced.choices import AmplitudeOf
 
 ContactsAs = Literal["static", "stuck", "open"]
 

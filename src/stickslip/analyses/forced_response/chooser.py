@@ -13,8 +13,8 @@ from stickslip.assembly.sides.mistuned import listed
 from stickslip.harmonic.harmonic_set import Harmonics, named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.strategies import STRATEGIES
+from stickslip.response.forced.choices import RUNGS
 from stickslip.response.forced.response import ForcedPoint, Sweep
-from stickslip.response.forced.sweep import RUNGS
 from stickslip.units import HZ
 
 NAMED = 4  # sets of harmonics that a sentence names

@@ -27,8 +27,8 @@ from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import frozen_sliders
+from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
-from stickslip.response.forced.sweep import RUNGS, RelativeTo
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analysis import Case

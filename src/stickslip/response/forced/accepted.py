@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
-from stickslip.response.forced.sweep import Stage
 
 # relative difference of two vibrations below which a branch has come back to the other
 ALIKE = 0.25

@@ -16,8 +16,8 @@ from stickslip.operators import Jacobian
 from stickslip.response.continuation.adaptive_continuation import follow
 from stickslip.response.continuation.branch import Followed, Judged, Kind, Route
 from stickslip.response.continuation.starting_solutions import without_branch
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.response.forced.sweep import Stage
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance

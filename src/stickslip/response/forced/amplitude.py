@@ -6,7 +6,8 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.model.dofs import ROTATIONS
-from stickslip.response.forced.sweep import AmplitudeOf, Sweep
+from stickslip.response.forced.choices import AmplitudeOf
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 
 SAMPLES_A_HARMONIC = 16  # of a period, from the highest of which Newton's method goes on to the extreme

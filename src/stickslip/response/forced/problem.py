@@ -18,7 +18,8 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept
 from stickslip.response.continuation.branch import Judged, following_vibration
 from stickslip.response.forced.amplitude import amplitudes, error_measure
-from stickslip.response.forced.sweep import Stage, Sweep
+from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import STEPS_BETWEEN, Following, Point, start_point, step_to
 from stickslip.solve.krylov import to_tolerance

@@ -11,8 +11,8 @@ from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.response.continuation.branch import Followed, Judged
 from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.forced.sweep import Stage
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to
 from stickslip.solve.fallbacks import steps_at_most

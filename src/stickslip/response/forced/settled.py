@@ -13,8 +13,8 @@ from stickslip.harmonic.harmonic_set import Harmonics, multiples
 from stickslip.harmonic.judging import JUDGED_MULTIPLE, SAMPLES_A_HARMONIC
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.along import AGREE, SAFETY, SAME_SHEET_RTOL, SMALL
+from stickslip.response.forced.choices import RUNGS, Stage
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point, with_stiffness
-from stickslip.response.forced.sweep import RUNGS, Stage
 from stickslip.response.verification import own_error, with_waves
 from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton

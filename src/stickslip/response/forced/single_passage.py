@@ -11,8 +11,8 @@ from stickslip.harmonic.harmonic_set import ByDof, Harmonics, joined, of_all
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.response.continuation.starting_solutions import without_branch
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.forced.sweep import Stage
 from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.newton_method import Solution, charged, newton
 

@@ -14,20 +14,11 @@ from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.continuation.branch import steps_through
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, AmplitudeOf, Passages, RelativeTo, Rescue
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
 Direction = Literal["up", "down"]
-Passages = Literal["double", "single"]
-RelativeTo = Literal["answer", "each"]
-AmplitudeOf = Literal["first", "half_peak_to_peak", "rms"]
-Rescue = Literal["all", "in_time", "off"]
-Stage = Literal[
-    "low", "high", "branch", "peak", "point", "audit", "trial", "found", "check", "in_time", "settled", "compared"
-]
-RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
-PUBLISHED = 5  # highest harmonic of the repeats in the papers
-SELECTION = "guarded_alert"  # what chooses harmonics where nothing else is said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

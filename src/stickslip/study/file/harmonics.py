@@ -10,7 +10,7 @@ from stickslip.errors import InputError, did_you_mean
 from stickslip.harmonic.harmonic_set import Harmonics as Support
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
-from stickslip.response.forced.sweep import PUBLISHED, RUNGS, SELECTION, Passages
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 
 HIGHEST = 200  # harmonic that a study may keep

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field, create_model
 
 from stickslip.contact.compiled import Evaluator
-from stickslip.response.forced.sweep import Rescue
+from stickslip.response.forced.choices import Rescue
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.aero import AeroTable
 from stickslip.study.file.model.contacts import ContactTable, JoinTable

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.column import Column, column, columns_of
-from stickslip.response.forced.sweep import Stage
+from stickslip.response.forced.choices import Stage
 from stickslip.solve.status import Status
 from stickslip.study.verdict import LEVELS, POINT_LEVELS
 

@@ -9,8 +9,8 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.response.forced.accepted import audits_by_frequency
 from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
-from stickslip.response.forced.sweep import AmplitudeOf
 from stickslip.response.recovery import Fields, fields
 from stickslip.response.verification import own_error
 from stickslip.solve.status import Status

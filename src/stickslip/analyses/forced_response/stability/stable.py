@@ -18,8 +18,8 @@ from stickslip.analyses.forced_response.stability.examination import (
 from stickslip.analyses.forced_response.stability.in_time import Check, seconds_in_time
 from stickslip.arrays import ComplexArray
 from stickslip.errors import InputError, StickslipError
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
-from stickslip.response.forced.sweep import Stage
 from stickslip.response.stability import Stability, hill_stability, settled_stability
 from stickslip.response.stability.hill_method.hill_segment import Keep, not_kept
 from stickslip.response.stability.missing_harmonics import with_more

@@ -12,7 +12,7 @@ from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
-from stickslip.response.forced.sweep import RUNGS
+from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.verdict import Level, from_json
 from stickslip.units import LARGEST_PERCENT, millimetres

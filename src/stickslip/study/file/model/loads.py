@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from stickslip.response.forced.sweep import AmplitudeOf
+from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.study.file.model.bodies import AXES, Triple
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
 
