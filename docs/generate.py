@@ -256,13 +256,9 @@ def _variables(kind: type) -> str:
 
 def variables_of_tractions() -> str:
     """Return the variables of bounds over residual tractions."""
-    from stickslip.analyses.residual_tractions.dataset import ABOUT
+    from stickslip.analyses.residual_tractions.records import ResidualTractions
 
-    rows = [
-        f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
-        for name, (dims, units, about) in ABOUT.items()
-    ]
-    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
+    return _variables(ResidualTractions)
 
 
 def variables_of_models() -> str:

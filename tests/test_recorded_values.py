@@ -4,7 +4,6 @@ Each variable that a result may hold is asserted by some test: the last test her
 """
 
 import ast
-import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -29,8 +28,8 @@ from stickslip.analyses.nonlinear_mode.analysis import NONLINEAR_MODE
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes
 from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
-from stickslip.analyses.residual_tractions.dataset import dataset as of_tractions
-from stickslip.analyses.residual_tractions.records import TractionRecord
+from stickslip.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
+from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord
 from stickslip.analyses.resonance.dataset import dataset as of_resonances
 from stickslip.analyses.run_up import values
 from stickslip.analyses.run_up.fast import name_of
@@ -44,6 +43,7 @@ from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC,
 from stickslip.response.all_motions.found import AllMotions, AtFrequency, MotionAt, MotionBranch
 from stickslip.response.bifurcations.side_branch import CLOSES
 from stickslip.response.forced.response import OF_PEAK
+from stickslip.response.residual_tractions.bounds import Bound
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.solve.status import Status
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
@@ -588,18 +588,16 @@ def traction_record(stage: Any, omega: float, amplitude: tuple[float, float, flo
     multipliers[0, :, 0] = 0.1 + k, 0.2 + k
     multipliers[1, 0, 1] = 0.3 + k
     multipliers[2] = 0.4 + k
+    errors = np.array([0.01, 0.02, 0.03]) + k
+    none = np.zeros((2, 1), dtype=complex), np.zeros((2, 2))
     return TractionRecord(
-        stage,
-        omega,
-        np.array(amplitude),
-        np.zeros((3, 2, 1), dtype=complex),
-        np.zeros((3, 2, 2)),
-        multipliers,
-        json.dumps(["L.1", "R.1"]),
-        5 + k,
-        k,
-        1 + k,
-        np.array([0.01, 0.02, 0.03]) + k,
+        stage=stage,
+        omega=omega,
+        each=tuple(Bound(a, *none, m, e) for a, m, e in zip(amplitude, multipliers, errors.tolist(), strict=True)),
+        springs=np.array(["L.1", "R.1"]),
+        solves=5 + k,
+        failures=k,
+        branches=1 + k,
     )
 
 
@@ -618,7 +616,7 @@ def test_bounds_over_tractions() -> None:
         "confirmed": [1, 1],
     }
     notes = {"model": {"output": "b.x", "excitation_n": 7.0, "harmonics": 5}, "confirmed": confirmed}
-    data = of_tractions(solved(records, notes))
+    data = RESIDUAL_TRACTIONS.dataset(solved(records, notes))
     check(
         data,
         output="b.x",
@@ -646,8 +644,8 @@ def test_bounds_over_tractions() -> None:
         traction_record("least", 10.0, (1.0, 2.2, 1.5)),
         traction_record("most", 14.0, (2.0, 1.0, 5.0)),
     ]
-    check(of_tractions(solved(ends, {"model": {"harmonics": 5}})), resonance_inside=[1, 0, 0])
-    lost = of_tractions(solved([traction_record("point", 10.0, (NAN, 0.5, 1.5))]))
+    check(RESIDUAL_TRACTIONS.dataset(solved(ends, {"model": {"harmonics": 5}})), resonance_inside=[1, 0, 0])
+    lost = RESIDUAL_TRACTIONS.dataset(solved([traction_record("point", 10.0, (NAN, 0.5, 1.5))]))
     assert lost.attrs["failed"] == 1
 
 
@@ -828,7 +826,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic, *KINDS)  # of cases, whose fields are columns
+RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic, ResidualTractions, *KINDS)  # of cases, whose fields are columns
 
 
 def written() -> set[str]:

@@ -21,6 +21,7 @@ from stickslip.analyses.nonlinear_mode.records import NonlinearModes
 from stickslip.analyses.quasi_periodic import verdicts as two_frequencies
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic
 from stickslip.analyses.residual_tractions import verdicts as tractions
+from stickslip.analyses.residual_tractions.records import ResidualTractions
 from stickslip.analyses.resonance import verdicts as resonances
 from stickslip.analyses.run_up import verdicts as running
 from stickslip.analyses.waves import doubts as waves
@@ -516,13 +517,17 @@ BOUNDS: dict[str, Any] = {
     "most_amplitude": [1e-3, 1e-3],
     "frequency_hz": [40.0, 60.0],
     "harmonics": 5,
-    "confirmed": None,
+    "resonance_harmonics_error": [0.0, 0.0, 0.0],
+    "harmonics_error": [[0.0, 0.0, 0.0]] * 2,
+}
+SETTLED: dict[str, Any] = {
+    "confirmed": [1, 1],
     "resolved_amplitude": [1e-3, 1e-3],
     "time_amplitude": [1e-3, 1e-3],
 }
 AS_IT_IS = ("trusted", "leave the resonance as it is, 1 mm at 50 Hz: what sticks does not change it.")
 BOUND_ROWS: list[Row] = [
-    ({"resonance_amplitude": None}, []),
+    ({name: None for name in BOUNDS if name.startswith("resonance")} | {"multiplier": None}, []),
     ({}, [AS_IT_IS]),
     ({"multiplier": [[[NAN]]] * 3}, [("trusted", "no contact sticks all the time")]),
     ({"resonance_amplitude": [1000.0, 999.0, 1000.0]}, [("trusted", "as it is, 1e+06 mm")]),
@@ -547,7 +552,7 @@ BOUND_ROWS: list[Row] = [
     ),
     ({"branches": [3, 2]}, [AS_IT_IS, ("doubtful", "40.00 Hz: at 2 frequencies from 40 to 60 Hz", "up to 3")]),
     ({"failures": [0, 2]}, [AS_IT_IS, ("note", "from 2 starts of tractions no motion was found (9 were)")]),
-    ({"confirmed": [1, 1]}, [AS_IT_IS]),
+    (SETTLED, [AS_IT_IS]),
     ({"resonance_harmonics_error": [0.0, 0.05, 0.05], "harmonics_error": [[0.0, 0.05, NAN]] * 2}, [AS_IT_IS]),
     (
         {"resonance_harmonics_error": [0.0, NAN, 0.05], "harmonics_error": [[0.0, 0.05, NAN]] * 2},
@@ -593,25 +598,25 @@ BOUND_ROWS: list[Row] = [
         [AS_IT_IS, ("note", "40.00 Hz", "over 100 % there, and by more than 5 % at 2 of 2")],
     ),
     (
-        {"confirmed": [0, 1], "resolved_amplitude": [1.0011e-3, 1e-3]},
+        SETTLED | {"confirmed": [0, 1], "resolved_amplitude": [1.0011e-3, 1e-3]},
         [AS_IT_IS, ("doubtful", "51.00 Hz: the smallest resonance was not found again", "more harmonics")],
     ),
     (
-        {"confirmed": [1, 0], "resolved_amplitude": [NAN, NAN]},
+        SETTLED | {"confirmed": [1, 0], "resolved_amplitude": [NAN, NAN]},
         [AS_IT_IS, ("doubtful", "52.00 Hz: the largest resonance was not found again")],
     ),
     (
-        {"confirmed": [1, 0], "time_amplitude": [1e-3, 2e-3]},
+        SETTLED | {"confirmed": [1, 0], "time_amplitude": [1e-3, 2e-3]},
         [AS_IT_IS, ("note", "52.00 Hz: the largest resonance, 1 mm", "it goes to 2 mm")],
     ),
-    ({"confirmed": [0, 1], "time_amplitude": [NAN, 1e-3]}, [AS_IT_IS, ("note", "it diverges")]),
+    (SETTLED | {"confirmed": [0, 1], "time_amplitude": [NAN, 1e-3]}, [AS_IT_IS, ("note", "it diverges")]),
 ]
 
 
 @pytest.mark.parametrize("row", BOUND_ROWS)
 def test_bounds_over_tractions_are_told_as_they_are(row: Row) -> None:
     changes, expected = row
-    check(tractions.case_verdicts("", case_of(BOUNDS, changes)), expected)
+    check(tractions.case_verdicts("", record_of(ResidualTractions, case_of(BOUNDS, changes))), expected)
 
 
 # two engine orders; the peak of the first is the point 1, that of the second the point 4

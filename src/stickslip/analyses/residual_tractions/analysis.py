@@ -1,14 +1,15 @@
 """Bounds of the response over residual tractions, over frequencies and at the resonance."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
-from stickslip.analyses.residual_tractions.dataset import dataset
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.residual_tractions.problem import MOTIONS, Question, cost_of, question_of
-from stickslip.analyses.residual_tractions.records import TractionRecord, of_record, to_record
+from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord, answer, to_record
 from stickslip.analyses.residual_tractions.table import ResidualTractionsTable
-from stickslip.analyses.residual_tractions.verdicts import tables
+from stickslip.analyses.residual_tractions.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.contact.initial_sliders import starts_of
 from stickslip.response.residual_tractions.bounds import End, TractionBounds, resonance_bounds, traction_bounds
@@ -18,6 +19,11 @@ from stickslip.study.store.progress import advance
 from stickslip.units import HZ, millimetres_between
 
 TOPS: tuple[End, End] = ("least", "most")
+
+
+def _lost(found: ResidualTractions) -> int:
+    """Return at how many frequencies no motion was found."""
+    return sum(bool(np.isnan(point.reference_amplitude)) for point in found.points)
 
 
 def _solve(inputs: Question, done: Sequence[TractionRecord], notes: Notes) -> Iterator[TractionRecord]:
@@ -32,10 +38,10 @@ def _solve(inputs: Question, done: Sequence[TractionRecord], notes: Notes) -> It
     for record in _along(inputs, [r for r in done if r.stage == "point"]):
         found.append(record)
         yield record
-    known = [of_record(r) for r in found if r.stage == "point"]
+    known = [r.bounds for r in found if r.stage == "point"]
     if not any(b.converged for b in known):
         return
-    tops = {r.stage: of_record(r) for r in found if r.stage != "point"}
+    tops = {r.stage: r.bounds for r in found if r.stage != "point"}
     for end in TOPS:
         if end not in tops:
             tops[end] = _resonance(inputs, known, end)
@@ -60,7 +66,7 @@ def _along(question: Question, done: Sequence[TractionRecord]) -> Iterator[Tract
     left = question.omegas[len(done) :]
     if not left.size:
         return
-    near = next((of_record(r) for r in reversed(done) if np.isfinite(r.amplitude[0])), None)
+    near = next((r.bounds for r in reversed(done) if r.bounds.converged), None)
     model = question.model
     each = traction_bounds(model.system, model.load, left.tolist(), 0, question.discretisation, question.search, near)
     for k, bounds in enumerate(each, len(done) + 1):
@@ -101,7 +107,7 @@ RESIDUAL_TRACTIONS = Analysis(
     key=of_tables("residual_tractions", "solver"),
     inputs=question_of,
     solve=_solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
 )

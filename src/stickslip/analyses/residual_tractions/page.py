@@ -1,10 +1,13 @@
 """Residual tractions: the band that they leave open over frequency, and of the resonance."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.residual_tractions.records import ConfirmedEnd, ResidualTractions
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.node import Node
@@ -26,13 +29,29 @@ def has_width(least: FloatArray, most: FloatArray) -> bool:
 class Tractions(Node):
     """One case."""
 
+    @cached_property
+    def found(self) -> ResidualTractions:
+        """What was found."""
+        known: ResidualTractions = record_of(ResidualTractions, self.data)
+        return known
+
+    @property
+    def least(self) -> FloatArray:
+        """Smallest amplitude at each frequency, m."""
+        return np.array([point.least_amplitude for point in self.found.points])
+
+    @property
+    def most(self) -> FloatArray:
+        """Largest amplitude at each frequency, m."""
+        return np.array([point.most_amplitude for point in self.found.points])
+
 
 def band(view: Tractions) -> Plot | None:
     """Show the smallest and the largest amplitude at each frequency."""
-    if not view.has("frequency_hz"):
+    points, least, most = view.found.points, view.least, view.most
+    if not points:
         return None
-    hertz = view.floats("frequency_hz")
-    own, least, most = (view.floats(f"{name}_amplitude") for name in ("reference", "least", "most"))
+    hertz = np.array([point.frequency_hz for point in points])
     scale = scale_for(np.concatenate([least, most]), "m")
     figure = go.Figure()
     edge = {"mode": "lines", "line": {"color": COLOURS[0], "width": 1}}
@@ -51,7 +70,7 @@ def band(view: Tractions) -> Plot | None:
         )
     figure.add_scatter(
         x=hertz,
-        y=scale.factor * own,
+        y=scale.factor * np.array([point.reference_amplitude for point in points]),
         name="own start" if wide else "amplitude",
         mode="lines+markers",
         marker={"size": 5},
@@ -60,8 +79,8 @@ def band(view: Tractions) -> Plot | None:
     )
     if _open_resonance(view):
         figure.add_scatter(
-            x=view.floats("resonance_hz")[1:],
-            y=scale.factor * view.floats("resonance_amplitude")[1:],
+            x=np.array([top.frequency_hz for top in view.found.resonances[1:]]),
+            y=scale.factor * np.array([top.amplitude for top in view.found.resonances[1:]]),
             name="bounds of the resonance",
             mode="markers",
             marker={"symbol": "diamond", "size": 10, "color": COLOURS[1]},
@@ -75,18 +94,18 @@ def band(view: Tractions) -> Plot | None:
 
 
 def _caption(view: Tractions) -> str:
-    least, most = (view.floats(f"{name}_amplitude") for name in ("least", "most"))
+    least, most, points = view.least, view.most, view.found.points
     text = (
-        f"Amplitude of {view.text('output')}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
+        f"Amplitude of {view.found.output}, H = {view.found.harmonics}: a contact that sticks keeps a traction from before, "
         "and every one within the friction cone is a steady motion. "
     )
-    if view.has("branches") and np.nanmax(view.floats("branches")) > 1:
+    if any(point.branches > 1 for point in points):
         text += "Where the own start has several motions, the band holds all that sweeps up and down met. "
     if not has_width(least, most):
         return text + "The bounds are equal at all frequencies: the answer is unique."
     width = most / least - 1
     at = int(np.nanargmax(width))
-    hertz = number(float(view.floats("frequency_hz")[at]), 5)
+    hertz = number(points[at].frequency_hz, 5)
     return (
         text
         + f"The band is widest at {hertz} Hz, {percent(100 * float(width[at]))}. Bounds are found motions; the true band is at least as wide."
@@ -95,39 +114,44 @@ def _caption(view: Tractions) -> str:
 
 def _open_resonance(view: Tractions) -> bool:
     """Whether there are bounds of the resonance, and they differ."""
-    if not view.has("resonance_amplitude"):
+    if not view.found.resonances:
         return False
-    _, least, most = view.floats("resonance_amplitude")
+    _, least, most = (top.amplitude for top in view.found.resonances)
     return has_width(np.atleast_1d(least), np.atleast_1d(most))
 
 
 def resonances(view: Tractions) -> Table | None:
     """Return the bounds of the resonance, and what time integration says of them."""
-    if not view.has("resonance_amplitude"):
+    tops, ends = view.found.resonances, (None, *view.found.ends) if view.found.ends else (None,) * 3
+    if not tops:
         return None
     equal = () if _open_resonance(view) else ("The bounds are equal.",)
-    height, hertz = view.floats("resonance_amplitude"), view.floats("resonance_hz")
-    rows = []
-    for k, name in enumerate(_NAMES):
-        again = time = NONE
-        told = ""
-        if k and view.has("confirmed"):
-            again, time = (
-                quantity(float(view.floats(f"{what}_amplitude")[k - 1]), "m") for what in ("resolved", "time")
-            )
-            followed = view.labels_of("time_status")[k - 1]
-            ends = ("left in time", "confirmed") if followed else ("not found again", "confirmed, not in time")
-            told = ends[view.integers("confirmed")[k - 1]]
-        off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
-        rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])
+    rows = [
+        [
+            name,
+            quantity(top.amplitude, "m"),
+            percent(100 * (top.amplitude / tops[0].amplitude - 1)) if top is not tops[0] else "",
+            number(top.frequency_hz, 6),
+            *_in_time(end),
+        ]
+        for name, top, end in zip(_NAMES, tops, ends, strict=True)
+    ]
     head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]
     return Table(head, rows, "Bounds of the resonance", equal)
+
+
+def _in_time(end: ConfirmedEnd | None) -> tuple[str, str, str]:
+    """Return the amplitude that was solved for again, that in time, and what they say of the bound."""
+    if end is None:
+        return NONE, NONE, ""
+    words = ("left in time", "confirmed") if end.time_status else ("not found again", "confirmed, not in time")
+    return quantity(end.resolved_amplitude, "m"), quantity(end.time_amplitude, "m"), words[end.confirmed]
 
 
 def _cards(view: Tractions) -> list[Card]:
     if not _open_resonance(view):
         return []
-    own, least, most = (float(h) for h in view.floats("resonance_amplitude"))
+    own, least, most = (top.amplitude for top in view.found.resonances)
     text = f"{percent(100 * (least / own - 1))} to {percent(100 * (most / own - 1))}"
     return [Card(text, "resonance by residual tractions", f"own start {quantity(own, 'm')}")]
 

@@ -1,10 +1,10 @@
 """Verdicts on bounds over residual tractions, and the terminal tables."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import xarray as xr
 
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.residual_tractions.records import ResidualTractions
 from stickslip.study.analysis import TextTable
 from stickslip.study.store.netcdf import one_case
 from stickslip.study.verdict import Verdict
@@ -16,37 +16,30 @@ FEW = 0.05  # relative change by more harmonics above which those kept are too f
 ENDS = ("smallest", "largest")
 
 
-def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables."""
-    if "resonance_amplitude" not in case:
+def case_verdicts(label: str, found: ResidualTractions) -> list[Verdict]:
+    """Return what is to be thought of a case."""
+    if not found.resonances:
         return []
-    height, hertz = case["resonance_amplitude"].values, case["resonance_hz"].values
-    found = [_of_width(label, case, height, hertz)]
-    if not np.all(case["resonance_inside"].values):
+    verdicts = [_of_width(label, found)]
+    if not all(top.inside for top in found.resonances):
         why = "a bound is highest at the end of residual_tractions.frequency_hz, which is no resonance"
-        found.append(Verdict("doubtful", label, None, why, "Widen the range."))
-    found += [*_of_harmonics(label, case), *_of_branches(label, case)]
-    failures = int(case["failures"].values.sum())
+        verdicts.append(Verdict("doubtful", label, None, why, "Widen the range."))
+    verdicts += [*_of_harmonics(label, found), *_of_branches(label, found)]
+    failures = sum(point.failures for point in found.points)
     if failures:
-        count = int(case["solves"].values.sum())
-        why = f"from {failures} starts of tractions no motion was found ({count} were), so that the bounds may be wider"
-        found.append(
-            Verdict(
-                "trusted", label, None, why, "Look at the figure: a bound that jumps back there is one that was missed."
-            )
-        )
-    return [*found, *_of_ends(label, case)]
+        why = f"from {failures} starts of tractions no motion was found ({found.solves} were), so that the bounds may be wider"
+        remedy = "Look at the figure: a bound that jumps back there is one that was missed."
+        verdicts.append(Verdict("trusted", label, None, why, remedy))
+    return [*verdicts, *_of_ends(label, found)]
 
 
-def _of_width(label: str, case: Mapping[str, xr.Variable], height: np.ndarray, hertz: np.ndarray) -> Verdict:
-    own, least, most = (float(h) for h in height)
+def _of_width(label: str, found: ResidualTractions) -> Verdict:
+    own, least, most = (top.amplitude for top in found.resonances)
+    hertz = [top.frequency_hz for top in found.resonances]
     if most - least <= SMALL * most:
-        because = (
-            "no contact sticks all the time"
-            if not np.isfinite(case["multiplier"].values).any()
-            else "what sticks does not change it"
-        )
-        elsewhere = _widest(case)
+        sticks = any(np.isfinite(top.multiplier).any() for top in found.resonances)
+        because = "what sticks does not change it" if sticks else "no contact sticks all the time"
+        elsewhere = _widest(found)
         also = f"; elsewhere in the range {elsewhere}" if elsewhere else ""
         why = (
             f"residual tractions leave the resonance as it is, {millimetres(own)} at {hertz[0]:.5g} Hz: {because}{also}"
@@ -60,12 +53,10 @@ def _of_width(label: str, case: Mapping[str, xr.Variable], height: np.ndarray, h
     return Verdict("trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least)
 
 
-def _of_harmonics(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+def _of_harmonics(label: str, bounds: ResidualTractions) -> list[Verdict]:
     """Doubt resonances that more harmonics are predicted to change; tell of other frequencies."""
-    if "resonance_harmonics_error" not in case:
-        return []
-    kept, remedy = int(case["harmonics"].values), "Raise residual_tractions.harmonics."
-    error, hertz = case["resonance_harmonics_error"].values, case["resonance_hz"].values
+    kept, remedy = bounds.harmonics, "Raise residual_tractions.harmonics."
+    error = np.array([top.harmonics_error for top in bounds.resonances])
     found = []
     if np.isnan(error).any():
         why = f"harmonics were not examined: nothing says how wrong H = {kept} is"
@@ -75,29 +66,29 @@ def _of_harmonics(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         names = ("resonance from the model's own start", *(f"{end} resonance" for end in ENDS))
         by = "over 100 %" if error[k] > 1.0 else f"{100 * error[k]:.2g} %"
         why = f"more harmonics than {kept} are predicted to change the {names[k]} by {by}"
-        found.append(Verdict("doubtful", label, float(hertz[k]), why, remedy))
-    each = np.nanmax(np.nan_to_num(case["harmonics_error"].values, nan=0.0), axis=1)
+        found.append(Verdict("doubtful", label, bounds.resonances[k].frequency_hz, why, remedy))
+    each = np.array([np.nan_to_num(point.harmonics_error, nan=0.0).max() for point in bounds.points])
     if (above := np.flatnonzero(each > FEW)).size and not worst.size:
         at = int(above[np.argmax(each[above])])
         by = "over 100 %" if each[at] > 1.0 else f"{100 * each[at]:.2g} %"
         why = f"more harmonics than {kept} are predicted to change the bounds by {by} there, and by more than {100 * FEW:g} % at {above.size} of {each.size} frequencies"
-        found.append(Verdict("trusted", label, float(case["frequency_hz"].values[at]), why, remedy))
+        found.append(Verdict("trusted", label, bounds.points[at].frequency_hz, why, remedy))
     return found
 
 
-def _of_branches(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+def _of_branches(label: str, bounds: ResidualTractions) -> list[Verdict]:
     """Doubt bounds at frequencies with several motions from one start."""
-    several = case["branches"].values > 1
-    if not several.any():
+    hertz = np.array([point.frequency_hz for point in bounds.points if point.branches > 1])
+    if not hertz.size:
         return []
-    hertz = case["frequency_hz"].values[several]
+    most = max(point.branches for point in bounds.points)
     where = (
         f"at {hertz[0]:.5g} Hz"
         if hertz.size == 1
         else f"at {hertz.size} frequencies from {hertz.min():.5g} to {hertz.max():.5g} Hz"
     )
     why = (
-        f"{where} the model's own start has several motions, up to {int(np.max(case['branches'].values))}: the bounds hold all that sweeps up and "
+        f"{where} the model's own start has several motions, up to {most}: the bounds hold all that sweeps up and "
         "down met, so that they are wide for another reason than residual tractions, and a detached motion may lie outside"
     )
     return [
@@ -111,40 +102,33 @@ def _of_branches(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     ]
 
 
-def _widest(case: Mapping[str, xr.Variable]) -> str:
+def _widest(bounds: ResidualTractions) -> str:
     """Say where the bounds are farthest apart; nothing where they are one everywhere."""
-    least, most = (case[f"{end}_amplitude"].values for end in ("least", "most"))
+    least = np.array([point.least_amplitude for point in bounds.points])
+    most = np.array([point.most_amplitude for point in bounds.points])
     width = np.nan_to_num(most / least)
     at = int(np.argmax(width))
     if width[at] - 1.0 <= SMALL:
         return ""
-    hertz = float(case["frequency_hz"].values[at])
-    return f"they leave up to {100 * (width[at] - 1):.2g} % open, at {hertz:.5g} Hz"
+    return f"they leave up to {100 * (width[at] - 1):.2g} % open, at {bounds.points[at].frequency_hz:.5g} Hz"
 
 
-def _of_ends(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    if "confirmed" not in case:
-        return []
+def _of_ends(label: str, bounds: ResidualTractions) -> list[Verdict]:
     found = []
-    height, hertz = case["resonance_amplitude"].values[1:], case["resonance_hz"].values[1:]
-    for k, end in enumerate(ENDS):
-        if case["confirmed"].values[k]:
+    for name, end, top in zip(ENDS, bounds.ends, bounds.resonances[1:], strict=False):
+        if end.confirmed:
             continue
-        again, time = (float(case[f"{name}_amplitude"].values[k]) for name in ("resolved", "time"))
-        if not abs(again / height[k] - 1.0) <= SMALL:
-            why = f"the {end} resonance was not found again where forces are marched over samples"
-            found.append(Verdict("doubtful", label, float(hertz[k]), why, "Take more harmonics."))
+        if not abs(end.resolved_amplitude / top.amplitude - 1.0) <= SMALL:
+            why = f"the {name} resonance was not found again where forces are marched over samples"
+            found.append(Verdict("doubtful", label, top.frequency_hz, why, "Take more harmonics."))
             continue
-        went = f"goes to {millimetres(time)}" if np.isfinite(time) else "diverges"
+        went = f"goes to {millimetres(end.time_amplitude)}" if np.isfinite(end.time_amplitude) else "diverges"
         why = (
-            f"the {end} resonance, {millimetres(height[k])}, is a periodic motion that a machine leaves: in time, begun with its tractions, it "
-            f"{went}"
+            f"the {name} resonance, {millimetres(top.amplitude)}, is a periodic motion that a machine leaves: in time, begun with its "
+            f"tractions, it {went}"
         )
-        found.append(
-            Verdict(
-                "trusted", label, float(hertz[k]), why, "The bound holds; it may be wider than what can be attained."
-            )
-        )
+        remedy = "The bound holds; it may be wider than what can be attained."
+        found.append(Verdict("trusted", label, top.frequency_hz, why, remedy))
     return found
 
 
@@ -156,19 +140,16 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     labels = [str(x) for x in data["case_label"].values]
     rows = []
     for i, label in enumerate(labels):
-        case = one_case(data, i)
-        if "resonance_amplitude" not in case:
+        found: ResidualTractions = record_of(ResidualTractions, one_case(data, i))
+        if not found.resonances:
             continue
-        height, hertz = case["resonance_amplitude"].values, case["resonance_hz"].values
-        each = [text for h, f in zip(height, hertz, strict=True) for text in (f"{1e3 * h:.5g}", f"{f:.3f}")]
-        rows.append((label, *each, _in_time(case), str(int(case["solves"].sum()))))
+        each = [text for top in found.resonances for text in (f"{1e3 * top.amplitude:.5g}", f"{top.frequency_hz:.3f}")]
+        rows.append((label, *each, _in_time(found), str(found.solves)))
     return (TextTable("Resonance over all residual tractions", head, tuple(rows)),)
 
 
-def _in_time(case: xr.Dataset) -> str:
-    if "confirmed" not in case:
+def _in_time(found: ResidualTractions) -> str:
+    if not any(end.time_status for end in found.ends):
         return "not followed"
-    if not any(str(word) for word in case["time_status"].values):
-        return "not followed"
-    words = ["confirmed" if ok else "left" for ok in case["confirmed"].values]
+    words = ["confirmed" if end.confirmed else "left" for end in found.ends]
     return words[0] if words[0] == words[1] else f"smallest {words[0]}, largest {words[1]}"
