@@ -22,8 +22,8 @@ from stickslip.analyses.forced_response.records.columns import KINDS
 from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
-from stickslip.analyses.modal_synthesis.dataset import dataset as of_synthesis
-from stickslip.analyses.modal_synthesis.records import SynthesisLevel
+from stickslip.analyses.modal_synthesis.analysis import MODAL_SYNTHESIS
+from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.analyses.nonlinear_mode.analysis import NONLINEAR_MODE
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes
 from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
@@ -50,6 +50,7 @@ from stickslip.study.models.measured import MeasuredPeaks, Quantity
 from stickslip.units import DEG, HZ, RPM
 
 NAN = np.nan
+NONE = np.zeros(0)
 COORDINATES = {
     "retained": np.array([0, 2]),
     "retained_label": np.array(["a.x", "b.x"]),
@@ -280,7 +281,6 @@ def synthesis_level(level: float, **changes: Any) -> SynthesisLevel:
         "overlap": 0.04 * level,
         "growth": 0.9 * level,
         "harmonics": 0.05 * level,
-        "linear": 0,
         "resolved": 0.001 * level,
         "detached": int(level),
         "omega": np.array([90.0, 95.0, 100.0, 105.0, 110.0]),
@@ -320,7 +320,9 @@ def test_synthesised_responses() -> None:
     }
     levels = [synthesis_level(1.0), synthesis_level(2.0, alone=np.array([0, 1, 0, 1, 0]))]
     asked = SimpleNamespace(passage_hz_per_s=(1.0, 2.0))
-    data = of_synthesis(solved(levels, {"design": design, "model": {"output": "b.x"}}, modal_synthesis=asked))
+    data = MODAL_SYNTHESIS.dataset(
+        solved(levels, {"design": design, "model": {"output": "b.x"}}, modal_synthesis=asked)
+    )
     both = np.array([1.0, 2.0])
     rows = both[:, None]
     check(
@@ -380,9 +382,11 @@ def test_synthesised_responses() -> None:
         passage_finished=[[1, 0]] * 2,
         passage_change=rows * [0.01, 0.02],
     )
-    plain = of_synthesis(
+    without: dict[str, Any] = dict.fromkeys(("passage_omega", "passage_amplitude"), np.zeros((0, 600)))
+    without |= dict.fromkeys(("passage_finished", "passage_change"), NONE)
+    plain = MODAL_SYNTHESIS.dataset(
         solved(
-            [synthesis_level(1.0, direct_omega=np.zeros(0), direct_amplitude=np.zeros(0))],
+            [synthesis_level(1.0, direct_omega=NONE, direct_amplitude=NONE, **without)],
             modal_synthesis=SimpleNamespace(passage_hz_per_s=()),
         )
     )
@@ -826,7 +830,14 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (LimitCycles, NonlinearModes, QuasiPeriodic, ResidualTractions, *KINDS)  # of cases, whose fields are columns
+RECORDS = (
+    LimitCycles,
+    ModalSynthesis,
+    NonlinearModes,
+    QuasiPeriodic,
+    ResidualTractions,
+    *KINDS,
+)  # of cases, whose fields are columns
 
 
 def written() -> set[str]:

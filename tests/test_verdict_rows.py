@@ -15,6 +15,7 @@ from stickslip.analyses.limit_cycle import verdicts as cycles
 from stickslip.analyses.limit_cycle.records import LimitCycles
 from stickslip.analyses.modal_synthesis import verdicts as synthesis
 from stickslip.analyses.modal_synthesis.percents import percent
+from stickslip.analyses.modal_synthesis.records import ModalSynthesis
 from stickslip.analyses.modal_synthesis.solve import judged
 from stickslip.analyses.nonlinear_mode import verdicts as backbones
 from stickslip.analyses.nonlinear_mode.records import NonlinearModes
@@ -101,7 +102,7 @@ SOUND = (
     "from 95 to 105 Hz at level 2 and in a wider range at the others",
 )
 LEVEL_ROWS: list[Row] = [
-    ({"level": None}, []),
+    (dict.fromkeys(LEVELS), []),
     ({}, [SOUND]),
     ({"foreign": [0.03, 0.02]}, [("trusted", "levels 1 and 2: at 1 few slip")]),
     ({"foreign": [0.03, NAN]}, [("trusted", "levels 1 and 2: at 1 few slip")]),
@@ -456,11 +457,12 @@ PEAK_ROWS: list[tuple[dict[str, Any], dict[str, Any], list[tuple[str, ...]]]] = 
 ]
 
 
-RECORDS: dict[Any, type[Any]] = {
+RECORDS: dict[Any, type[Any]] = {  # what the rules of an analysis are given
     cycles: LimitCycles,
     backbones: NonlinearModes,
+    synthesis: ModalSynthesis,
     two_frequencies: QuasiPeriodic,
-}  # what the rules of an analysis are given
+}
 
 
 @pytest.mark.parametrize(

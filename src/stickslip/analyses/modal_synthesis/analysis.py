@@ -1,11 +1,13 @@
 """Forced responses at many levels from one nonlinear mode."""
 
-from stickslip.analyses.modal_synthesis.dataset import dataset
+from functools import partial
+
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.modal_synthesis.problem import NAME, question_of
-from stickslip.analyses.modal_synthesis.records import SynthesisLevel
+from stickslip.analyses.modal_synthesis.records import SynthesisLevel, answer
 from stickslip.analyses.modal_synthesis.solve import solve
 from stickslip.analyses.modal_synthesis.table import ModalSynthesisTable
-from stickslip.analyses.modal_synthesis.verdicts import tables
+from stickslip.analyses.modal_synthesis.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.study.analysis import Analysis, Case, of_tables
 from stickslip.units import HZ
@@ -27,7 +29,7 @@ MODAL_SYNTHESIS = Analysis(
     key=of_tables("modal_synthesis", "solver"),
     inputs=question_of,
     solve=solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts),
     check=_check,
     summary=tables,
 )

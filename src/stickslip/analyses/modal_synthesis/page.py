@@ -1,19 +1,24 @@
 """Synthesised responses over the backbone, peaks over the level, passages, and verdicts."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.modal_synthesis.percents import percent
-from stickslip.arrays import BoolArray, FloatArray
+from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
+from stickslip.units import HZ
 
 NAME = "modal_synthesis"
+NOTHING = np.zeros(0)
 MAX_NAMED_CURVES = 24  # curves that get a name of their own
 
 
@@ -21,82 +26,86 @@ MAX_NAMED_CURVES = 24  # curves that get a name of their own
 class Synthesised(Node):
     """One case."""
 
+    @cached_property
+    def found(self) -> ModalSynthesis:
+        """What was found."""
+        known: ModalSynthesis = record_of(ModalSynthesis, self.data)
+        return known
+
     @property
     def levels(self) -> FloatArray:
         """Factors on the harmonic loads."""
-        return self.floats("level")
+        return np.array([one.level for one in self.found.levels])
 
     @property
-    def answers(self) -> tuple[str, ...]:
-        """What is thought of each level."""
-        return tuple(self.labels_of("answer"))
-
-    @property
-    def shown(self) -> list[int]:
+    def shown(self) -> list[SynthesisLevel]:
         """Levels that have a response."""
-        return [i for i, a in enumerate(self.answers) if a in ("trusted", "doubtful")]
+        return [one for one in self.found.levels if one.shown]
 
-    def tint(self, level: int) -> str:
+    def answered(self, *answers: str) -> list[SynthesisLevel]:
+        """Return the levels with some answers."""
+        return [one for one in self.found.levels if one.answer in answers]
+
+    def tint(self, level: SynthesisLevel) -> str:
         """Return the colour of a level: from dark for the lowest to gold for the highest."""
         order = np.argsort(np.argsort(self.levels))
-        return ramp(self.levels.size)[int(order[level])]
+        return ramp(self.levels.size)[int(order[self.found.levels.index(level)])]
 
 
 def responses(view: Synthesised) -> Plot | None:
     """Show the responses, the nonlinear mode through their peaks, and direct solutions where there are any."""
-    if not view.has("amplitude") or not view.shown:
+    found, shown = view.found, view.shown
+    amplitude = np.concatenate([one.amplitude for one in found.levels])
+    if not amplitude.size or not shown:
         return None
-    hertz, amplitude, stable, curve, alone = (
-        view.values(n, "level", "point") for n in ("frequency_hz", "amplitude", "stable", "curve", "alone")
-    )
     scale, figure = scale_for(amplitude, "m"), go.Figure()
-    direct = view.has("direct_amplitude")
-    for i in view.shown if direct else ():
+    direct = any(one.direct_amplitude.size for one in found.levels)
+    for one in shown if direct else ():
         # below the curves, so that they hide nothing
         figure.add_scatter(
-            x=view.values("direct_frequency_hz", "level", "direct_point")[i],
-            y=scale.factor * view.values("direct_amplitude", "level", "direct_point")[i],
+            x=one.direct_omega / HZ,
+            y=scale.factor * one.direct_amplitude,
             mode="markers",
             name="direct solution",
             legendgroup="direct",
-            showlegend=i == view.shown[0],
+            showlegend=one is shown[0],
             opacity=0.7,
-            marker=ring(view.tint(i), 5, 0.8),
-            hovertemplate=f"direct, level {number(float(view.levels[i]))}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
+            marker=ring(view.tint(one), 5, 0.8),
+            hovertemplate=f"direct, level {number(one.level)}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
         )
-    every = -(-len(view.shown) // MAX_NAMED_CURVES)
-    for k, i in enumerate(view.shown):
-        label = f"level {number(float(view.levels[i]))}"
-        doubt = ", doubtful" if view.answers[i] == "doubtful" else ""
+    every = -(-len(shown) // MAX_NAMED_CURVES)
+    for k, one in enumerate(shown):
+        label = f"level {number(one.level)}"
+        doubt = ", doubtful" if one.answer == "doubtful" else ""
         named = k % every != 0
         for keep, width, opacity in ((True, 2.0, 1.0), (False, 1.0, 0.6)):
             for steady in (1, 0):
-                y = _where(amplitude[i], curve[i], (stable[i] == steady) & ((alone[i] == 1) == keep))
+                y = _where(one.amplitude, one.curve, (one.stable == steady) & ((one.alone == 1) == keep))
                 if not np.any(np.isfinite(y)):
                     continue
                 dash = ("solid" if keep else "dash") if steady else "dot"
                 figure.add_scatter(
-                    x=hertz[i],
+                    x=one.omega / HZ,
                     y=scale.factor * y,
                     mode="lines",
                     name=f"{label}{doubt}",
                     legendgroup=label,
                     showlegend=not named,
                     opacity=opacity,
-                    line={"color": view.tint(i), "width": width, "dash": dash},
+                    line={"color": view.tint(one), "width": width, "dash": dash},
                     hovertemplate=f"{label}{doubt}{'' if keep else ', other modes above 5 %'}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
                 )
                 named = True
         figure.add_scatter(
-            x=[view.floats("peak_frequency_hz")[i]],
-            y=[scale.factor * view.floats("peak_amplitude")[i]],
+            x=[one.peak_omega / HZ],
+            y=[scale.factor * one.peak],
             mode="markers",
             legendgroup=label,
             showlegend=False,
-            marker={"symbol": "diamond" if doubt else "circle", "size": 7, "color": view.tint(i)},
+            marker={"symbol": "diamond" if doubt else "circle", "size": 7, "color": view.tint(one)},
             hovertemplate=f"peak of {label}{doubt}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
         )
-    mode, height = view.floats("backbone_frequency_hz"), view.floats("backbone_amplitude")
+    mode, height = _backbone(found)
     near = (height >= np.nanmin(amplitude)) & (height <= 1.2 * np.nanmax(amplitude))
     figure.add_scatter(
         x=mode[near],
@@ -108,11 +117,11 @@ def responses(view: Synthesised) -> Plot | None:
     )
     styled(figure, 560)
     figure.update_layout(legend_tracegroupgap=0)
-    span = np.concatenate([hertz[i] for i in view.shown])
+    span = np.concatenate([one.omega / HZ for one in shown])
     figure.update_xaxes(title_text="frequency (Hz)", range=[np.nanmin(span), np.nanmax(span)])
     figure.update_yaxes(
         type="log",
-        title_text=f"amplitude of {view.text('output')} ({scale.unit})",
+        title_text=f"amplitude of {found.output} ({scale.unit})",
         **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]),
     )
     caption = (
@@ -121,12 +130,18 @@ def responses(view: Synthesised) -> Plot | None:
         "the amplitude by more than that; the curve may be far off there. Dotted: unstable in the mode's own amplitude and phase."
     )
     caption += f" Rings are solved directly.{_along(view)}" if direct else ""
-    left = [i for i, a in enumerate(view.answers) if a in ("refused", "beyond")]
+    left = view.answered("refused", "beyond")
     caption += f" {counted(len(left), 'level')} not shown: see the table." if left else ""
     return Plot(f"modal_synthesis{view.key}", "Responses from one nonlinear mode", caption, figure)
 
 
-def _where(amplitude: FloatArray, curve: FloatArray, own: BoolArray) -> FloatArray:
+def _backbone(found: ModalSynthesis) -> tuple[FloatArray, FloatArray]:
+    """Return frequency, Hz, and amplitude, m, along the nonlinear mode."""
+    hertz, amplitude = found.backbone_frequency_hz, found.backbone_amplitude
+    return (NOTHING, NOTHING) if hertz is None or amplitude is None else (hertz, amplitude)
+
+
+def _where(amplitude: FloatArray, curve: IntArray, own: BoolArray) -> FloatArray:
     """Return the amplitudes of some points and the first beyond each run, so that runs meet; gaps elsewhere and between curves."""
     next_to = own.copy()
     same = curve[1:] == curve[:-1]
@@ -141,21 +156,22 @@ def _share(value: float) -> str:
 
 def _along(view: Synthesised) -> str:
     """Say how far the curves are from the direct ones where the mode is alone."""
-    error = np.abs(view.floats("along_error")) if view.has("along_error") else np.zeros(0)
-    if not np.any(np.isfinite(error)):
+    known = [(abs(e), one) for one in view.found.levels if (e := one.along_error) is not None and np.isfinite(e)]
+    if not known:
         return ""
-    worst = int(np.nanargmax(error))
+    error, worst = max(known, key=lambda found: found[0])
+    hertz = np.nan if worst.along_error_omega is None else worst.along_error_omega / HZ
     return (
-        f" Where the lines around the peaks are full they differ from them by up to {_share(float(error[worst]))}, at level "
-        f"{number(float(view.levels[worst]))} and {number(float(view.floats('along_error_hz')[worst]), 5)} Hz."
+        f" Where the lines around the peaks are full they differ from them by up to {_share(error)}, at level "
+        f"{number(worst.level)} and {number(hertz, 5)} Hz."
     )
 
 
 def peaks(view: Synthesised) -> Plot | None:
     """Show the peak over its level, each place of the backbone being one."""
-    if not view.has("resonance_level"):
+    level, amplitude = view.found.resonance_level, view.found.backbone_amplitude
+    if level is None or amplitude is None:
         return None
-    level, amplitude = view.floats("resonance_level"), view.floats("backbone_amplitude")
     known = np.isfinite(level) & (level > 0.0) & (amplitude > 0.0)
     per = np.where(known, amplitude / np.where(known, level, 1.0), np.nan)
     scale, figure = scale_for(per[known], "m"), go.Figure()
@@ -167,10 +183,11 @@ def peaks(view: Synthesised) -> Plot | None:
         line={"color": colour(0), "width": 2},
         hovertemplate=f"%{{y:.5g}} {scale.unit} per level at level %{{x:.5g}}<extra></extra>",
     )
-    if view.has("direct_peak_amplitude"):
+    if view.found.direct:
+        direct = [(one.level, one.direct_peak) for one in view.found.levels if one.direct_peak is not None]
         figure.add_scatter(
-            x=view.levels,
-            y=scale.factor * view.floats("direct_peak_amplitude") / view.levels,
+            x=np.array([of for of, _ in direct]),
+            y=np.array([scale.factor * peak / of for of, peak in direct]),
             mode="markers",
             name="direct solution",
             marker=ring(INK, 14, 1.0),
@@ -181,11 +198,11 @@ def peaks(view: Synthesised) -> Plot | None:
         ("doubtful", "diamond-open", colour(1)),
         ("refused", "x", MUTED),
     ):
-        own = [i for i, a in enumerate(view.answers) if a == answer]
-        if own:
-            at = np.interp(np.log(view.levels[own]), np.log(level[known]), per[known])
+        own = np.array([one.level for one in view.answered(answer)])
+        if own.size:
+            at = np.interp(np.log(own), np.log(level[known]), per[known])
             figure.add_scatter(
-                x=view.levels[own],
+                x=own,
                 y=scale.factor * at,
                 mode="markers",
                 name=answer,
@@ -196,7 +213,7 @@ def peaks(view: Synthesised) -> Plot | None:
     figure.update_xaxes(type="log", title_text="level of the loads", **log_ticks(level[known]))
     figure.update_yaxes(title_text=f"peak per level ({scale.unit})", rangemode="tozero")
     caption = "Peak of the mode over the level of the harmonic loads, divided by it: horizontal where nothing slips."
-    if int(view.scalar("homogeneous", 0)):
+    if view.found.homogeneous:
         caption += (
             " All contact laws here are homogeneous, so that this is also the optimisation curve of the static loads: with static loads s times as large "
             "the peak under the same vibration loads is that of the level 1/s, s times as large."
@@ -206,22 +223,20 @@ def peaks(view: Synthesised) -> Plot | None:
 
 def passages(view: Synthesised) -> Plot | None:
     """Show the amplitude while the frequency is swept."""
-    if not view.has("passage_amplitude"):
+    rates = view.found.passage_hz_per_s
+    every = [one.passage_amplitude for one in view.found.levels]
+    if rates is None or not np.any(np.isfinite(every)):
         return None
-    amplitude = view.values("passage_amplitude", "level", "rate", "moment")
-    if not np.any(np.isfinite(amplitude)):
-        return None
-    hertz = view.values("passage_frequency_hz", "level", "rate", "moment")
-    scale, figure = scale_for(amplitude, "m"), go.Figure()
-    for i in view.shown:
-        for j, rate in enumerate(view.floats("passage_hz_per_s")):
-            name = f"level {number(float(view.levels[i]))}, {number(float(rate))} Hz/s"
+    scale, figure = scale_for(np.array(every), "m"), go.Figure()
+    for one in view.shown:
+        for j, rate in enumerate(rates.tolist()):
+            name = f"level {number(one.level)}, {number(rate)} Hz/s"
             figure.add_scatter(
-                x=hertz[i, j],
-                y=scale.factor * amplitude[i, j],
+                x=one.passage_omega[j] / HZ,
+                y=scale.factor * one.passage_amplitude[j],
                 mode="lines",
                 name=name,
-                line={"color": view.tint(i), "width": 1.5, "dash": ("solid", "dash", "dot", "dashdot")[j % 4]},
+                line={"color": view.tint(one), "width": 1.5, "dash": ("solid", "dash", "dot", "dashdot")[j % 4]},
                 hovertemplate=f"{name}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
             )
     styled(figure, 500)
@@ -233,7 +248,7 @@ def passages(view: Synthesised) -> Plot | None:
 
 def table(view: Synthesised) -> Table | None:
     """Return the levels, their peaks, and why they are trusted or not."""
-    if not view.has("level"):
+    if not view.found.levels:
         return None
     head = [
         "level",
@@ -243,25 +258,9 @@ def table(view: Synthesised) -> Table | None:
         "motion of the other modes",
         "predicted error of the peak",
         "alone around the peak (Hz)",
+        "why",
     ]
-    head.append("why")
-    rows = []
-    for i, answer in enumerate(view.answers):
-        peak, hertz, foreign, low, high = (
-            float(view.floats(n)[i])
-            for n in ("peak_amplitude", "peak_frequency_hz", "foreign", "alone_from_hz", "alone_to_hz")
-        )
-        moves = max(float(view.floats(n)[i]) for n in ("others_in_output", "others_in_gaps"))
-        row = [
-            number(float(view.levels[i])),
-            quantity(peak, "m", 5),
-            number(hertz, 7) if np.isfinite(hertz) else NONE,
-            f"**{answer}**" if answer != "trusted" else answer,
-            _share(moves),
-            _share(foreign),
-            f"{number(low, 5)} to {number(high, 5)}" if np.isfinite(low) else "nowhere" if np.isfinite(peak) else NONE,
-        ]
-        rows.append([*row, view.labels_of("why")[i]])
+    rows = [_row(one) for one in view.found.levels]
     said = (
         "Predicted and found errors, and the answer, are those of the peak. **Alone**: from where to where around the peak nothing slips, or the "
         "other modes move by at most 5 % of the mode and change the amplitude by at most that."
@@ -269,49 +268,48 @@ def table(view: Synthesised) -> Table | None:
     return Table(head, rows, "Levels", (said,), worded=True, items=_cycles(view))
 
 
+def _row(one: SynthesisLevel) -> list[str]:
+    hertz, low, high = one.peak_omega / HZ, one.alone_from / HZ, one.alone_to / HZ
+    nowhere = "nowhere" if np.isfinite(one.peak) else NONE
+    return [
+        number(one.level),
+        quantity(one.peak, "m", 5),
+        number(hertz, 7) if np.isfinite(hertz) else NONE,
+        f"**{one.answer}**" if one.answer != "trusted" else one.answer,
+        _share(max(one.output, one.gaps)),
+        _share(one.foreign),
+        f"{number(low, 5)} to {number(high, 5)}" if np.isfinite(low) else nowhere,
+        one.why,
+    ]
+
+
 def against_direct(view: Synthesised) -> Table | None:
     """Return the differences from the direct solutions, of the peaks and along the curves."""
-    if not view.has("direct_error"):
+    if not view.found.direct:
         return None
-    names = ("peak_amplitude", "direct_peak_amplitude", "direct_error", "along_error", "along_error_hz")
-    columns = [view.floats(n) for n in names]
     rows = []
-    for i in range(view.levels.size):
-        peak, direct, error, along, hertz = (float(c[i]) for c in columns)
-        rows.append(
-            [
-                number(float(view.levels[i])),
-                quantity(peak, "m", 5),
-                quantity(direct, "m", 5),
-                _share(error),
-                _share(along),
-                number(hertz, 5),
-            ]
-        )
+    for one in view.found.levels:
+        known = (one.direct_peak, one.direct_error, one.along_error, one.along_error_omega)
+        peak, error, along, omega = (np.nan if value is None else value for value in known)
+        lengths = [quantity(size, "m", 5) for size in (one.peak, peak)]
+        rows.append([number(one.level), *lengths, _share(error), _share(along), number(omega / HZ, 5)])
     head = ["level", "peak", "direct peak", "error of the peak", "largest along the curve, where alone", "at (Hz)"]
     return Table(head, rows, "Against direct solutions")
 
 
 def passage_peaks(view: Synthesised) -> Table | None:
     """Return the peak of each passage beside the steady one."""
-    if not view.has("passage_peak_amplitude"):
-        return None
-    peak, hertz, share, change = (
-        view.values(f"passage_{n}", "level", "rate") for n in ("peak_amplitude", "peak_frequency_hz", "share", "change")
-    )
     rows = [
         [
-            number(float(view.levels[i])),
-            number(float(rate)),
-            quantity(float(peak[i, j]), "m", 5),
-            number(float(hertz[i, j]), 5),
-            quantity(float(view.floats("peak_amplitude")[i]), "m", 5),
-            _share(float(share[i, j])),
-            _share(float(change[i, j])),
+            number(one.level),
+            number(passage.rate),
+            quantity(passage.peak, "m", 5),
+            number(passage.hertz, 5),
+            quantity(one.peak, "m", 5),
+            _share(passage.share),
+            _share(passage.change),
         ]
-        for i in view.shown
-        for j, rate in enumerate(view.floats("passage_hz_per_s"))
-        if np.isfinite(peak[i, j])
+        for one, passage in view.found.passages
     ]
     head = ["level", "rate (Hz/s)", "peak", "at (Hz)", "steady peak", "share of it", "change in a radian"]
     return Table(head, rows, "Passages") if rows else None
@@ -319,19 +317,20 @@ def passage_peaks(view: Synthesised) -> Table | None:
 
 def _cycles(view: Synthesised) -> list[str]:
     """Return the amplitudes at which the mode goes on without any load."""
-    if not view.has("cycle_amplitude"):
+    amplitudes = view.found.cycle_amplitude
+    if amplitudes is None:
         return []
-    each = joined([quantity(float(a), "m", 4) for a in view.floats("cycle_amplitude")])
+    each = joined([quantity(a, "m", 4) for a in amplitudes.tolist()])
     return [f"The damping of the mode is zero at {each}: limit cycles, which `[limit_cycle]` examines."]
 
 
 def _cards(view: Synthesised) -> list[Card]:
     words = {"trusted": "trusted", "doubtful": "doubtful", "refused": "refused", "beyond": "beyond the mode"}
-    each = {answer: view.answers.count(answer) for answer in words}
+    each = {answer: len(view.answered(answer)) for answer in words}
     note = joined([f"{n} {words[answer]}" for answer, n in each.items() if n and answer != "trusted"])
     return [
         Card(
-            f"{each['trusted']} of {len(view.answers)}",
+            f"{each['trusted']} of {len(view.found.levels)}",
             "peaks of levels trusted to one nonlinear mode",
             note or "no other is doubtful or refused",
             bool(note),

@@ -176,7 +176,6 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         overlap=alone.overlap,
         growth=alone.growth,
         harmonics=alone.harmonics,
-        linear=int(alone.linear),
         resolved=resolved,
         detached=int(curve.curve.max(initial=0)) if shown else 0,
         omega=curve.omega[inside],

@@ -1,16 +1,18 @@
 """Verdicts on synthesised responses, and the terminal tables."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import number, told_apart
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.modal_synthesis.percents import percent
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.response.nonlinear_modes.single_mode_validity import ALONE
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Level, Verdict
+from stickslip.units import HZ
 
 ASK = "Ask for [forced_response] there."
 REMEDIES = {
@@ -27,30 +29,27 @@ ALONG = 0.05  # of the curve where the mode answers alone, against the direct so
 FEW = 4  # levels that are named each
 
 
-def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables."""
-    if "level" not in case:
+def case_verdicts(label: str, case: ModalSynthesis) -> list[Verdict]:
+    """Return what is to be thought of a case."""
+    if not case.levels:
         return []
-    answers = [str(a) for a in case["answer"].values]
-    apart = np.isfinite(case["detached_peak_amplitude"].values)
-    found = [
-        _of_answer(label, case, answer, own, remedy)
-        for answer, told in REMEDIES.items()
-        for remedy, among in ((told, ~apart), (APART, apart))
-        if (own := np.flatnonzero((np.array(answers) == answer) & among)).size
-    ]
-    if not set(answers) & {"trusted", "doubtful"}:
+    found = []
+    for answer, told in REMEDIES.items():
+        there = [level for level in case.levels if level.answer == answer]
+        for remedy, apart in ((told, False), (APART, True)):
+            own = [level for level in there if bool(np.isfinite(level.detached_peak)) == apart]
+            if own:
+                found.append(_of_answer(label, case, answer, own, remedy))
+    if not any(level.shown for level in case.levels):
         why = "nothing is left: at no level the nonlinear mode answers alone"
         found.append(Verdict("wrong", label, None, why, "Ask for [forced_response]."))
     return [*found, *_of_direct(label, case), *_of_passages(label, case)]
 
 
-def _of_answer(label: str, case: Mapping[str, xr.Variable], answer: str, own: IntArray, remedy: str) -> Verdict:
+def _of_answer(label: str, case: ModalSynthesis, answer: str, own: Sequence[SynthesisLevel], remedy: str) -> Verdict:
     """Return one verdict on all levels with the same answer and remedy: that of the worst of them."""
-    foreign = np.nan_to_num(case["foreign"].values[own], nan=0.0)
-    worst = int(own[int(np.argmax(foreign))])
-    levels = case["level"].values[own]
-    span = _levels(levels)
+    worst = own[int(np.argmax(np.nan_to_num([level.foreign for level in own], nan=0.0)))]
+    span = _levels(own)
     what = {
         "trusted": f"the nonlinear mode answers alone at {span}",
         "doubtful": f"the response at {span} is doubtful",
@@ -58,109 +57,107 @@ def _of_answer(label: str, case: Mapping[str, xr.Variable], answer: str, own: In
         "beyond": f"no peak at {span}",
     }[answer]
     level: Level = "trusted" if answer == "trusted" else "doubtful"
-    at = "" if own.size == 1 else f"at {case['level'].values[worst]:g} "
-    why = f"{what}: {at}{case['why'].values[worst]!s}"
+    at = "" if len(own) == 1 else f"at {worst.level:g} "
+    why = f"{what}: {at}{worst.why}"
     if answer in ("trusted", "doubtful"):
-        why += f". {_of_peaks(case, own)}"
-    solved = remedy == REMEDIES["doubtful"] and "direct_error" in case
+        why += f". {_of_peaks(own)}"
+    solved = remedy == REMEDIES["doubtful"] and case.direct
     return Verdict(level, label, None, why, BESIDE if solved else remedy)
 
 
-def _of_peaks(case: Mapping[str, xr.Variable], own: IntArray) -> str:
+def _of_peaks(own: Sequence[SynthesisLevel]) -> str:
     """Say that this is the peak, and within which frequencies around it the mode answers alone: the narrowest of some levels."""
-    low, high = (case[name].values[own] for name in ("alone_from_hz", "alone_to_hz"))
-    around = np.flatnonzero(np.isfinite(low))
-    said = "This is said of the peak" if own.size == 1 else "This is said of the peaks"
-    if not around.size:
+    around = [level for level in own if np.isfinite(level.alone_from)]
+    said = "This is said of the peak" if len(own) == 1 else "This is said of the peaks"
+    if not around:
         return f"{said}: the rest of the curve may be off by more, since the other modes change it by more than {percent(ALONE)}"
-    few = int(around[int(np.argmin(high[around] / low[around]))])
-    level = "" if own.size == 1 else f" at level {case['level'].values[own[few]]:g}"
-    wider = " and in a wider range at the others" if around.size == own.size > 1 else ""
-    rest = np.delete(own, around)
-    if rest.size:
-        wider = f", and at {_levels(case['level'].values[rest])} not even at the peak"
-    return f"{said}: along the curve the other modes stay below {percent(ALONE)} from {low[few]:.5g} to {high[few]:.5g} Hz{level}{wider}"
+    few = min(around, key=lambda level: (level.alone_to / HZ) / (level.alone_from / HZ))
+    low, high = few.alone_from / HZ, few.alone_to / HZ
+    level = "" if len(own) == 1 else f" at level {few.level:g}"
+    wider = " and in a wider range at the others" if len(around) == len(own) > 1 else ""
+    rest = [one for one in own if not np.isfinite(one.alone_from)]
+    if rest:
+        wider = f", and at {_levels(rest)} not even at the peak"
+    return f"{said}: along the curve the other modes stay below {percent(ALONE)} from {low:.5g} to {high:.5g} Hz{level}{wider}"
 
 
-def _of_direct(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    if "direct_error" not in case:
+def _of_direct(label: str, case: ModalSynthesis) -> list[Verdict]:
+    known = [(abs(e), level) for level in case.levels if (e := level.direct_error) is not None and np.isfinite(e)]
+    if not known:
         return []
-    error = np.abs(case["direct_error"].values)
-    shown = np.isfinite(error)
-    if not np.any(shown):
-        return []
-    worst = int(np.nanargmax(np.where(shown, error, np.nan)))
-    level = case["level"].values
-    why = f"synthesised peaks differ from direct ones by up to {percent(error[worst])}, at level {level[worst]:g}"
-    off = bool(error[worst] > WRONG)
-    found = [Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")]
-    along = np.abs(case["along_error"].values)
-    if np.any(np.isfinite(along)):
-        worst = int(np.nanargmax(along))
-        off = bool(along[worst] > ALONG)
-        hertz = case["along_error_hz"].values[worst]
-        why = f"where the other modes stay below {percent(ALONE)} synthesised curves differ from direct ones by up to {percent(along[worst])}, at level {level[worst]:g} and {hertz:.5g} Hz"
-        found.append(
-            Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")
-        )
+    error, worst = max(known, key=lambda found: found[0])
+    why = f"synthesised peaks differ from direct ones by up to {percent(error)}, at level {worst.level:g}"
+    found = [_against(label, why, off=error > WRONG)]
+    along = [(abs(e), level) for level in case.levels if (e := level.along_error) is not None and np.isfinite(e)]
+    if along:
+        error, worst = max(along, key=lambda found: found[0])
+        hertz = np.nan if worst.along_error_omega is None else worst.along_error_omega / HZ
+        why = f"where the other modes stay below {percent(ALONE)} synthesised curves differ from direct ones by up to {percent(error)}, at level {worst.level:g} and {hertz:.5g} Hz"
+        found.append(_against(label, why, off=error > ALONG))
     return found
 
 
-def _of_passages(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    if "passage_change" not in case:
+def _against(label: str, why: str, *, off: bool) -> Verdict:
+    return Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")
+
+
+def _of_passages(label: str, case: ModalSynthesis) -> list[Verdict]:
+    rates = case.passage_hz_per_s
+    if rates is None or not rates.size:
         return []
-    change, finished = case["passage_change"].values, case["passage_finished"].values
-    found, known = [], np.isfinite(change)
-    fast = known & (change > FAST)
-    if np.any(fast):
-        rate = float(np.min(case["passage_hz_per_s"].values[np.any(fast, axis=0)]))
-        levels = case["level"].values[np.any(fast, axis=1)]
+    found = []
+    fast = [(level.passage_change > FAST, level) for level in case.levels]
+    if any(own.any() for own, _ in fast):
+        rate = min(float(rates[own].min()) for own, _ in fast if own.any())
+        levels = [level for own, level in fast if own.any()]
         why = f"in passages from {rate:g} Hz/s on at {_levels(levels)} the amplitude changes by more than {percent(FAST)} in a radian of the vibration"
         found.append(Verdict("doubtful", label, None, why, "Integrate in time where the peak counts."))
-    left = known & (finished == 0)
-    if np.any(left):
-        why = f"a passage at {_levels(case['level'].values[np.any(left, axis=1)])} left the nonlinear mode at its end"
+    left = [level for level in case.levels if np.any(np.isfinite(level.passage_change) & (level.passage_finished == 0))]
+    if left:
+        why = f"a passage at {_levels(left)} left the nonlinear mode at its end"
         found.append(Verdict("doubtful", label, None, why, "Raise modal_synthesis.amplitude_mm."))
     return found
 
 
-def _levels(levels: FloatArray) -> str:
+def _levels(among: Sequence[SynthesisLevel]) -> str:
     """Name levels: each of a few, the number and the range of many."""
-    if levels.size == 1:
+    levels = [one.level for one in among]
+    if len(levels) == 1:
         return f"level {levels[0]:g}"
-    if levels.size <= FEW:
+    if len(levels) <= FEW:
         return f"levels {', '.join(f'{v:g}' for v in levels[:-1])} and {levels[-1]:g}"
-    return f"{levels.size} levels from {levels.min():g} to {levels.max():g}"
+    return f"{len(levels)} levels from {min(levels):g} to {max(levels):g}"
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the levels of each case."""
     found = []
-    for case, head in told_apart(data):
-        if "level" in case:
+    for one, head in told_apart(data):
+        case: ModalSynthesis = record_of(ModalSynthesis, one)
+        if case.levels:
             found.append(_table(case, head))
             found += _passages(case, head)
     return tuple(found)
 
 
-def _table(case: xr.Dataset, head: str) -> TextTable:
-    direct = "direct_error" in case
+def _table(case: ModalSynthesis, head: str) -> TextTable:
+    direct = case.direct
     rows = []
-    for i in range(case.sizes["level"]):
+    for level in case.levels:
         row = [
-            f"{float(case['level'][i]):g}",
-            number(1e3 * float(case["peak_amplitude"][i])),
-            number(float(case["peak_frequency_hz"][i]), 7),
-            percent(float(max(case["others_in_output"][i], case["others_in_gaps"][i])), unit=False),
-            percent(float(case["foreign"][i]), unit=False),
-            _range(case, i),
-            str(case["answer"][i].values),
+            f"{level.level:g}",
+            number(1e3 * level.peak),
+            number(level.peak_omega / HZ, 7),
+            percent(max(level.output, level.gaps), unit=False),
+            percent(level.foreign, unit=False),
+            _range(level),
+            level.answer,
         ]
         if direct:
             row += [
-                number(1e3 * float(case["direct_peak_amplitude"][i])),
-                percent(float(case["direct_error"][i]), unit=False),
-                percent(float(case["along_error"][i]), unit=False),
+                number(1e3 * _known(level.direct_peak)),
+                percent(_known(level.direct_error), unit=False),
+                percent(_known(level.along_error), unit=False),
             ]
         rows.append(tuple(row))
     beside = ("direct mm", "error %", "along %") if direct else ()
@@ -172,38 +169,30 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
             "error: of the peak against the direct one; along: the largest along the curve where the mode is alone"
         )
     columns = ("level", "peak mm", "Hz", "others %", "predicted error %", "alone Hz", "answer", *beside)
-    return TextTable(
-        f"{head}Responses of one nonlinear mode, {case.attrs.get('output', '')}", columns, tuple(rows), tuple(lines)
-    )
+    return TextTable(f"{head}Responses of one nonlinear mode, {case.output}", columns, tuple(rows), tuple(lines))
 
 
-def _range(case: xr.Dataset, i: int) -> str:
-    low, high = (float(case[name][i]) for name in ("alone_from_hz", "alone_to_hz"))
+def _known(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _range(level: SynthesisLevel) -> str:
+    low, high = level.alone_from / HZ, level.alone_to / HZ
     return f"{low:.5g} to {high:.5g}" if np.isfinite(low) else "-"
 
 
-def _passages(case: xr.Dataset, head: str) -> list[TextTable]:
+def _passages(case: ModalSynthesis, head: str) -> list[TextTable]:
     """Return the peaks of the passages."""
-    if "passage_peak_amplitude" not in case:
-        return []
-    rows = []
-    for i in range(case.sizes["level"]):
-        for j in range(case.sizes["rate"]):
-            peak = float(case["passage_peak_amplitude"][i, j])
-            if np.isfinite(peak):
-                rows.append(
-                    (
-                        f"{float(case['level'][i]):g}",
-                        f"{float(case['passage_hz_per_s'][j]):g}",
-                        number(1e3 * peak),
-                        number(float(case["passage_peak_frequency_hz"][i, j])),
-                        percent(float(case["passage_share"][i, j]), unit=False),
-                        percent(float(case["passage_change"][i, j]), unit=False),
-                    )
-                )
+    rows = [
+        (
+            f"{level.level:g}",
+            f"{passage.rate:g}",
+            number(1e3 * passage.peak),
+            number(passage.hertz),
+            percent(passage.share, unit=False),
+            percent(passage.change, unit=False),
+        )
+        for level, passage in case.passages
+    ]
     columns = ("level", "Hz/s", "peak mm", "at Hz", "of the steady one %", "change in a radian %")
-    return (
-        [TextTable(f"{head}Passages through resonance, {case.attrs.get('output', '')}", columns, tuple(rows))]
-        if rows
-        else []
-    )
+    return [TextTable(f"{head}Passages through resonance, {case.output}", columns, tuple(rows))] if rows else []
