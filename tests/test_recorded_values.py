@@ -30,7 +30,8 @@ from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
 from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord
-from stickslip.analyses.resonance.dataset import dataset as of_resonances
+from stickslip.analyses.resonance.analysis import RESONANCE
+from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.run_up import values
 from stickslip.analyses.run_up.fast import name_of
 from stickslip.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
@@ -552,7 +553,7 @@ def test_resonances() -> None:
     ]
     asked = SimpleNamespace(parameter="load.ratio", by="phase", values=(1.0, 2.0, 3.0))
     notes = {"smallest": {"value": 1.2, "amplitude": 1.5, "omega": 104.0}, "model": {"output": "b.x"}}
-    data = of_resonances(solved(points, notes, resonance=asked))
+    data = RESONANCE.dataset(solved(points, notes, resonance=asked))
     known = np.array([[1.0, 2.0, NAN], [1.0, 2.0, 3.0]])
     check(
         data,
@@ -577,11 +578,11 @@ def test_resonances() -> None:
         smallest_frequency_hz=104.0 / HZ,
     )
     assert data.attrs["failed"] == 1
-    higher = of_resonances(
+    higher = RESONANCE.dataset(
         solved(points, {"smallest": {"value": 1.2, "amplitude": 2.5, "omega": 104.0}}, resonance=asked)
     )
     check(higher, smallest_value=1.5, smallest_amplitude=2.0, smallest_frequency_hz=NAN)
-    visited = of_resonances(
+    visited = RESONANCE.dataset(
         solved(points[:1], {"smallest": {"value": 1.2, "amplitude": 3.5, "omega": 104.0}}, resonance=asked)
     )
     assert "smallest_value" not in visited
@@ -836,6 +837,7 @@ RECORDS = (
     NonlinearModes,
     QuasiPeriodic,
     ResidualTractions,
+    Resonances,
     *KINDS,
 )  # of cases, whose fields are columns
 

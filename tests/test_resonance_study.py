@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from study_texts import DETACHED, JENKINS, answered, study_of
 
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.resonance.analysis import RESONANCE
 from stickslip.analyses.resonance.page import Peaks, amplitudes, peak_table
+from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.resonance.verdicts import case_verdicts
 from stickslip.api.study import Study
 from stickslip.assembly.model import Model as Assembly
@@ -37,7 +39,7 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     assert case.attrs["smallest_amplitude"] == pytest.approx(0.5509002, abs=5e-8)
     assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
     own = outcome.tree["resonance"].to_dataset().isel(case=0).variables
-    (trusted,) = case_verdicts("", own, {}, [0.2, 0.12, 0.09])
+    (trusted,) = case_verdicts("", record_of(Resonances, own), {}, [0.2, 0.12, 0.09])
     assert trusted.why.endswith("followed from the first value, not held against sweeps at the others")
 
 

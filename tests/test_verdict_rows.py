@@ -24,6 +24,7 @@ from stickslip.analyses.quasi_periodic.records import QuasiPeriodic
 from stickslip.analyses.residual_tractions import verdicts as tractions
 from stickslip.analyses.residual_tractions.records import ResidualTractions
 from stickslip.analyses.resonance import verdicts as resonances
+from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.run_up import verdicts as running
 from stickslip.analyses.waves import doubts as waves
 from stickslip.analyses.waves.flutter import _doubts, _unstable, _unstable_wheel
@@ -414,8 +415,8 @@ PEAKS: dict[str, Any] = {
 OVER = {"overtaking_value": [1.5], "overtaking_before": [0], "overtaking_after": [1]}
 MET = ("trusted", "2 peaks of tip.x over load.ratio", "followed from the first value")
 PEAK_ROWS: list[tuple[dict[str, Any], dict[str, Any], list[tuple[str, ...]]]] = [
-    ({"maximum": None}, {}, [("wrong", "no peak was found. Widen")]),
-    ({"maximum": None}, {"last": {"problem": "is empty"}}, [("wrong", "no peak was found: the range is empty")]),
+    (dict.fromkeys(PEAKS), {}, [("wrong", "no peak was found. Widen")]),
+    (dict.fromkeys(PEAKS), {"last": {"problem": "is empty"}}, [("wrong", "no peak was found: the range is empty")]),
     ({}, {}, [MET]),
     (
         {"maximum": [[1, 1, 1]], "value": [[1.0, 1.0, 1.0]], "below": [[0.0] * 3]},
@@ -489,7 +490,7 @@ def test_a_case_is_told_as_it_is(words: Any, base: dict[str, Any], row: Row) -> 
 @pytest.mark.parametrize("row", PEAK_ROWS)
 def test_peaks_are_told_as_they_are(row: Any) -> None:
     changes, notes, expected = row
-    check(resonances.case_verdicts("", case_of(PEAKS, changes), notes, ()), expected)
+    check(resonances.case_verdicts("", record_of(Resonances, case_of(PEAKS, changes)), notes, ()), expected)
 
 
 @pytest.mark.parametrize(
@@ -503,7 +504,7 @@ def test_peaks_are_told_as_they_are(row: Any) -> None:
 )
 def test_a_peak_that_joins_another_ends_where_it_was_last_seen(own: Any, expected: Any) -> None:
     case = case_of(PEAKS, {"maximum": [[1, 1, 1]], "value": [own], "below": [[0.0] * 3]})
-    found = resonances.case_verdicts("", case, {}, (1.0, 2.0, 3.0))
+    found = resonances.case_verdicts("", record_of(Resonances, case), {}, (1.0, 2.0, 3.0))
     check(found, [*expected, ("trusted",)])
 
 

@@ -3,12 +3,14 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import xarray as xr
 
-from stickslip.analyses.resonance.dataset import dataset
+from stickslip.analyses.collected import of_answers
 from stickslip.analyses.resonance.envelope import heights, valley
 from stickslip.analyses.resonance.problem import Question, more_than, question_of
+from stickslip.analyses.resonance.records import Resonances, answer
 from stickslip.analyses.resonance.table import ResonanceTable
-from stickslip.analyses.resonance.verdicts import tables
+from stickslip.analyses.resonance.verdicts import case_verdicts, tables
 from stickslip.analyses.vibrating import represented
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
@@ -17,9 +19,9 @@ from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, represented_as, smallest_peak
-from stickslip.study.analysis import Analysis, Case, Notes, of_tables
+from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
 from stickslip.study.store.progress import LOG, advance
-from stickslip.study.verdict import doubt, to_json
+from stickslip.study.verdict import Verdict, doubt, to_json
 from stickslip.units import HZ, millimetres
 
 SWEEPS = 8  # at most, at values spread over those that are in question
@@ -177,6 +179,22 @@ def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float
     return {"value": best.value, "amplitude": best.amplitude, "omega": best.omega}
 
 
+def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    """Return the peaks of all cases."""
+    by_label = {one.case.label: one for one in solved}
+
+    def verdicts(label: str, own: Resonances) -> Sequence[Verdict]:
+        one = by_label[label]
+        return case_verdicts(label, own, one.notes, one.case.settings.resonance.values or ())
+
+    return of_answers(solved, answer, verdicts, _lost)
+
+
+def _lost(found: Resonances) -> int:
+    """Return how many points have no solution."""
+    return sum(int(np.sum(peak.maximum == -1)) for peak in found.peaks)
+
+
 RESONANCE = Analysis(
     name="resonance",
     table=ResonanceTable,
@@ -184,7 +202,7 @@ RESONANCE = Analysis(
     key=of_tables("resonance", "solver"),
     inputs=_inputs,
     solve=_solve,
-    dataset=dataset,
+    dataset=_dataset,
     check=_check,
     summary=tables,
 )

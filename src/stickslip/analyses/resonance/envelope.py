@@ -7,27 +7,18 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.column import column
 from stickslip.response.resonances.point import PeakPoint
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Overtaking:
-    """A value of the parameter at which another peak becomes the highest, in the order of visits.
+    """A value of the parameter at which another peak becomes the highest, interpolated between two visited ones, in the order of visits."""
 
-    Parameters
-    ----------
-    value
-        Value of the parameter, interpolated between two visited ones.
-    before, after
-        Numbers of the peaks.
-    amplitude
-        Amplitude at this value, m.
-    """
-
-    value: float
-    before: int
-    after: int
-    amplitude: float
+    value: float = column("1", "where another peak becomes the highest")
+    before: int = column("1", "number of the peak that was")
+    after: int = column("1", "number of the peak that is from there on")
+    amplitude: float = column("m", "amplitude of both there")
 
 
 def heights(points: Sequence[PeakPoint], values: Sequence[float]) -> FloatArray:
@@ -92,7 +83,7 @@ def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaki
         share = gap[0] / (gap[0] - gap[1])
         value = values[i] + share * (values[j] - values[i])
         there = amplitude[b, i] + share * (amplitude[b, j] - amplitude[b, i])
-        found.append(Overtaking(float(value), a, b, float(there)))
+        found.append(Overtaking(value=float(value), before=a, after=b, amplitude=float(there)))
     return found
 
 

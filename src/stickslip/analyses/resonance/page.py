@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.node import Node
@@ -24,45 +27,43 @@ _BY = {
 class Peaks(Node):
     """One case."""
 
-    @property
-    def count(self) -> int:
-        """Number of peaks."""
-        return int(self.data.sizes["peak"])
+    @cached_property
+    def found(self) -> Resonances:
+        """What was found."""
+        known: Resonances = record_of(Resonances, self.data)
+        return known
 
-    def curve(self, name: str, i: int) -> FloatArray:
-        """Return a quantity of a peak along its curve."""
-        there = self.values("maximum", "peak", "point")[i] > -2
-        return np.asarray(self.values(name, "peak", "point")[i][there])
+    @property
+    def amplitude(self) -> FloatArray:
+        """Of all points of all peaks, m."""
+        return np.concatenate([peak.amplitude for peak in self.found.peaks])
 
 
 def amplitudes(view: Peaks) -> Plot:
     """Show the amplitude of the peaks over the parameter, the lowest place of the highest, and where one overtakes another."""
-    scale = scale_for(view.floats("amplitude"), "m")
-    figure = _over_parameter(view, "amplitude", scale.factor, scale.unit)
-    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")
+    found, scale = view.found, scale_for(view.amplitude, "m")
+    figure = _over_parameter(found, [scale.factor * peak.amplitude for peak in found.peaks], scale.unit)
+    figure.update_yaxes(title_text=f"amplitude of {found.output} ({scale.unit})", rangemode="tozero")
     parts = [
-        f"{counted(view.count, 'peak')} followed over {view.text('parameter')}: {_BY[view.text('by')]}.",
-        "Dashed: the curve has met a minimum of the response, and is no peak any more." * _any_minimum(view),
+        f"{counted(len(found.peaks), 'peak')} followed over {found.parameter}: {_BY[found.by]}.",
+        "Dashed: the curve has met a minimum of the response, and is no peak any more." * _any_minimum(found),
     ]
-    if np.isfinite(view.scalar("smallest_value")):
-        x, y, hertz = (view.scalar(f"smallest_{k}") for k in ("value", "amplitude", "frequency_hz"))
+    if found.smallest is not None:
+        x, y, hertz = found.smallest
         _mark(figure, np.array([x]), scale.factor * np.array([y]), "lowest", INK)
         where = f"at {number(hertz, 6)} Hz" if np.isfinite(hertz) else "where two are equally high"
         parts.append(f"The highest peak is lowest at **{number(x, 5)}**: {quantity(y, 'm', 5)} {where}.")
-    if view.has("overtaking_value"):
-        met, height = view.floats("overtaking_value"), view.floats("overtaking_amplitude")
-        _mark(figure, met, scale.factor * height, "overtaken", MUTED)
-        told = [
-            f"peak {a + 1} by peak {b + 1} at {number(float(v), 4)}"
-            for v, a, b in zip(met, view.integers("overtaking_before"), view.integers("overtaking_after"), strict=True)
-        ]
+    if met := found.overtakings:
+        places, heights = np.array([m.value for m in met]), np.array([m.amplitude for m in met])
+        _mark(figure, places, scale.factor * heights, "overtaken", MUTED)
+        told = [f"peak {m.before + 1} by peak {m.after + 1} at {number(m.value, 4)}" for m in met]
         parts.append(f"Overtaken: {joined(told)}.")
     return Plot(f"resonances{view.key}", "Amplitude of the peaks", " ".join(p for p in parts if p), figure)
 
 
 def frequencies(view: Peaks) -> Plot:
     """Show the frequency of the peaks."""
-    figure = _over_parameter(view, "frequency_hz", 1.0, "Hz")
+    figure = _over_parameter(view.found, [peak.frequency_hz for peak in view.found.peaks], "Hz")
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = "Frequency of each peak, in the colours of the figure above."
     return Plot(f"resonance_frequency{view.key}", "Frequency of the peaks", caption, figure)
@@ -70,7 +71,7 @@ def frequencies(view: Peaks) -> Plot:
 
 def phases(view: Peaks) -> Plot:
     """Show how far the output is behind the force."""
-    figure = _over_parameter(view, "phase_deg", 1.0, "°")
+    figure = _over_parameter(view.found, [peak.phase_deg for peak in view.found.peaks], "°")
     figure.update_yaxes(title_text="phase of the output (°)")
     caption = (
         "Phase of the output against the force at each peak. Where it is not −90° a peak in quadrature would be another one: several forces, several "
@@ -81,14 +82,14 @@ def phases(view: Peaks) -> Plot:
 
 def energies(view: Peaks) -> Plot:
     """Show what the loads put in, and the part of it that friction takes."""
-    scale = scale_for(view.floats("energy"), "J")
-    figure = _over_parameter(view, "energy", scale.factor, scale.unit)
-    for i in range(view.count):
-        own = scale.factor * view.curve("friction_energy", i)
+    peaks = view.found.peaks
+    scale = scale_for(np.concatenate([peak.energy for peak in peaks]), "J")
+    figure = _over_parameter(view.found, [scale.factor * peak.energy for peak in peaks], scale.unit)
+    for i, peak in enumerate(peaks):
         figure.add_trace(
             go.Scatter(
-                x=view.curve("value", i),
-                y=own,
+                x=peak.value[peak.known],
+                y=scale.factor * peak.friction_energy[peak.known],
                 mode="lines",
                 name=f"peak {i + 1}, contacts",
                 line={"color": colour(i), "width": 1.4, "dash": "dot"},
@@ -102,36 +103,35 @@ def energies(view: Peaks) -> Plot:
 
 def peak_table(view: Peaks) -> Table:
     """Return the peaks."""
-    rows = []
-    for i in range(view.count):
-        columns = [
-            view.curve(k, i)
-            for k in ("value", "frequency_hz", "amplitude", "phase_deg", "energy", "friction_energy", "maximum")
-        ]
-        for value, hertz, height, phase, energy, friction, kind in zip(*columns, strict=True):
-            share = 100 * friction / energy if energy > 0.0 else np.nan
-            word = {1: "", 0: " (no maximum)", -1: " (not found)"}[int(kind)]
-            rows.append(
-                [
-                    f"{i + 1}{word}",
-                    number(float(value), 6),
-                    number(float(hertz), 6),
-                    quantity(float(height), "m", 5),
-                    number(float(phase), 4),
-                    quantity(float(energy), "J", 4),
-                    f"{number(float(share), 3)} %" if np.isfinite(share) else NONE,
-                ]
-            )
-    head = ["peak", view.text("parameter"), "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]
+    rows = [
+        _row(i + 1, peak, k) for i, peak in enumerate(view.found.peaks) for k in np.flatnonzero(peak.known).tolist()
+    ]
+    head = ["peak", view.found.parameter, "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]
     return Table(head, rows, "Peaks")
 
 
-def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figure:
+def _row(number_of: int, peak: PeakCurve, k: int) -> list[str]:
+    energy = float(peak.energy[k])
+    share = 100 * float(peak.friction_energy[k]) / energy if energy > 0.0 else np.nan
+    word = {1: "", 0: " (no maximum)", -1: " (not found)"}[int(peak.maximum[k])]
+    return [
+        f"{number_of}{word}",
+        number(float(peak.value[k]), 6),
+        number(float(peak.frequency_hz[k]), 6),
+        quantity(float(peak.amplitude[k]), "m", 5),
+        number(float(peak.phase_deg[k]), 4),
+        quantity(energy, "J", 4),
+        f"{number(share, 3)} %" if np.isfinite(share) else NONE,
+    ]
+
+
+def _over_parameter(found: Resonances, each: Sequence[FloatArray], unit: str) -> go.Figure:
+    """Draw a quantity of each peak over the parameter."""
     figure = go.Figure()
-    for i in range(view.count):
-        value, own, kind = (view.curve(k, i) for k in ("value", name, "maximum"))
+    for i, (peak, own) in enumerate(zip(found.peaks, each, strict=True)):
+        value, kind = peak.value[peak.known], peak.maximum[peak.known]
         for low in (False, True):
-            shown = np.where((kind == 0) == low, factor * own, np.nan)
+            shown = np.where((kind == 0) == low, own[peak.known], np.nan)
             if low and not np.any(np.isfinite(shown)):
                 continue
             figure.add_trace(
@@ -146,7 +146,7 @@ def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figu
                 )
             )
     styled(figure, 440)
-    figure.update_xaxes(title_text=view.text("parameter"))
+    figure.update_xaxes(title_text=found.parameter)
     return figure
 
 
@@ -163,19 +163,20 @@ def _mark(figure: go.Figure, x: FloatArray, y: FloatArray, name: str, shade: str
     )
 
 
-def _any_minimum(view: Peaks) -> bool:
-    return bool(np.any(view.integers("maximum") == 0))
+def _any_minimum(found: Resonances) -> bool:
+    return any(bool(np.any(peak.maximum == 0)) for peak in found.peaks)
 
 
 def _cards(view: Peaks) -> Sequence[Card]:
-    known = view.floats("amplitude")
-    if np.isfinite(view.scalar("smallest_value")):
-        note = f"lowest, at {view.text('parameter')} = {number(view.scalar('smallest_value'), 4)}"
-        return [Card(quantity(view.scalar("smallest_amplitude"), "m", 4), "highest resonance", note)]
-    if not np.any(np.isfinite(known)):
+    found = view.found
+    if found.smallest is not None:
+        value, amplitude, _ = found.smallest
+        note = f"lowest, at {found.parameter} = {number(value, 4)}"
+        return [Card(quantity(amplitude, "m", 4), "highest resonance", note)]
+    if not np.any(np.isfinite(view.amplitude)):
         return []
-    span = f"{counted(view.count, 'peak')} over {view.text('parameter')}"
-    return [Card(quantity(float(np.nanmax(known)), "m", 4), "highest resonance", span)]
+    span = f"{counted(len(found.peaks), 'peak')} over {found.parameter}"
+    return [Card(quantity(float(np.nanmax(view.amplitude)), "m", 4), "highest resonance", span)]
 
 
 _BLOCK = Block("resonances", "Resonances over a parameter", (amplitudes, frequencies, phases, energies, peak_table))

@@ -7,6 +7,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.collected import number, told_apart
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict, from_json
 from stickslip.units import millimetres
@@ -17,38 +19,37 @@ SPARSE = 12  # values that the terminal prints of each peak
 
 
 def case_verdicts(
-    label: str, case: Mapping[str, xr.Variable], notes: Mapping[str, Mapping[str, Any]], values: Sequence[float]
+    label: str, case: Resonances, notes: Mapping[str, Mapping[str, Any]], values: Sequence[float]
 ) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables and notes, and the values that were visited, if any."""
+    """Return what is to be thought of a case with its notes, and the values that were visited, if any."""
     found = list(from_json(str(notes.get("model", {}).get("verdicts", "[]"))))
     problem = str(notes.get("last", {}).get("problem", ""))
-    if "maximum" not in case:
+    if not case.peaks:
         why = f"no peak was found: the range {problem}" if problem else "no peak was found"
         return [*found, Verdict("wrong", label, None, why, "Widen resonance.frequency_hz.")]
-    kind, value = case["maximum"].values, case["value"].values
-    found += _of_points(label, kind, value)
+    found += _of_points(label, case)
     found += _of_unmet(label, notes.get("unmet", {}))
-    found += _of_joined(label, value, values)
+    found += _of_joined(label, case, values)
     found += _of_phase(label, case)
     found += _of_harmonics(label, notes.get("harmonics", {}))
-    if "overtaking_value" in case:
-        found += _of_overtaking(label, case)
+    found += _of_overtaking(label, case)
     if problem:
         why = f"whether the last value has a peak that none of the followed ones leads to is not known: the range {problem}"
         found.append(Verdict("doubtful", label, None, why, "Widen resonance.frequency_hz."))
     if not any(v.rank for v in found):
-        count = int(np.sum(np.any(kind >= 0, axis=1)))
-        why = f"{count} peak{'s' * (count > 1)} of {case['output'].values} over {case['parameter'].values}, every point a solution and a maximum"
+        count = sum(bool(np.any(peak.maximum >= 0)) for peak in case.peaks)
+        why = f"{count} peak{'s' * (count > 1)} of {case.output} over {case.parameter}, every point a solution and a maximum"
+        value = np.concatenate([peak.value for peak in case.peaks])
         if np.unique(value[np.isfinite(value)]).size > 1:
             why += "; followed from the first value, not held against sweeps at the others"
         found.append(Verdict("trusted", label, None, why))
     return found
 
 
-def _of_points(label: str, kind: np.ndarray, value: np.ndarray) -> list[Verdict]:
+def _of_points(label: str, case: Resonances) -> list[Verdict]:
     found = []
-    for i, own in enumerate(kind):
-        lost, low = value[i][own == -1], value[i][own == 0]
+    for i, peak in enumerate(case.peaks):
+        lost, low = peak.value[peak.maximum == -1], peak.value[peak.maximum == 0]
         if lost.size:
             why = f"peak {i + 1} was not found at {_values(lost)}"
             found.append(Verdict("doubtful", label, None, why, "Give values closer together, or resonance.span."))
@@ -81,11 +82,11 @@ def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
     return found
 
 
-def _of_joined(label: str, value: np.ndarray, values: Sequence[float]) -> list[Verdict]:
+def _of_joined(label: str, case: Resonances, values: Sequence[float]) -> list[Verdict]:
     """Return notes of peaks that end because they have become another one; those that were followed back end towards the first value."""
     found = []
-    for i, row in enumerate(value if values else []):
-        own = set(row[np.isfinite(row)].tolist())
+    for i, peak in enumerate(case.peaks if values else ()):
+        own = set(peak.value[np.isfinite(peak.value)].tolist())
         visited = values if values[0] in own else values[::-1]
         last = max((k for k, v in enumerate(visited) if v in own), default=-1)
         if last < 0 or last == len(visited) - 1:
@@ -95,15 +96,15 @@ def _of_joined(label: str, value: np.ndarray, values: Sequence[float]) -> list[V
     return found
 
 
-def _of_phase(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    if str(case["by"].values) == "horizontal_tangent":
+def _of_phase(label: str, case: Resonances) -> list[Verdict]:
+    if case.by == "horizontal_tangent":
         return []
-    below = case["below"].values
+    below = np.concatenate([peak.below for peak in case.peaks])
     known = np.isfinite(below)
     if not np.any(below[known] > FAR_BELOW):
         return []
     worst = float(np.max(below[known]))
-    why = f"by {case['by'].values} a peak lies {100 * worst:.2g} % below the largest amplitude beside it"
+    why = f"by {case.by} a peak lies {100 * worst:.2g} % below the largest amplitude beside it"
     return [Verdict("doubtful", label, None, why, 'Take by = "horizontal_tangent".')]
 
 
@@ -121,19 +122,10 @@ def _of_harmonics(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
     return [Verdict("doubtful", label, None, f"{what} changes by {100 * change:+.2g} % with {order} harmonics", remedy)]
 
 
-def _of_overtaking(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
-    each = zip(*(case[f"overtaking_{k}"].values for k in ("value", "before", "after")), strict=True)
-    return [
-        Verdict(
-            "trusted",
-            label,
-            None,
-            f"peak {b + 1} overtakes peak {a + 1} at {v:.4g}",
-            "Beyond, the highest amplitude is that of another resonance.",
-            warns=True,
-        )
-        for v, a, b in each
-    ]
+def _of_overtaking(label: str, case: Resonances) -> list[Verdict]:
+    remedy = "Beyond, the highest amplitude is that of another resonance."
+    each = [f"peak {met.after + 1} overtakes peak {met.before + 1} at {met.value:.4g}" for met in case.overtakings]
+    return [Verdict("trusted", label, None, why, remedy, warns=True) for why in each]
 
 
 def _values(values: np.ndarray) -> str:
@@ -143,42 +135,38 @@ def _values(values: np.ndarray) -> str:
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the peaks of each case."""
-    return tuple(_table(case, head) for case, head in told_apart(data) if "maximum" in case)
+    every = ((record_of(Resonances, case), head) for case, head in told_apart(data))
+    return tuple(_table(found, head) for found, head in every if found.peaks)
 
 
-def _table(case: xr.Dataset, head: str) -> TextTable:
+def _table(found: Resonances, head: str) -> TextTable:
     rows = []
-    for i in range(case.sizes["peak"]):
-        there = np.flatnonzero(case["maximum"].values[i] > -2)
+    for i, peak in enumerate(found.peaks):
+        there = np.flatnonzero(peak.known)
         few = there if there.size <= SPARSE else there[np.linspace(0, there.size - 1, SPARSE).astype(int)]
-        rows += [_row(case, i, int(k)) for k in few]
+        rows += [_row(str(i + 1), peak, int(k)) for k in few]
     columns = ("peak", "value", "Hz", "amplitude mm", "phase deg", "energy mJ", "of friction %")
     lines = []
-    if np.isfinite(float(case.attrs.get("smallest_value", np.nan))):
-        value, amplitude, hertz = (float(case.attrs[f"smallest_{k}"]) for k in ("value", "amplitude", "frequency_hz"))
+    if found.smallest is not None:
+        value, amplitude, hertz = found.smallest
         where = f"at {hertz:.6g} Hz" if np.isfinite(hertz) else "where two peaks are equally high"
         lines.append(f"The highest peak is lowest at {value:.6g}: {millimetres(amplitude, 6)} {where}.")
-    title = f"{head}Resonances of {case.attrs.get('output', '')} over {case.attrs.get('parameter', '')}"
+    title = f"{head}Resonances of {found.output} over {found.parameter}"
     return TextTable(title, columns, tuple(rows), tuple(lines))
 
 
-def _row(case: xr.Dataset, i: int, k: int) -> tuple[str, ...]:
-    kind = int(case["maximum"].values[i, k])
-    name = str(i + 1)
+def _row(name: str, peak: PeakCurve, k: int) -> tuple[str, ...]:
+    kind, value = int(peak.maximum[k]), float(peak.value[k])
     if kind == -1:
-        return (name, f"{float(case['value'].values[i, k]):.5g}", "not found", *("-",) * 4)
-
-    def of(key: str) -> float:
-        return float(case[key].values[i, k])
-
-    energy = of("energy")
-    share = 100 * of("friction_energy") / energy if energy > 0.0 else np.nan
+        return (name, f"{value:.5g}", "not found", *("-",) * 4)
+    energy = float(peak.energy[k])
+    share = 100 * float(peak.friction_energy[k]) / energy if energy > 0.0 else np.nan
     return (
         name if kind == 1 else f"{name}, no maximum",
-        f"{of('value'):.5g}",
-        f"{of('frequency_hz'):.6g}",
-        f"{1e3 * of('amplitude'):.6g}",
-        f"{of('phase_deg'):.1f}",
+        f"{value:.5g}",
+        f"{peak.frequency_hz[k]:.6g}",
+        f"{1e3 * peak.amplitude[k]:.6g}",
+        f"{peak.phase_deg[k]:.1f}",
         f"{1e3 * energy:.4g}",
         number(share, 3),
     )
