@@ -199,8 +199,8 @@ def _mark(found: LimitCycles, figure: go.Figure, heights: Sequence[float]) -> No
         lines = [colour(i) for _, i, _ in own]
         figure.add_trace(
             go.Scatter(
-                x=[factor * c.amplitude for c, _, _ in own],
-                y=[height for _, _, height in own],
+                x=factor * np.array([c.amplitude for c, _, _ in own]),
+                y=np.array([height for _, _, height in own]),
                 mode="markers",
                 name=word,
                 marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
