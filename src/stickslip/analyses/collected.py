@@ -1,6 +1,6 @@
 """Joining of job records: arrays, cases side by side, verdicts."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,10 @@ from stickslip.analyses.columns import variables
 from stickslip.analyses.waves.records.about import told
 from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
-from stickslip.study.store.netcdf import alike, one_case, stacked, variable
+from stickslip.study.store.netcdf import alike, one_case, stacked
 from stickslip.study.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
 
 Variables = dict[str, xr.Variable]
-About = Mapping[str, tuple[str, str, str]]  # dimensions, unit and words of each variable
 
 
 def of_cases(
@@ -58,17 +57,6 @@ def of_answers(
     found = [v for label, own in zip(labels, answers, strict=True) for v in verdicts(label, own)]
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": sum(map(lost, answers))}
     return xr.Dataset(stacked(cases), attrs=attributes)
-
-
-def described(about: About, values: Mapping[str, Any], model: Mapping[str, Any]) -> Variables:
-    """Return the nonempty values as variables, together with those of the model."""
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()}
-
-
-def each(records: Sequence[object], name: str) -> Any:
-    """Return one attribute of all records as an array."""
-    return np.array([getattr(one, name) for one in records])
 
 
 def rows(records: Sequence[object], name: str, missing: float = np.nan) -> FloatArray:
