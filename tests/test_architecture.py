@@ -124,6 +124,17 @@ def test_type_checking_imports_do_not_hide_from_the_contracts():
     assert hidden <= {"cli.py", "api/reading.py"}
 
 
+def test_of_an_analysis_its_page_alone_draws():
+    pages = ("page", "compared", "pictures")
+    drawing = [
+        str(path.relative_to(SOURCE))
+        for path in (SOURCE / "analyses").rglob("*.py")
+        if "import plotly" in path.read_text(encoding="utf-8") or "from plotly" in path.read_text(encoding="utf-8")
+    ]
+    assert len(drawing) > 10
+    assert [name for name in drawing if not set(name.removesuffix(".py").split("/")) & set(pages)] == []
+
+
 def test_functions_are_short():
     lengths = sorted(lines for path in MODULES for lines in written(path).functions)
     assert lengths[int(0.9 * len(lengths))] <= USUAL_FUNCTION
