@@ -48,7 +48,7 @@ import sys
 from pathlib import Path
 from stickslip.study.questions import ANALYSES
 from stickslip.study.run import run_study
-from stickslip.study.jobs import Shard
+from stickslip.study.shard import Shard
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
     ANALYSES["toy"] = "slow_toy:TOY"

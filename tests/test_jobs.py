@@ -19,9 +19,9 @@ from toy_analysis import ToyStudy
 
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
-from stickslip.study.jobs import Shard
 from stickslip.study.questions import ANALYSES
 from stickslip.study.run import run_study
+from stickslip.study.shard import Shard
 from stickslip.study.store import folder as keep_folder
 from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind
 from stickslip.study.store.folder import locked_folder

@@ -25,7 +25,8 @@ from stickslip.harmonic.selection.jaumouille import Jaumouille, strain_energy
 from stickslip.harmonic.selection.laxalde import Laxalde, left_out
 from stickslip.harmonic.selection.maple import Maple
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Step, always_kept
-from stickslip.harmonic.selection.suess import SuessJacobian, SuessSpectral, column_norms
+from stickslip.harmonic.selection.suess_jacobian import SuessJacobian, column_norms
+from stickslip.harmonic.selection.suess_spectral import SuessSpectral
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure

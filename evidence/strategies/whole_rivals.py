@@ -11,7 +11,8 @@ from evidence.strategies.page import heading, table
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.laxalde import Laxalde
 from stickslip.harmonic.selection.maple import Maple
-from stickslip.harmonic.selection.suess import SuessJacobian, SuessSpectral
+from stickslip.harmonic.selection.suess_jacobian import SuessJacobian
+from stickslip.harmonic.selection.suess_spectral import SuessSpectral
 
 ENTRIES = (
     Entry(FEW),

@@ -15,10 +15,10 @@ from stickslip.api.result import Result
 from stickslip.api.screen import by_default
 from stickslip.model.blas_threads import one_loaded_blas_thread
 from stickslip.study.check import check_study
-from stickslip.study.jobs import Shard
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.shard import Shard
 
 
 @dataclass(frozen=True, eq=False)

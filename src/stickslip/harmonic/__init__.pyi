@@ -18,6 +18,6 @@ from .selection.strategy import ErrorMeasure as ErrorMeasure
 from .selection.strategy import Step as Step
 from .selection.strategy import Strategy as Strategy
 from .selection.strategy import Verdict as Verdict
-from .selection.suess import SuessJacobian as SuessJacobian
-from .selection.suess import SuessSpectral as SuessSpectral
+from .selection.suess_jacobian import SuessJacobian as SuessJacobian
+from .selection.suess_spectral import SuessSpectral as SuessSpectral
 from .sparse_stiffness import Unreduced as Unreduced

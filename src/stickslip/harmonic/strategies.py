@@ -9,8 +9,8 @@ STRATEGIES = {
     "jaumouille": ("jaumouille", "Jaumouille"),
     "laxalde": ("laxalde", "Laxalde"),
     "maple": ("maple", "Maple"),
-    "suess_jacobian": ("suess", "SuessJacobian"),
-    "suess_spectral": ("suess", "SuessSpectral"),
+    "suess_jacobian": ("suess_jacobian", "SuessJacobian"),
+    "suess_spectral": ("suess_spectral", "SuessSpectral"),
     "always_low": ("fixed", "AlwaysLow"),
     "always_high": ("fixed", "AlwaysHigh"),
 }

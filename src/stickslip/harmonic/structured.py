@@ -184,7 +184,7 @@ class StructuredJacobian:
             yield mean, block
 
     def preconditioner(self) -> Kept | None:
-        """Return one factor for all harmonics if the structure allows it, else the factors of ``Z_h + K̂ʰʰ``; None if a matrix is singular."""
+        """Factorise the preconditioner: one factor for all harmonics where the structure allows it, else each ``Z_h + K̂ʰʰ``. None: singular."""
         if isinstance(self.linear, Shareable) and self.linear.n >= SHARED:
             shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
             if shared is not None:

@@ -1,8 +1,7 @@
-"""Execution of jobs: in this process, in worker processes, on other machines, in several runs. A failed job stops no other."""
+"""Execution of jobs: in this process, in worker processes, on other machines. A failed job stops no other."""
 
 import logging
 import pickle
-import re
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -14,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import SingularError, StickslipError, input_error
+from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analysis import Analysis, Job
-from stickslip.study.outcome import CHECKED, UNSOLVED, Book, Outcome, Task, checked
+from stickslip.study.outcome import CHECKED, UNSOLVED, checked
 from stickslip.study.store.attempts import (
     begin,
     clear,
@@ -33,60 +32,6 @@ from stickslip.study.store.provenance import library_versions
 from stickslip.study.store.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched
 from stickslip.study.store.worker_process import Limits, blas_threads
 from stickslip.study.store.workers import Hands
-
-
-@dataclass(frozen=True)
-class Shard:
-    """One of several runs that share the jobs of a study.
-
-    Parameters
-    ----------
-    number
-        From 1.
-    count
-        Number of shards.
-    """
-
-    number: int
-    count: int
-
-    @classmethod
-    def read(cls, text: str) -> "Shard":
-        """Parse a text such as ``3/8``.
-
-        Raises
-        ------
-        InputError
-            If the text is not of this form.
-        """
-        found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
-        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
-        if not 1 <= shard.number <= shard.count:
-            raise input_error(
-                f"--shard {text}",
-                "is no share of the jobs",
-                "Give its number and how many there are: --shard 1/4 up to --shard 4/4.",
-            )
-        return shard
-
-    @property
-    def log(self) -> str:
-        """Name of its log file."""
-        return f"run-{self.number}-of-{self.count}.log"
-
-    def own(self, tasks: Sequence[Task]) -> Sequence[Task]:
-        """Return its share of all tasks; every shard sorts the tasks in the same order."""
-        return tasks[self.number - 1 :: self.count]
-
-    def outcome(self, book: Book, done: int, left: int, folder: Path) -> Outcome:
-        """Return the outcome of a shard that ends before others."""
-        text = (
-            f"shard {self.number}/{self.count}: {done} jobs done, {left} of other shards are not. The last one to end puts the "
-            "result together, as does the same command without --shard."
-        )
-        LOG.info(text)
-        return Outcome(book.tree(complete=False), {}, 0, (folder / self.log,), text)
-
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 LOST = 3  # workers lost at the same place: they may be lost for reasons of their own

@@ -19,10 +19,11 @@ from stickslip.assembly.joints.surface_checks import TENFOLD
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analysis import Analysis, Case, Job, Solved, named
-from stickslip.study.jobs import Order, Shard, solve_job, worked
+from stickslip.study.jobs import Order, solve_job, worked
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.questions import ANALYSES
+from stickslip.study.shard import Shard
 from stickslip.study.store.atomic_write import whole_file
 from stickslip.study.store.attempts import file_at_work, new_owner
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder

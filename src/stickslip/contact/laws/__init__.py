@@ -1,4 +1,4 @@
-"""Contact laws, one a file, and their registry."""
+"""Contact laws, one in each file, and their list."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module

@@ -208,7 +208,7 @@ def read_matrix_files(
 
 
 def names_in(path: Path) -> tuple[str, ...]:
-    """Return those of the names stiffness, mass and damping that a file contains; none for a file with a single unnamed matrix."""
+    """Return the names of the matrices in a file (stiffness, mass, damping); an empty result means one matrix without a name."""
     suffix = path.suffix.lower()
     found: Collection[str] = ()
     if suffix == ".npz":

@@ -30,7 +30,7 @@ _BLADE = re.compile(r"\[\d+\]")  # of the label of an output
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """The solutions judged by the strategy, one a frequency: the first one for an alert, else the accepted one."""
+    """The judged solution of each frequency. An alert judges the first solution, every other strategy the accepted one."""
 
     case: IntArray
     hz: FloatArray

@@ -439,7 +439,7 @@ class Curve:
         return np.array(near, dtype=bool) & ~(self.outputs_off > self.limit)
 
     def allowed_in_time(self, point: int) -> float:
-        """Return the tolerated difference from a time integration, percent: `ATTAINED` at the peak, else the tolerated error."""
+        """Return the difference from time integration that a point may have, percent: `ATTAINED` at the peak, elsewhere the error limit."""
         return ATTAINED if point == self.peak else 100 * self.limit
 
     @cached_property
