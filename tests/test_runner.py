@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slow_toy
 import xarray as xr
 from toy_analysis import TOY, ToyStudy
 
@@ -118,6 +119,13 @@ def test_model_of_python_gets_the_same_answer(tmp_path: Path, whole: ToyStudy) -
     same(made.tree, result(whole))
     assert made.verdicts == (Verdict("doubtful", "factor = 2.5", None, "large"),)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_slow_toy_of_the_cluster_gets_the_same_answer(
+    tmp_path: Path, whole: ToyStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slow_toy, "SECONDS", 1e-3)
+    same(answer(slow_toy.TOY, study(tmp_path).cases()).tree, result(whole))
 
 
 def test_interrupted_run_goes_on_to_the_same_numbers(tmp_path: Path, whole: ToyStudy) -> None:
