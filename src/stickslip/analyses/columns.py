@@ -14,6 +14,9 @@ from stickslip.study.store.netcdf import variable
 MISSING: Mapping[type, Any] = {float: np.nan, int: -1, str: "", bool: False}
 FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # where the records of a variable differ in length
 
+ENTRIES: Mapping[type, Any] = {np.floating: np.nan, np.integer: -1, str: ""}  # of arrays, by the class of their entries
+CASE = "case"  # the dimension of cases, which a record of one case lacks
+
 
 def variables(record: Any) -> dict[str, xr.Variable]:
     """Return the variables of the record of a case; fields that are None or empty have none."""
@@ -24,7 +27,9 @@ def variables(record: Any) -> dict[str, xr.Variable]:
     return {name: v for name, v in found.items() if v is not None and v.size}
 
 
-def record_of(kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable]) -> Any:
+def record_of(
+    kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable], sizes: Mapping[Any, int] | None = None
+) -> Any:
     """Return the record of a case of a result, the inverse of `variables`; arrays of rows keep their padding.
 
     Parameters
@@ -34,8 +39,10 @@ def record_of(kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable]) -> 
     case
         Variables of the case, or its dataset, in which single numbers and texts may be attributes. Missing values are NaN, −1, an empty
         text, or the default of the field.
+    sizes
+        Lengths of dimensions: a missing array has missing values in this shape. None: it is empty.
     """
-    values = {name: _value(c.name or name, c, kind, name, case) for name, c in columns_of(kind).items()}
+    values = {name: _value(c.name or name, c, kind, name, case, sizes) for name, c in columns_of(kind).items()}
     for name, inner in rows_of(kind).items():
         values[name] = tuple(_rows_read(_row_type(kind, name), inner, case))
     return kind(**{name: value for name, value in values.items() if value is not None})
@@ -108,14 +115,23 @@ def _owned(
     return list(zip(np.asarray(case[inner.prefix + of.dim].values).tolist(), found, strict=True)) if found else []
 
 
-def _value(stored: str, c: Column, kind: type[Any], name: str, case: xr.Dataset | Mapping[str, xr.Variable]) -> Any:
+def _value(
+    stored: str,
+    c: Column,
+    kind: type[Any],
+    name: str,
+    case: xr.Dataset | Mapping[str, xr.Variable],
+    sizes: Mapping[Any, int] | None,
+) -> Any:
     if stored in case:
         return _as(kind, name, _read(case[stored], c))
     told = case.attrs if isinstance(case, xr.Dataset) else {}
     if stored in told:
         value = np.asarray(told[stored])
         return _as(kind, name, value if c.per == 1.0 else c.per * value)
-    return _missing(kind, name)
+    if sizes is None:
+        return _missing(kind, name)
+    return _missing(kind, name, [sizes.get(d, 0) for d in c.along if d in sizes or d != CASE])
 
 
 def _read(found: xr.Variable | xr.DataArray, c: Column) -> Any:
@@ -125,16 +141,26 @@ def _read(found: xr.Variable | xr.DataArray, c: Column) -> Any:
 def _as(kind: type[Any], name: str, value: Any) -> Any:
     """Return a stored value as what the field says; an empty text or array is the default of a field that may be None."""
     own = _plain_type(kind, name)
-    told = own(value) if own in MISSING else np.asarray(value)
+    told = own(value) if own in MISSING and np.ndim(value) == 0 else np.asarray(value)
     empty = not told if isinstance(told, str) else np.size(told) == 0
     return None if empty and kind.__dataclass_fields__[name].default is None else told
 
 
-def _missing(kind: type[Any], name: str) -> Any:
+def _missing(kind: type[Any], name: str, shape: Sequence[int] = ()) -> Any:
     """Return what stands for a value that a result does not hold; None: the default of the field."""
+    own = _plain_type(kind, name)
     if kind.__dataclass_fields__[name].default is None:
         return None
-    return MISSING.get(_plain_type(kind, name), np.zeros(0))
+    if not shape:
+        return MISSING.get(own, np.zeros(0))
+    return np.full(shape, MISSING[own] if own in MISSING else _entry(own))
+
+
+def _entry(array: Any) -> Any:
+    """Return what stands for a missing entry of an array, by the annotation of the array."""
+    (held,) = get_args(get_args(array)[-1]) or (str,)
+    kind = get_origin(held) or held
+    return next(value for base, value in ENTRIES.items() if issubclass(kind, base))
 
 
 def _plain_type(kind: type[Any], name: str) -> Any:

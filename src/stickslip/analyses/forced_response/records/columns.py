@@ -4,19 +4,22 @@ Complex numbers have a trailing dimension ``part = (re, im)``, flags are small i
 compound types, no booleans, nothing that needs this package to be read.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
+from stickslip.analyses.columns import record_of
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.column import Column, column, columns_of
 from stickslip.response.forced.choices import Stage
 from stickslip.solve.status import Status
 from stickslip.study.verdict import LEVELS, POINT_LEVELS
 
+Kind = TypeVar("Kind")
 TextArray = npt.NDArray[np.str_]
 STAGES = get_args(Stage)
 MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutral": 4}  # numbers of motion_stability
@@ -304,12 +307,18 @@ class MotionsInTime:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BifurcationRows:
-    """Bifurcations of the branch, and the side branches."""
+class BifurcationSearch:
+    """The search for bifurcations of a case."""
 
     bifurcations_limits: str = column(
         "1", "where bifurcations are not seen, and what looking for them took, in words", along="case"
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BifurcationRows:
+    """Bifurcations of the branch."""
+
     bifurcation_case: IntArray | None = column(
         "1", "case of a bifurcation on the branch", along="bifurcation", default=None
     )
@@ -336,12 +345,24 @@ class BifurcationRows:
     bifurcation_multiplier: FloatArray = column(
         "1", "multiplier that crosses the unit circle, of a fold that nearest to 1", along="bifurcation part"
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SideBranches:
+    """Branches that leave the response at bifurcations."""
+
     side_branch_case: IntArray | None = column(
         "1", "case of a branch that leaves the response", along="side_branch", default=None
     )
     side_branch_frequency_hz: FloatArray = column("Hz", "where it leaves", along="side_branch")
     side_branch_periods: IntArray = column("1", "periods of the load in one of its motions", along="side_branch")
     side_branch_sentence: TextArray = column("1", "what became of it, in words", along="side_branch")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SidePoints:
+    """Points of such branches."""
+
     side_point_case: IntArray | None = column("1", "case of a point of such a branch", along="side_point", default=None)
     side_point_frequency_hz: FloatArray = column("Hz", "frequency of the load", along="side_point")
     side_point_branch: IntArray = column("1", "number of the branch within its case, from 0", along="side_point")
@@ -517,7 +538,10 @@ KINDS = (
     ExaminedRows,
     OtherMotions,
     MotionsInTime,
+    BifurcationSearch,
     BifurcationRows,
+    SideBranches,
+    SidePoints,
     TimeChecks,
     MoreHarmonics,
     PhysicsVerdicts,
@@ -527,6 +551,45 @@ KINDS = (
     Blades,
 )
 COLUMNS: Mapping[str, Column] = {name: own for kind in KINDS for name, own in columns_of(kind).items()}
+
+# the variable with the case of each row, by the dimension along which the rows of cases follow each other
+OWNERS = {own.along[0]: name for name, own in COLUMNS.items() if name.endswith("_case")}
+
+
+def read(kind: type[Kind], data: xr.Dataset, case: int | None = None) -> Kind:
+    """Return the record of a kind from a result.
+
+    Parameters
+    ----------
+    kind
+        One of `KINDS`.
+    data
+        Dataset of `put_together`, of this or an earlier version. What it lacks is NaN, -1 or an empty text: single, or as many as its
+        points or rows.
+    case
+        Index along ``case``: of its rows alone, without the dimension ``case``. None: of all cases; numbers of a case are arrays then.
+    """
+    columns = columns_of(kind)
+    owners = {d: OWNERS[d] for own in columns.values() for d in own.along if OWNERS.get(d) in data}
+    own = data[[*dict.fromkeys([*filter(data.__contains__, columns), *owners.values()])]]
+    if case is not None:
+        there = {d: rows_of_case(own[name].values, case) for d, name in owners.items()}
+        own = own.isel({"case": case, **there}, missing_dims="ignore")
+    record: Kind = record_of(kind, own, own.sizes)
+    return record
+
+
+def rows_of_case(owner: IntArray, case: int) -> slice | IntArray:
+    """Return where `owner` is a case: a slice of neighbours, which copies no values."""
+    at = np.flatnonzero(owner == case)
+    return slice(int(at[0]), int(at[-1]) + 1) if at.size and np.ptp(at) < at.size else at
+
+
+def each(record: Kind) -> Iterator[Kind]:
+    """Yield the rows of a record whose fields all lie along the same dimension, as records of its entries."""
+    values = stored(record)
+    for i in range(min(map(len, values.values()))):
+        yield type(record)(**{name: value[i] for name, value in values.items()})
 
 
 def stored(record: Any) -> dict[str, Any]:

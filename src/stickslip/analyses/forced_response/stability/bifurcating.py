@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
-from stickslip.analyses.forced_response.records.columns import MOTION, BifurcationRows, PointStability, stored
+from stickslip.analyses.forced_response.records.columns import (
+    MOTION,
+    BifurcationRows,
+    BifurcationSearch,
+    PointStability,
+    SideBranches,
+    SidePoints,
+    stored,
+)
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.stability.examination import FLOPS, by_hill, examination_work, hill_work
@@ -134,17 +142,22 @@ def of_bifurcations(
         bifurcation_certain=np.array([int(b.certain) for b in own], dtype=np.int64),
         bifurcation_outside=np.array([b.after for b in own], dtype=np.int64),
         bifurcation_sentence=texts(b.sentence for b in own),
-        bifurcations_limits="; ".join(limits(question, found)),
+    )
+    branches = SideBranches(
         side_branch_frequency_hz=np.array([b.omega / HZ for b, _ in sides]),
         side_branch_periods=np.array([s.periods for _, s in sides], dtype=np.int64),
         side_branch_sentence=texts(f"from the {b.kind} at {b.omega / HZ:.6g} Hz: {s.sentence}" for b, s in sides),
+    )
+    beside = SidePoints(
         side_point_frequency_hz=np.array([s.periods * p.omega / HZ for _, s, p in points]),
         side_point_branch=np.array([n for n, _, _ in points], dtype=np.int64),
         side_point_amplitude=np.array([s.amplitude(p, output) for _, s, p in points]),
         side_point_subharmonic=np.array([s.subharmonic(p, output) for _, s, p in points]),
         side_point_localisation=np.array([s.localisation(p) for _, s, p in points]),
     )
-    return stored(rows) | _of_motions(known, examined)
+    search = BifurcationSearch(bifurcations_limits="; ".join(limits(question, found)))
+    every = stored(search) | stored(rows) | stored(branches) | stored(beside)
+    return every | _of_motions(known, examined)
 
 
 def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
