@@ -16,7 +16,7 @@ from synthetic_result import tree_of
 from stickslip.analyses.forced_response import analysis as analysis_module
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.estimate import estimate, retained_of
-from stickslip.analyses.forced_response.page.not_periodic import statistics_in_time
+from stickslip.analyses.forced_response.page.checks import statistics_in_time
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.physics.known import (
     mixed_places,

@@ -10,7 +10,7 @@ from synthetic_result import synthetic_result
 from typer.testing import CliRunner
 
 import stickslip as ss
-from stickslip.analyses.forced_response.page.curves import optimisation
+from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.cli import app

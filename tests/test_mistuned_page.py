@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 from synthetic_result import synthetic_result
 
+from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.curves import frequency_response
-from stickslip.analyses.forced_response.page.head import cards
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.wheel import blades
 from stickslip.analyses.forced_response.verdicts.curve import Curve, peak_output

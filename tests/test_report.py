@@ -14,16 +14,15 @@ from browser import CHROMIUM, Browser
 from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
-from stickslip.analyses.forced_response.page.chapter import stability
-from stickslip.analyses.forced_response.page.contacts.bodies import body_motion, rigid_bodies
-from stickslip.analyses.forced_response.page.contacts.contact import hysteresis_t
-from stickslip.analyses.forced_response.page.curves import frequency_response, optimisation
+from stickslip.analyses.forced_response.page.bodies import body_motion, rigid_bodies
+from stickslip.analyses.forced_response.page.chapter import cards, peaks
+from stickslip.analyses.forced_response.page.checks import stability, statistics_in_time, time_integration
+from stickslip.analyses.forced_response.page.contacts import hysteresis_t
+from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.errors import errors
-from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics
-from stickslip.analyses.forced_response.page.head import cards
-from stickslip.analyses.forced_response.page.not_periodic import statistics_in_time
+from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics, more_harmonics
+from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
-from stickslip.analyses.forced_response.page.tables import more_harmonics, peaks, time_integration
 from stickslip.analyses.inputs import Varied, as_run, told
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures.model import reduction

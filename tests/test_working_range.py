@@ -8,7 +8,7 @@ import pytest
 from synthetic_result import synthetic_result
 
 import stickslip as ss
-from stickslip.analyses.forced_response.page.curves import optimisation, where_friction_works
+from stickslip.analyses.forced_response.page.optimisation import optimisation, where_friction_works
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import not_periodic

@@ -10,7 +10,7 @@ import xarray as xr
 
 from stickslip.analyses.all_motions import page as all_motions
 from stickslip.analyses.forced_response.page import chapter as forced_response
-from stickslip.analyses.forced_response.page.contacts.tractions import with_bands
+from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.limit_cycle import page as limit_cycle
 from stickslip.analyses.modal_synthesis import page as modal_synthesis

@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.contacts.bodies import group_colours, rigid_bodies
-from stickslip.analyses.forced_response.page.contacts.contact import contact_lines, states
+from stickslip.analyses.forced_response.page.bodies import group_colours, rigid_bodies
+from stickslip.analyses.forced_response.page.contacts import contact_lines, states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.node import Node

@@ -1,65 +1,21 @@
-"""Figures of the response: curves of all cases, low against accepted order, the optimisation curves and the working range of the friction."""
+"""Figures of the response: curves of all cases, of each engine order, and low against accepted order."""
 
 from html import escape
 from textwrap import wrap
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.bifurcations import mark_bifurcations
-from stickslip.analyses.forced_response.page.contacts.tractions import draw_bands, draw_peak_bands
-from stickslip.analyses.forced_response.page.measured import measured_of
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.summary import amplitude_name
-from stickslip.analyses.forced_response.verdicts.working_range import MIN_PEAKS, TITLE, range_lines, working_ranges
+from stickslip.analyses.forced_response.page.tractions import draw_bands
+from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
-from stickslip.report.cases import ShownCase, first_number
-from stickslip.report.content import Words
-from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
+from stickslip.report.cases import ShownCase
+from stickslip.report.plot import ALARM, GRID, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.verdict import POINT_LEVELS
-
-
-def where_friction_works(response: Response) -> Words | None:
-    """State the values at which all contacts stick, friction works, or contacts slide freely."""
-    lines = range_lines(response.data)
-    if not lines:
-        return None
-    return Words(heading=TITLE, items=lines)
-
-
-def what_is_needed(response: Response) -> Words | None:
-    """State the values missing for an optimisation curve, if a number is varied with too few of them."""
-    key, n = first_number(response.data)[0], len(response.cases)
-    if not key or n >= MIN_PEAKS:
-        return None
-    text = f"Curves over {key}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
-    return Words((text,))
-
-
-def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:
-    """Shade the values at which friction works; return the sentence for the caption, empty for none."""
-    ranges = working_ranges(response.data)
-    stretches = ranges[0].stretches if len(ranges) == 1 and ranges[0].judged else []
-    if not stretches:
-        return ""
-    values = np.unique([p.value for p in ranges[0].peaks])
-    middles = np.sqrt(values[1:] * values[:-1]) if logarithmic else (values[1:] + values[:-1]) / 2
-    edges = np.array([values[0], *middles, values[-1]])
-    for stretch in stretches:
-        at = np.searchsorted(values, sorted(p.value for p in stretch))
-        figure.add_vrect(
-            x0=float(edges[at[0]]),
-            x1=float(edges[at[-1] + 1]),
-            fillcolor=GRID,
-            opacity=0.6,
-            line_width=0,
-            layer="below",
-        )
-    return " Shaded, to halfway to the neighbouring cases: where friction works."
-
 
 COMPARED = 3  # curves that stay legible in one panel
 _BUTTONS = {
@@ -263,6 +219,48 @@ def frequency_response(response: Response) -> Plot | None:
     return Plot("response", title, _caption(response) + marked + banded, figure)
 
 
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
+
+
+def of_each_order(response: Response) -> Plot | None:
+    """Draw the amplitude of each engine order over frequency or speed."""
+    orders = several_orders(response.data)
+    if not orders or not response.has("driven_amplitude"):
+        return None
+    size = response.at_outputs(response.values("driven_amplitude", "point", "driven", "output"))
+    size = np.where(response.converged[:, None], size, np.nan)
+    scale = scale_for(size, response.length)
+    x, name, unit = abscissa(response)
+    cases = most(response, np.nanmax(size, axis=1, initial=-np.inf))
+    figure, said = go.Figure(), []
+    for case in cases:
+        at = response.points(case)
+        for k, m in enumerate(orders):
+            figure.add_scatter(
+                x=x[at],
+                y=size[at, k] * scale.factor,
+                mode="lines",
+                name=f"engine order {m}",
+                legendgroup=str(case.index),
+                legendgrouptitle={"text": case.label or None},
+                line={"color": case.colour, "width": 1.8, "dash": DASHES[k % len(DASHES)]},
+                hovertemplate=f"{case.named}<br>engine order {m}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<extra></extra>",
+            )
+            if np.isfinite(size[at, k]).any():
+                top = at[int(np.nanargmax(size[at, k]))]
+                said.append(
+                    f"engine order {m} {number(float(size[top, k]) * scale.factor)} {scale.unit} at {number(float(x[top]), 5)} {unit}{case.where}"
+                )
+    styled(figure, 440)
+    figure.update_xaxes(title_text=f"{name} ({unit})")
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor))
+    text = (
+        f"Each engine order in {response.output_name}; the curve above is their norm. {orders_sentence(response.data)}"
+    )
+    largest = f" Largest: {'; '.join(said)}." if said else ""
+    return Plot("orders", "Amplitude of each engine order", text + largest, figure)
+
+
 def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) -> str:
     parts = []
     for case in cases:
@@ -305,81 +303,3 @@ def low_order(response: Response) -> Plot | None:
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", **{**ticks, "tickmode": "auto"})
     title = f"What H = {response.low_name} alone would have given"
     return Plot("low_order", title, _low_caption(response, cases, low), figure)
-
-
-def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
-    peak, hz = ([of(c) for c in cases] for of in (response.peak_response, response.peak_hz))
-    within = [response.resonates(c) for c in cases]
-    best = int(np.argmin(np.where(within, peak, np.inf) if any(within) else peak))
-    text = (
-        f"Among the cases computed the peak is smallest{cases[best].where}: "
-        f"{percent(100 * peak[best] / max(peak))} of the largest one. "
-    )
-    if best in (0, len(peak) - 1):
-        text += "No value beyond it was computed: the optimum may lie there. "
-    if not all(within):
-        ends = joined([c.label for c, inside in zip(cases, within, strict=True) if not inside])
-        text += f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
-    known = [k for k, inside in enumerate(within) if inside]
-    if len(known) < 2:
-        return text
-    a, b = known[0], known[-1]
-    return text + (
-        f"Between the values the peak moves by {number(abs(hz[b] - hz[a]))} Hz, "
-        f"from {number(hz[a], 5)} Hz{cases[a].where} to {number(hz[b], 5)} Hz{cases[b].where}."
-    )
-
-
-def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
-    """Group cases by all varied keys except `key`; each group is a curve."""
-    found: dict[str, list[ShownCase]] = {}
-    for case in cases:
-        others = ", ".join(t for t in case.label.split(", ") if not t.startswith(f"{key} = "))
-        found.setdefault(others, []).append(case)
-    return found
-
-
-def optimisation(response: Response) -> Plot | None:
-    """Draw peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
-    key = first_number(response.data)[0]
-    known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
-    cases = sorted(known, key=lambda c: c.value)
-    measured = measured_of(response, key)
-    if not key or len(cases) < (1 if measured else MIN_PEAKS):
-        return None
-    peak = {c: response.peak_response(c) for c in cases}
-    scale = scale_for(np.array(list(peak.values())), response.unit)
-    figure, families = make_subplots(1, 2, horizontal_spacing=0.12), _families(cases, key)
-    banded = [draw_peak_bands(figure, response, own, scale.factor) for own in families.values()]
-    for name, family in families.items():
-        edge = {"width": 1, "color": "white"}
-        mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
-        curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
-        for column, (unit, y) in enumerate(curves, 1):
-            figure.add_scatter(
-                x=[c.value for c in family],
-                y=y,
-                mode="lines+markers",
-                line={"color": MUTED, "width": 1.3},
-                marker=mark,
-                name=name,
-                showlegend=column == 1 and len(families) > 1,
-                text=[c.named for c in family],
-                hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>",
-                row=1,
-                col=column,
-            )
-    styled(figure, 380)
-    if measured:
-        measured.draw(figure, scale)
-    values = np.unique([c.value for c in cases])
-    wide = values[0] > 0 and values[-1] > 5 * values[0]
-    ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
-    figure.update_xaxes(title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
-    drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
-    figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
-    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
-    caption += next(filter(None, banded), "")
-    caption += shade_working_range(figure, response, logarithmic=bool(wide))
-    return Plot("optimisation", "Optimisation curves", caption, figure)

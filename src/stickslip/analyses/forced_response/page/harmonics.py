@@ -1,4 +1,4 @@
-"""Harmonics over frequency on the page: those kept, frequencies that needed more, and the reasons."""
+"""Harmonics over frequency on the page: those kept, frequencies that needed more, the reasons, and what they cost."""
 
 from collections import Counter
 
@@ -6,7 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.contacts.contact import states
+from stickslip.analyses.forced_response.page.checks import sentences
+from stickslip.analyses.forced_response.page.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.summary import cost_sentence
 from stickslip.arrays import IntArray
@@ -14,7 +15,14 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, Plot, styled
-from stickslip.report.quantities import NONE, counted, number, predicted, runs
+from stickslip.report.quantities import (
+    NONE,
+    counted,
+    fixed,
+    number,
+    predicted,
+    runs,
+)
 
 _SHOWN = 12  # cases that stay legible below one another
 _EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
@@ -235,3 +243,48 @@ def _kept_where(response: Response, case: ShownCase | None = None) -> str:
     if rest:
         each.append(f"others at {rest}")
     return "; ".join(each) + f" of {sum(counts.values())} points" if each else "–"
+
+
+def attempts(response: Response) -> Table | None:
+    """Return a table with one row a case and set of harmonics: the work, including discarded solutions."""
+    if not response.has("attempt_case", "attempt_kept"):
+        return None
+    case = response.integers("attempt_case")
+    kept = response.values("attempt_kept", "attempt", "harmonic")
+    sets = np.array([named(np.flatnonzero(row)) for row in kept])
+    numbers = ("attempt_newton_iterations", "attempt_unknowns", "attempt_seconds")
+    columns = [response.floats(name) for name in numbers]
+    good, rows = response.floats("attempt_status") == 0, []
+    for one in response.cases:
+        mine = case == one.index
+        for own in sorted(set(sets[mine]), key=lambda s: (int(s.rsplit(", ", maxsplit=1)[-1]), s)):
+            at = mine & (sets == own)
+            sums = [float(column[at].sum()) for column in columns]
+            rows.append(
+                [one.short, own, str(int(at.sum())), str(int((at & ~good).sum()))]
+                + [fixed(total, digits) for total, digits in zip(sums, (0, 0, 2), strict=True)]
+            )
+    head = ["H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
+    text = (
+        "By case and harmonics, those solutions included in whose place others were "
+        "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine."
+    )
+    return response.table("Everything that was solved", (text,), head, rows)
+
+
+def more_harmonics(response: Response) -> Table | None:
+    """Report the predicted change by twice as many harmonics."""
+    names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
+    if not response.has(*names):
+        return None
+    rows = []
+    for case in response.cases:
+        worst, hz, above = (response.number_of(name, case) for name in names)
+        rows.append([case.short, predicted(worst), fixed(hz, 2), fixed(above, 0)])
+    head = ["largest predicted change", "at (Hz)", "points above the threshold"]
+    text = (
+        f"What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
+        "points: the change of the complex amplitude, phase included, over its size."
+    )
+    items = sentences(response, "reference_sentence")
+    return response.table("More harmonics", (text,), head, rows, items=items)

@@ -1,1 +1,0 @@
-"""Figures of the contacts and rigid bodies of a response."""
