@@ -12,6 +12,8 @@ from typing import Any
 
 import interface_by_task
 
+from stickslip.study.questions import ANALYSES
+
 HERE = Path(__file__).parent
 # page -> its heading and the tables of the study file on it; the empty name is the top of the file
 PAGES_OF_KEYS = {
@@ -24,21 +26,7 @@ PAGES_OF_KEYS = {
     "output": ("Output and measured peaks", ("output", "measured")),
     "analyses": (
         "Questions",
-        (
-            "forced_response",
-            "resonance",
-            "all_motions",
-            "modal_synthesis",
-            "nonlinear_mode",
-            "residual_tractions",
-            "quasi_periodic",
-            "limit_cycle",
-            "run_up",
-            "modes",
-            "campbell",
-            "safe",
-            "flutter",
-        ),
+        tuple(ANALYSES),
     ),
     "settings": ("Harmonics, solver, limits", ("harmonics", "solver", "retention", "limits")),
 }

@@ -21,7 +21,7 @@ import xarray as xr
 from toy_analysis import ToyStudy
 
 from stickslip.errors import InputError
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import run_study
 from stickslip.study.store import workers
 from stickslip.study.store.attempts import reached
@@ -46,12 +46,12 @@ LIMIT = 300.0  # seconds of a run, after which it is ended and the test has fail
 RUN = """
 import sys
 from pathlib import Path
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
-    ANALYSES["toy"] = "slow_toy:TOY"
+    ANALYSES["toy"] = Home("slow_toy:TOY")
     path, kind, processes, shard = sys.argv[1:]
     study = ToyStudy(Path(path), {factors}, stop_at=3, how="kill", stop_in={poison})
     run_study(study, kind=kind, workers=int(processes), shard=Shard.read(shard) if shard else None)
@@ -101,7 +101,7 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
     """The powers themselves, computed here."""
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+        patch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
         made = ToyStudy(folder / "study.toml", FACTORS)
         run_study(made)
     tree = xr.load_datatree(made.folder / "result.nc", engine="h5netcdf")
@@ -110,7 +110,7 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
 
 @pytest.fixture
 def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ToyStudy:
-    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+    monkeypatch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
     return ToyStudy(tmp_path / "study.toml", FACTORS)
 
 

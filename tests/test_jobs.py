@@ -19,7 +19,7 @@ from toy_analysis import ToyStudy
 
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
 from stickslip.study.store import folder as keep_folder
@@ -34,7 +34,7 @@ from stickslip.study.store.workers import check_kind, executor
 
 @pytest.fixture(autouse=True)
 def toy_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+    monkeypatch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
 
 
 # ---- a process that is watched

@@ -10,7 +10,6 @@ from types import ModuleType
 import pytest
 
 from stickslip.study.file.tables import json_schema
-from stickslip.study.questions import ANALYSES
 
 DOCS = Path(__file__).parents[1] / "docs"
 NO_TABLES = {"schema_version", "title", "vary"}  # at the top of the file
@@ -38,7 +37,6 @@ def test_every_table_of_a_study_has_its_keys_on_a_page(generate: ModuleType) -> 
     told = [name for _, tables in generate.PAGES_OF_KEYS.values() for name in tables]
     assert len(told) == len(set(told))
     assert set(told) - {""} == set(json.loads(json_schema())["properties"]) - NO_TABLES
-    assert set(generate.PAGES_OF_KEYS["analyses"][1]) == set(ANALYSES)
 
 
 def test_every_public_name_serves_a_task(generate: ModuleType) -> None:

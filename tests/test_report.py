@@ -2,10 +2,12 @@
 
 import json
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from html import unescape
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -34,6 +36,7 @@ from stickslip.report.node import Node
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.tiles import patches, triangulated
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.verdict import Verdict, to_json
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: the page is not opened")
@@ -661,7 +664,6 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
 def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     from plotly import graph_objects as go
 
-    from stickslip.analyses import page as module
     from stickslip.report.content import Words
     from stickslip.report.node import Node
     from stickslip.report.plot import Plot
@@ -670,8 +672,11 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     def figure(node: Node) -> Plot:
         return Plot("toy", "A toy", "Its answer.", go.Figure([go.Scatter(y=node.floats("answer"))]))
 
-    toy = Section("toy", ("answer",), Node, (Block("toy", "The toy", (figure, lambda _: Words(("**42** < 43",)))),))
-    monkeypatch.setattr(module, "SECTIONS", (*module.SECTIONS, toy))
+    own = ModuleType("toy_page")
+    section = Section("toy", ("answer",), Node, (Block("toy", "The toy", (figure, lambda _: Words(("**42** < 43",)))),))
+    monkeypatch.setattr(own, "SECTION", section, raising=False)
+    monkeypatch.setitem(sys.modules, "toy_page", own)
+    monkeypatch.setitem(ANALYSES, "toy", Home("", page="toy_page:SECTION"))
     tree = tree_of(
         toy=xr.Dataset(
             {"answer": (("case", "n"), [[1.0, 2.0]])}, attrs={"verdicts": to_json([Verdict("doubtful", why="so so")])}

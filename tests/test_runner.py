@@ -17,7 +17,7 @@ from toy_analysis import TOY, ToyStudy
 
 from stickslip.errors import InputError
 from stickslip.study.analysis import Solved
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import answer, run_study
 from stickslip.study.shard import Shard
 from stickslip.study.store.folder import locked_folder
@@ -32,7 +32,7 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(autouse=True)
 def toy_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+    monkeypatch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
 
 
 def study(folder: Path, **changes: object) -> ToyStudy:
@@ -75,7 +75,7 @@ def test_another_study_file_does_not_replace_a_result(tmp_path: Path) -> None:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> ToyStudy:
     made = study(tmp_path_factory.mktemp("whole"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+        patch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
         run_study(made)
     return made
 
@@ -146,12 +146,12 @@ import sys
 sys.path.insert(0, {here!r})
 from collections.abc import Sequence
 from pathlib import Path
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.analysis import Solved
 from stickslip.study.run import run_study
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
-    ANALYSES["toy"] = "toy_analysis:TOY"
+    ANALYSES["toy"] = Home("toy_analysis:TOY")
     run_study(ToyStudy(Path({path!r}), stop_at=2, how="kill", stop_in=0))
 """
 
@@ -287,7 +287,7 @@ def test_the_work_of_judging_grows_with_the_number_of_cases(
     entered = ENTERED
     entered.clear()
     monkeypatch.setattr("toy_analysis.COUNTED", replace(TOY, dataset=counted, verdicts=counted_again), raising=False)
-    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:COUNTED")
+    monkeypatch.setitem(ANALYSES, "toy", Home("toy_analysis:COUNTED"))
     # what is not complete is written by the clock: here never
     monkeypatch.setattr("stickslip.study.run._now_and_then", lambda _: lambda _: None)
     work = {}

@@ -8,19 +8,10 @@ from typing import Any
 import plotly.graph_objects as go
 import xarray as xr
 
-from stickslip.analyses.all_motions import page as all_motions
-from stickslip.analyses.forced_response.page import chapter as forced_response
 from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
-from stickslip.analyses.limit_cycle import page as limit_cycle
-from stickslip.analyses.modal_synthesis import page as modal_synthesis
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
 from stickslip.analyses.pictures import model
-from stickslip.analyses.quasi_periodic import page as quasi_periodic
-from stickslip.analyses.residual_tractions import page as residual_tractions
-from stickslip.analyses.resonance import page as resonance
-from stickslip.analyses.run_up import page as run_up
-from stickslip.analyses.waves.page import campbell, flutter, modes, safe
 from stickslip.errors import input_error
 from stickslip.report.cases import cases_of, varied
 from stickslip.report.content import Table, Words, chooser
@@ -30,31 +21,21 @@ from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, versions
 from stickslip.report.section import Block, Card, Content, Part, Section
+from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.store.netcdf import alike, one_case
 from stickslip.study.verdict import conclusion, not_trusted, of_tree
 
-SECTIONS: tuple[Section, ...] = (
-    forced_response.SECTION,
-    nonlinear_mode.SECTION,
-    modal_synthesis.SECTION,
-    quasi_periodic.SECTION,
-    limit_cycle.SECTION,
-    resonance.SECTION,
-    all_motions.SECTION,
-    residual_tractions.SECTION,
-    modes.SECTION,
-    campbell.SECTION,
-    flutter.SECTION,
-    safe.SECTION,
-    run_up.SECTION,
-)
+FORCED = "forced_response"  # whose tractions other analyses bound
 
 
 def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
     """Return the sections whose analysis is in the result, with its dataset."""
-    for section in SECTIONS:
-        data = analysis(tree, section.name) if section.name in tree.children else xr.Dataset()
-        data = with_bands(data, tree) if section.name == forced_response.SECTION.name else data
+    for name, home in ANALYSES.items():
+        if name not in tree.children or not home.page:
+            continue
+        section: Section = loaded(home.page)
+        data = analysis(tree, name)
+        data = with_bands(data, tree) if name == FORCED else data
         if all(name in data for name in section.needs) and data.sizes.get("case"):
             yield section, data
 
@@ -180,7 +161,7 @@ def report_file(path: Path, html_path: Path | None = None) -> Path:
     """
     tree = open_result(path)
     if not any(True for _ in _shown(tree)):
-        known = ", ".join(section.name for section in SECTIONS)
+        known = ", ".join(name for name, home in ANALYSES.items() if home.page)
         raise input_error(
             str(path), f"holds none of {known}", "This is no result of 'stickslip run'; run the study again."
         )

@@ -30,17 +30,7 @@ from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer
 from stickslip.units import RPM
 
-_SHARED = {  # tables that analyses take beside their own
-    "forced_response": ("harmonics", "solver", "limits"),
-    "limit_cycle": ("solver",),
-    "modal_synthesis": ("solver",),
-    "nonlinear_mode": ("solver",),
-    "resonance": ("solver",),
-    "residual_tractions": ("solver", "limits"),
-    "all_motions": ("solver",),
-    "run_up": ("harmonics", "solver", "limits"),
-}
-_OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
+_OF_THE_MODEL = ("alert_over",)  # keys of tables that a model has itself
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -226,9 +216,9 @@ def _contact(contact: Contact) -> str:
 
 def _sections(name: str) -> dict[str, type[Section]]:
     """Return the tables of an analysis by name: its own and those that it shares."""
-    shared = _SHARED.get(name, ())
-    fields = {table: Tables.model_fields[table].annotation for table in shared}
-    return {name: named(name).table, **fields}  # type: ignore[dict-item]
+    own = named(name)
+    fields = {table: Tables.model_fields[table].annotation for table in own.shared}
+    return {name: own.table, **fields}  # type: ignore[dict-item]
 
 
 def _with_keys(name: str) -> Signature:
@@ -258,7 +248,19 @@ def _with_keys(name: str) -> Signature:
     )
 
 
+def _method(name: str) -> Callable[..., Result]:
+    """Return the method of an analysis that has none of its own."""
+
+    def ask(self: Model, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        return self._answer(name, keys, folder)
+
+    ask.__name__, ask.__doc__ = name, f"Answer the question [{name}]; its keys are those of the table."
+    return ask
+
+
 for _name in ANALYSES:
+    if not hasattr(Model, _name):
+        setattr(Model, _name, _method(_name))
     getattr(Model, _name).__signature__ = _with_keys(_name)
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
-from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
@@ -15,7 +14,7 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.assembly.parts.reduced import Store, in_memory
 from stickslip.study.models.measured import MeasuredPeaks
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.verdict import Verdict, stored
 
 
@@ -220,6 +219,8 @@ class Analysis:
     linear
         Whether it concerns small vibrations about the static state. These do not depend on harmonic loads and outputs, so cases that differ
         in these alone share a job.
+    shared
+        Names of the other tables that it reads; a `Model` takes their keys with its own.
     checks
         Names of additional checks that a run may ask for (``verify``). A sealed job without them is opened again: `solve` then finds all
         its records done and writes the outcome of the checks into the notes.
@@ -239,6 +240,7 @@ class Analysis:
     check: Callable[[Case, Model], tuple[str, ...]]
     summary: Callable[[xr.Dataset], "tuple[TextTable, ...]"]
     linear: bool = False
+    shared: tuple[str, ...] = ()
     checks: tuple[str, ...] = ()
     verdicts: Callable[[xr.Dataset], tuple[Verdict, ...]] = judged_when_made
     completed: Callable[[xr.Dataset, MeasuredPeaks | None], xr.Dataset] = nothing_to_add
@@ -246,8 +248,7 @@ class Analysis:
 
 def named(name: str) -> Analysis:
     """Return an analysis of `ANALYSES`; its module is imported at this call."""
-    module, _, instance = ANALYSES[name].partition(":")
-    found: Analysis = getattr(import_module(module), instance)
+    found: Analysis = loaded(ANALYSES[name].analysis)
     return found
 
 

@@ -1,35 +1,63 @@
-"""The analyses that a study may ask for, one line each: name of the table -> module and its instance, and the class of the table.
+"""The analyses that a study may ask for, one entry each: where its functions, its table and its section of the page stand.
 
-A file is judged by the tables alone; the analyses, with all that they compute, are loaded when it is found good.
+A file is judged by the tables alone; the analyses, with all that they compute, are loaded when it is found good. The order is that of
+computation, of terminal tables and of the page.
 """
 
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Home:
+    """Addresses ``module:name`` of what makes an analysis.
+
+    Parameters
+    ----------
+    analysis
+        Its `Analysis`.
+    table
+        pydantic class of its table in a study file; empty: a study file cannot ask for it.
+    page
+        Its `Section` of the page; empty: it has none.
+    """
+
+    analysis: str
+    table: str = ""
+    page: str = ""
+
+
+def loaded(address: str) -> Any:
+    """Return the object at an address ``module:name``; its module is imported at this call."""
+    module, _, name = address.partition(":")
+    return getattr(import_module(module), name)
+
+
+def _folder(name: str, analysis: str, table: str, page: str = "page") -> Home:
+    """Return the addresses of an analysis in a folder of its own."""
+    own = f"stickslip.analyses.{name}"
+    return Home(f"{own}.analysis:{analysis}", f"{own}.table:{table}", f"{own}.{page}:SECTION")
+
+
+def _waves(name: str, table: str) -> Home:
+    """Return the addresses of an analysis of small vibrations by waves."""
+    own = "stickslip.analyses.waves"
+    return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION")
+
+
 ANALYSES = {
-    "forced_response": "stickslip.analyses.forced_response.analysis:FORCED_RESPONSE",
-    "quasi_periodic": "stickslip.analyses.quasi_periodic.analysis:QUASI_PERIODIC",
-    "limit_cycle": "stickslip.analyses.limit_cycle.analysis:LIMIT_CYCLE",
-    "nonlinear_mode": "stickslip.analyses.nonlinear_mode.analysis:NONLINEAR_MODE",
-    "residual_tractions": "stickslip.analyses.residual_tractions.analysis:RESIDUAL_TRACTIONS",
-    "modal_synthesis": "stickslip.analyses.modal_synthesis.analysis:MODAL_SYNTHESIS",
-    "modes": "stickslip.analyses.waves.modes:MODES",
-    "campbell": "stickslip.analyses.waves.campbell:CAMPBELL",
-    "flutter": "stickslip.analyses.waves.flutter:FLUTTER",
-    "safe": "stickslip.analyses.waves.safe:SAFE",
-    "resonance": "stickslip.analyses.resonance.analysis:RESONANCE",
-    "all_motions": "stickslip.analyses.all_motions.analysis:ALL_MOTIONS",
-    "run_up": "stickslip.analyses.run_up.analysis:RUN_UP",
-}
-TABLES = {
-    "forced_response": "stickslip.analyses.forced_response.table:ForcedResponse",
-    "quasi_periodic": "stickslip.analyses.quasi_periodic.table:QuasiPeriodicTable",
-    "limit_cycle": "stickslip.analyses.limit_cycle.table:LimitCycleTable",
-    "nonlinear_mode": "stickslip.analyses.nonlinear_mode.table:NonlinearModeTable",
-    "residual_tractions": "stickslip.analyses.residual_tractions.table:ResidualTractionsTable",
-    "modal_synthesis": "stickslip.analyses.modal_synthesis.table:ModalSynthesisTable",
-    "modes": "stickslip.analyses.waves.tables:ModesTable",
-    "campbell": "stickslip.analyses.waves.tables:CampbellTable",
-    "flutter": "stickslip.analyses.waves.tables:FlutterTable",
-    "safe": "stickslip.analyses.waves.tables:SafeTable",
-    "resonance": "stickslip.analyses.resonance.table:ResonanceTable",
-    "all_motions": "stickslip.analyses.all_motions.table:AllMotionsTable",
-    "run_up": "stickslip.analyses.run_up.table:RunUpTable",
+    "forced_response": _folder("forced_response", "FORCED_RESPONSE", "ForcedResponse", "page.chapter"),
+    "nonlinear_mode": _folder("nonlinear_mode", "NONLINEAR_MODE", "NonlinearModeTable"),
+    "modal_synthesis": _folder("modal_synthesis", "MODAL_SYNTHESIS", "ModalSynthesisTable"),
+    "quasi_periodic": _folder("quasi_periodic", "QUASI_PERIODIC", "QuasiPeriodicTable"),
+    "limit_cycle": _folder("limit_cycle", "LIMIT_CYCLE", "LimitCycleTable"),
+    "resonance": _folder("resonance", "RESONANCE", "ResonanceTable"),
+    "all_motions": _folder("all_motions", "ALL_MOTIONS", "AllMotionsTable"),
+    "residual_tractions": _folder("residual_tractions", "RESIDUAL_TRACTIONS", "ResidualTractionsTable"),
+    "modes": _waves("modes", "ModesTable"),
+    "campbell": _waves("campbell", "CampbellTable"),
+    "flutter": _waves("flutter", "FlutterTable"),
+    "safe": _waves("safe", "SafeTable"),
+    "run_up": _folder("run_up", "RUN_UP", "RunUpTable"),
 }

@@ -79,4 +79,5 @@ ALL_MOTIONS = Analysis(
     dataset=dataset,
     check=_check,
     summary=tables,
+    shared=("solver",),
 )

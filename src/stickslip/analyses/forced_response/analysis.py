@@ -337,6 +337,7 @@ FORCED_RESPONSE = Analysis(
     dataset=_dataset,
     check=_check,
     summary=tables,
+    shared=("harmonics", "solver", "limits"),
     checks=(IN_TIME, HARMONICS),
     verdicts=_verdicts,
     completed=_completed,

@@ -45,5 +45,6 @@ LIMIT_CYCLE = Analysis(
     dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
+    shared=("solver",),
     checks=(IN_TIME,),
 )

@@ -32,4 +32,5 @@ MODAL_SYNTHESIS = Analysis(
     dataset=partial(of_answers, answer=answer, verdicts=case_verdicts),
     check=_check,
     summary=tables,
+    shared=("solver",),
 )

@@ -110,4 +110,5 @@ RESIDUAL_TRACTIONS = Analysis(
     dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
+    shared=("solver", "limits"),
 )

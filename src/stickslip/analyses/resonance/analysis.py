@@ -205,4 +205,5 @@ RESONANCE = Analysis(
     dataset=_dataset,
     check=_check,
     summary=tables,
+    shared=("solver",),
 )

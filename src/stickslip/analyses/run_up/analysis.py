@@ -89,4 +89,5 @@ RUN_UP = Analysis(
     dataset=_dataset,
     check=_check,
     summary=tables,
+    shared=("harmonics", "solver", "limits"),
 )

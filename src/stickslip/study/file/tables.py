@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from importlib import import_module
 from typing import Any, Literal
 
 from pydantic import Field, create_model
@@ -17,7 +16,7 @@ from stickslip.study.file.model.material import DampingTable, MaterialTable, Stu
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import AnyPart, Copy
 from stickslip.study.file.section import FilePath, Name, Section
-from stickslip.study.questions import ANALYSES, TABLES
+from stickslip.study.questions import ANALYSES, loaded
 
 
 class Measured(Section):
@@ -104,16 +103,13 @@ class Tables(Section):
     )
 
 
-def _table(place: str) -> Any:
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
-
-
 @cache
 def study_tables() -> type[Tables]:
     """Return the section of the whole file, with one optional table for each analysis."""
     asked: dict[str, Any] = {
-        name: (_table(place) | None, Field(None, description=f"the table [{name}]")) for name, place in TABLES.items()
+        name: (loaded(home.table) | None, Field(None, description=f"the table [{name}]"))
+        for name, home in ANALYSES.items()
+        if home.table
     }
     made: type[Tables] = create_model(
         "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked
