@@ -5,6 +5,7 @@ forbids, sliding or penetration, they predict a force in the time domain that Co
 correction returns Λ, whatever ε is: a penalty of the method, not a stiffness of the contact.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from time import perf_counter
@@ -65,7 +66,7 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     inverse = np.linalg.inv(stiffness + 1j * LOSS * largest * np.eye(linear.n))
     compliance = np.diagonal(inverse, axis1=1, axis2=2)
     slope = -np.sum((inverse @ part.derivative[h]) * inverse.swapaxes(1, 2), axis=2)
-    value = (highest + 1) / np.e * np.exp(-np.mean(np.log(h[:, None] ** 2 * np.abs(compliance)), axis=0))
+    value = (highest + 1) / math.e * np.exp(-np.mean(np.log(h[:, None] ** 2 * np.abs(compliance)), axis=0))
     return Penalty(value, -value * np.mean((slope / compliance).real, axis=0))
 
 
