@@ -37,7 +37,7 @@ TASKS = {
     "Harmonic balance": ("harmonic", "solve"),
     "Which harmonics are kept": ("harmonic.selection", "response.verification"),
     "Peaks over a design parameter": ("response.resonances", "response.parameter"),
-    "Stability": ("response.stability", "response.time.floquet", "response.free_motion"),
+    "Stability": ("response.stability", "response.free_motion"),
     "Bifurcations and other motions": ("response.bifurcations", "response.all_motions"),
     "Nonlinear modes": ("response.nonlinear_modes",),
     "Limit cycles": ("response.self_excited",),

@@ -15,7 +15,7 @@ from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.dynamic_stiffness import Condensed
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 
 SINGULAR = 1e-13  # smallest singular value of a scaled dynamic stiffness over the largest
 

@@ -13,7 +13,7 @@ from stickslip.errors import InputError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations import bifurcations, side_branches, subharmonic_branch
 from stickslip.response.stability import Stability, stability
-from stickslip.response.time.floquet import Floquet
+from stickslip.response.stability.found import Floquet
 from stickslip.solve.status import Status
 
 DAMPING, STOP = 0.05, 10.0  # of a mass that meets a stop ten times as stiff as its spring

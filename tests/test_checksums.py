@@ -14,8 +14,8 @@ from stickslip.model.checksum import LENGTH, add_checksum, checked, with_checksu
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.model.structure_file import load_structure, save_structure
+from stickslip.study.store.archive import PartStore
 from stickslip.study.store.netcdf import attributes_there, read_tree, write_tree
-from stickslip.study.store.shelf import PartStore
 
 MATRIX = np.array([[2.0, -1.0], [-1.0, 2.0]])
 

@@ -12,7 +12,7 @@ from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.iwan import FourParameter
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study

@@ -19,7 +19,7 @@ from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dlft import dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import to_complex
 from stickslip.harmonic.rigid_jacobian import RigidJacobian
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure

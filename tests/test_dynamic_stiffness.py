@@ -14,8 +14,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic import spectral
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import padded, to_complex, to_real
-from stickslip.harmonic.harmonic_set import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of, padded, to_complex, to_real
 from stickslip.harmonic.spectral import ModeTerms, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
 from stickslip.harmonic.travelling import MIN_CACHED_DOFS, condensed_once

@@ -14,7 +14,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.stability import hill_exponents, hill_stability, motion_stability, stability, wave_disturbances

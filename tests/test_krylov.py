@@ -24,8 +24,7 @@ from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import factorise
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of, to_complex, to_real
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses
@@ -38,8 +37,7 @@ from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.gmres import gmres
-from stickslip.solve.krylov import MIN_WORN_ITERATIONS, Automatic, Krylov, to_tolerance
+from stickslip.solve.krylov import MIN_WORN_ITERATIONS, Automatic, Krylov, gmres, to_tolerance
 from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status

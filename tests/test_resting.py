@@ -22,9 +22,16 @@ from stickslip.harmonic.stuck_contact_elimination import Resting, TransposedElim
 from stickslip.operators import Bordered, Costs, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.factors import BorderedElimination, Reduced, reduced_factors
 from stickslip.solve.krylov import Automatic, Krylov
-from stickslip.solve.linear import Assembled, Dense, factorised, factors_of
+from stickslip.solve.linear import (
+    Assembled,
+    BorderedElimination,
+    Dense,
+    Reduced,
+    factorised,
+    factors_of,
+    reduced_factors,
+)
 from stickslip.solve.newton_method import Newton
 
 KINDS = ("rests", "static", "tangents", "all")

@@ -17,7 +17,7 @@ from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.harmonic_set import to_real
 from stickslip.harmonic.selection import alert as alert_module
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert

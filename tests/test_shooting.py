@@ -13,7 +13,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.time.floquet import Floquet, floquet
+from stickslip.response.stability.found import Floquet, floquet
 from stickslip.response.time.period_map import PeriodMap, period_map
 from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, rest

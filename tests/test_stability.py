@@ -25,14 +25,14 @@ from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.harmonic_set import to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import motion_stability, stability
-from stickslip.response.stability.flow_map import sampled_monodromy
+from stickslip.response.stability.flow_map import monodromy
 from stickslip.response.stability.missing_harmonics import FARTHER, MIN_HARMONICS, corrected, solved_with
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
@@ -412,7 +412,7 @@ def test_a_block_of_samples_is_one_sample_after_the_other(n_modes, monkeypatch):
             states = step @ states
         return states
 
-    monkeypatch.setattr(sampled_monodromy._Kicks, "advance", each_alone)
+    monkeypatch.setattr(monodromy._Kicks, "advance", each_alone)
     one_by_one = motion_stability(structure, interface, gaps, 0.8)
     assert of_blocks.transitions == one_by_one.transitions > 0
     assert matched(of_blocks.floquet.multipliers, one_by_one.floquet.multipliers) < 1e-9

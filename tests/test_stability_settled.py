@@ -16,11 +16,9 @@ from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import settled, settled_stability, stability
-from stickslip.response.stability.course import course_of, sign_of
-from stickslip.response.stability.cycle import cycle_of, has_transitions
-from stickslip.response.stability.found import NEUTRAL, Stability, changes
+from stickslip.response.stability.course import course_of, cycle_of, has_transitions, sign_of
+from stickslip.response.stability.found import NEUTRAL, Floquet, Stability, changes
 from stickslip.response.system import System
-from stickslip.response.time.floquet import Floquet
 
 DAMPING = 0.04
 

@@ -47,9 +47,9 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
+from stickslip.response.stability.found import Floquet
 from stickslip.response.stability.settled import Settled
 from stickslip.response.system import System
-from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ

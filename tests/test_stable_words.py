@@ -8,9 +8,7 @@ import xarray as xr
 from stickslip.analyses.forced_response.stability.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
 from stickslip.analyses.residual_tractions.page import SECTION, Tractions, band, resonances
 from stickslip.response.bifurcations.found import Bifurcations
-from stickslip.response.stability.found import Stability
-from stickslip.response.stability.modulus import modulus_text
-from stickslip.response.time.floquet import Floquet
+from stickslip.response.stability.found import Floquet, Stability, modulus_text
 
 
 def points(words: str) -> list[Point]:

@@ -8,8 +8,7 @@ from transient_models import load_of, structure_of
 import stickslip as ss
 from stickslip.response.quasi_periodic.in_time import course
 from stickslip.response.time.start import rest
-from stickslip.response.time.stepping.marcher import Marcher, prepared
-from stickslip.response.time.stepping.step_choice import FINE, MOST_STEPS, with_enough_steps
+from stickslip.response.time.stepping.marcher import FINE, MOST_STEPS, Marcher, prepared, with_enough_steps
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 PRELOAD, OMEGA, ORDER = 0.3, 1.26, 5

@@ -12,8 +12,7 @@ from newton_bounds import FINE, unknowns_bound
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
-from stickslip.harmonic.harmonic_set import complex_rows, harmonics_of, is_full, real_rows, rows_of
+from stickslip.harmonic.harmonic_set import complex_rows, harmonics_of, is_full, real_rows, rows_of, to_real
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 

@@ -32,9 +32,8 @@ from stickslip.harmonic.stuck_contact_elimination import Known
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.solve.factors import reduced_factors
 from stickslip.solve.krylov import Automatic, Krylov
-from stickslip.solve.linear import Dense, LinearSolver
+from stickslip.solve.linear import Dense, LinearSolver, reduced_factors
 from stickslip.solve.newton_method import Newton, Solution, newton
 
 ORDER, SAMPLES = 5, 128

@@ -23,7 +23,7 @@ import numpy as np
 from evidence.benchmarks.bench_newton import medians
 from evidence.models.two_blades import TwoBlades, two_blades
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.harmonic_set import to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import accepted_points
 from stickslip.response.stability import hill_exponents, motion_stability, stability

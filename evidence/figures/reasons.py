@@ -11,7 +11,7 @@ from evidence.figures.solve import Orbit, Pair, orbit
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.contact.law import OPEN, SLIP
 from stickslip.harmonic.aft import contact_forces
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.response import ForcedPoint, ForcedProblem, fields, forced_problem, signals
 from stickslip.solve.newton_method import newton
 

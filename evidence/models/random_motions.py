@@ -16,8 +16,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
-from stickslip.harmonic.harmonic_set import harmonics_of
+from stickslip.harmonic.harmonic_set import harmonics_of, to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.stability import Stability, motion_stability

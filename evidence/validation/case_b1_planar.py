@@ -11,7 +11,7 @@ from stickslip.arrays import ComplexArray
 from stickslip.contact.compiled import Evaluator, compile_contacts
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.harmonic.aft import contact_forces
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import to_complex
 
 SOURCE = "literature benchmark B1 (closed form)"
 # A/xc, real and imaginary part of F/U

@@ -21,7 +21,7 @@ from evidence.validation.going_on import go_on
 from stickslip.errors import StickslipError
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import hill_exponents
-from stickslip.response.time.floquet import UNIT_TOLERANCE
+from stickslip.response.stability.found import UNIT_TOLERANCE
 from stickslip.response.time.shooting import shoot
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping

@@ -16,8 +16,16 @@ from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
 from stickslip.harmonic.costs import linear_costs, products_pay
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics, complex_rows, harmonics_of, is_full, real_rows, rows_of
+from stickslip.harmonic.harmonic_set import (
+    Harmonics,
+    complex_rows,
+    harmonics_of,
+    is_full,
+    real_rows,
+    rows_of,
+    to_complex,
+    to_real,
+)
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.matrix_products import known_by_vectors, linear_force, mass_damping_slope, matrices, products
 from stickslip.harmonic.sparse_stiffness import SparseStiffness

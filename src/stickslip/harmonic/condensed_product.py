@@ -14,8 +14,7 @@ import scipy.linalg
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import SparseRows
 from stickslip.harmonic.factors import with_contacts
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics, real_rows
+from stickslip.harmonic.harmonic_set import Harmonics, real_rows, to_complex, to_real
 from stickslip.harmonic.spectral import Blocks, Interior, StateSpace
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows

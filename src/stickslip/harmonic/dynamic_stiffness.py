@@ -17,8 +17,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency, onto_interior
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import padded
-from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.harmonic.harmonic_set import Harmonics, padded
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
 from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
 from stickslip.model.blas_threads import threads_for

@@ -14,8 +14,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.product import multiply_blocks
 from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics, is_full
+from stickslip.harmonic.harmonic_set import Harmonics, is_full, to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, Products, StiffnessProducts
 from stickslip.harmonic.spectral import Blocks
 

@@ -14,8 +14,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.harmonic.harmonic_set import Harmonics, to_complex, to_real
 from stickslip.harmonic.spectral import Blocks
 from stickslip.reduction.mistuned import MistunedWheel, circulant
 

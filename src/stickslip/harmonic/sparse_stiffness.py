@@ -25,8 +25,7 @@ from stickslip.harmonic.condensed_product import (
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import as_array, with_contacts
-from stickslip.harmonic.fourier import to_complex
-from stickslip.harmonic.harmonic_set import Harmonics, real_rows
+from stickslip.harmonic.harmonic_set import Harmonics, real_rows, to_complex
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry
 from stickslip.harmonic.spectral import Blocks, Interior
 from stickslip.model.dofs import Dofs

@@ -18,7 +18,7 @@ from stickslip.contact.coupling import add_coupling, couplings, touched
 from stickslip.contact.interface import SparseRows
 from stickslip.contact.product import contact_product
 from stickslip.harmonic.factors import as_array
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.harmonic.linear import StiffnessProducts
 from stickslip.operators import Elimination
 

@@ -17,8 +17,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness, condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics
+from stickslip.harmonic.harmonic_set import Harmonics, to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
 from stickslip.harmonic.mistuned import by_sectors, condense_mistuned

@@ -31,7 +31,7 @@ from .rotating.safe import NodalDiameterMap as NodalDiameterMap
 from .rotating.safe import Safe as Safe
 from .rotating.safe import nodal_diameter_map as nodal_diameter_map
 from .rotating.safe import safe as safe
-from .time.floquet import Floquet as Floquet
+from .stability.found import Floquet as Floquet
 from .time.sectors import SectorsInTime as SectorsInTime
 from .time.sectors import WaveMotion as WaveMotion
 from .time.sectors import all_sectors as all_sectors

@@ -15,7 +15,7 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import as_array, real_part, solved, with_contacts
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import to_complex
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.fe.factorisation import factorise

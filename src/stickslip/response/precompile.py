@@ -24,7 +24,7 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.stuck_contact_elimination import known
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.stability.flow_map import kick_blocks
+from stickslip.response.stability.flow_map.monodromy import compiled_kicks
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping, integrate
 from stickslip.solve.krylov import Automatic, Krylov
@@ -61,7 +61,7 @@ def _on_samples() -> None:
     start = start_from_harmonics(np.zeros((2, 3), dtype=complex), 1.0, gap, [SPRING])
     stepping = TimeStepping(steps_per_period=SAMPLES, max_periods=2)
     integrate(structure, gap, [SPRING], load, 1.0, np.array([0]), start, stepping)
-    kick_blocks.run()
+    compiled_kicks()
 
 
 TASKS: dict[str, Callable[[], None]] = {

@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.dlft import DynamicLagrangian
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 

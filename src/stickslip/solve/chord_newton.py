@@ -13,11 +13,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.operators import Bordered, Corner, Inverse, Jacobian
-from stickslip.solve.factors import Factored, Reduced
 from stickslip.solve.iterate import Globalisation, Iterate, Work
 from stickslip.solve.krylov import Automatic
 from stickslip.solve.line_search import MEMORY, LineSearch
-from stickslip.solve.linear import Dense, LinearSolver, Signed, factorised, factors_of, is_factorised
+from stickslip.solve.linear import Dense, Factored, LinearSolver, Reduced, Signed, factorised, factors_of, is_factorised
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 

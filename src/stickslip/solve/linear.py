@@ -1,27 +1,31 @@
-"""Protocol of the linear solvers, and the dense solver."""
+"""Protocol of the linear solvers, the dense solver, and LU factors of arrays and of the Schur complement of a Jacobian."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, TypeGuard
 
 import numpy as np
+import scipy.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.model.blas_threads import threads_for
 from stickslip.operators import (
     MAX_CHEAP_ARRAY,
     Bordered,
     Corner,
     Costs,
+    Elimination,
     Inverse,
     Jacobian,
     JacobianOperator,
     array_of,
     transpose_of,
 )
-from stickslip.solve.factors import elimination_of, lu_factors, reduced_factors
 
 SOLUTIONS, PRODUCTS = (5, 10)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
 MAX_ARRAY_UNKNOWNS = 8000  # unknowns of an array, which then takes half a GB
+SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 
 
 class Assembling(JacobianOperator, Protocol):
@@ -122,7 +126,7 @@ class Assembled:
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right``; see `LinearSolver`."""
-        elimination = elimination_of(jac)
+        elimination = _elimination_of(jac)
         if elimination is None:
             array = assembled(jac)
             return None if array is None else self.dense.solve(array, right)
@@ -133,7 +137,7 @@ class Assembled:
         self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system and return the sign of its determinant; see `LinearSolver`."""
-        elimination = elimination_of(Bordered(jac, column, row, corner))
+        elimination = _elimination_of(Bordered(jac, column, row, corner))
         if elimination is None:
             array = assembled(jac)
             if array is None:
@@ -164,7 +168,7 @@ def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatA
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
-    factors = lu_factors(matrix)
+    factors = _lu_factors(matrix)
     return None if factors is None else factors(right)
 
 
@@ -196,12 +200,12 @@ def factors_of(jac: Jacobian) -> Signed | None:
     """
     array = array_of(jac)
     if array is not None:
-        return lu_factors(array)
-    elimination = elimination_of(jac)
+        return _lu_factors(array)
+    elimination = _elimination_of(jac)
     if elimination is not None:
         return reduced_factors(elimination)
     array = assembled(jac)
-    return None if array is None else lu_factors(array)
+    return None if array is None else _lu_factors(array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +243,7 @@ def is_factorised(jac: Jacobian) -> bool:
 
 def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
     """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
-    known = lu_factors(matrix)
+    known = _lu_factors(matrix)
     return (None, 0.0) if known is None else (known(right), known.sign)
 
 
@@ -254,3 +258,145 @@ def _array(jac: Jacobian) -> FloatArray:
             "Give a Krylov solver.",
         )
     return array
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """LU factors of an array."""
+
+    lu: FloatArray
+    pivots: FloatArray
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant."""
+        swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
+        flips = swaps + np.count_nonzero(self.lu.diagonal() < 0.0)
+        return 1.0 if flips % 2 == 0 else -1.0
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solve; see `Inverse`."""
+        solution, _ = scipy.linalg.lapack.dgetrs(self.lu, self.pivots, right, trans=int(transposed))
+        return np.asarray(solution)
+
+
+def _lu_factors(matrix: FloatArray) -> Factored | None:
+    """Factorise an array, which is overwritten; None if it is singular to working precision."""
+    with threads_for(len(matrix)):
+        lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
+    size = np.abs(lu.diagonal())
+    size.sort()
+    # neither NaN, which is sorted to the end, nor infinity passes
+    usable = info == 0 and size[0] > SINGULAR * size[-1]
+    return Factored(lu, pivots) if usable else None
+
+
+class Eliminating(JacobianOperator, Protocol):
+    """A Jacobian from which cheap unknowns can be eliminated."""
+
+    def eliminated(self) -> Elimination | None:
+        """Return the elimination of cheap unknowns; None where it costs as much as the whole array."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class BorderedElimination:
+    """Elimination in a bordered matrix; the border remains.
+
+    Parameters
+    ----------
+    inside
+        The elimination without the border.
+    columns, rows, corner
+        (n, m), (m, n) and (m, m).
+    """
+
+    inside: Elimination
+    columns: FloatArray
+    rows: FloatArray
+    corner: FloatArray
+
+    @property
+    def size(self) -> int:
+        """Number of remaining unknowns, border included."""
+        return self.inside.size + len(self.corner)
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of the eliminated block."""
+        return self.inside.sign
+
+    @cached_property
+    def _across(self) -> tuple[FloatArray, FloatArray]:
+        return self.inside.reduced(self.columns)
+
+    @cached_property
+    def _down(self) -> tuple[FloatArray, FloatArray]:
+        return self.inside.reduced(self.rows.T, transposed=True)
+
+    def array(self) -> FloatArray:
+        """Return the Schur complement (size, size)."""
+        n = self.inside.size
+        columns, inner = self._across
+        out = np.empty((self.size, self.size), order="F")
+        out[:n, :n], out[:n, n:] = self.inside.array(), columns
+        out[n:, :n], out[n:, n:] = self._down[0].T, self.corner - self.rows @ inner
+        return out
+
+    def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Return the right sides of the Schur complement, and their part of the eliminated unknowns; see `Elimination`."""
+        n = len(self.columns)
+        rows = self.columns.T if transposed else self.rows
+        left, inner = self.inside.reduced(right[:n], transposed=transposed)
+        return np.vstack([left, right[n:] - rows @ inner]), np.vstack([inner, np.zeros_like(right[n:])])
+
+    def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Return all unknowns from the remaining ones; see `Elimination`."""
+        inner = (self._down if transposed else self._across)[1]
+        n = self.inside.size
+        all_of_it = self.inside.spread(x[:n], transposed=transposed)
+        return np.vstack([all_of_it - inner @ x[n:], x[n:]])
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """LU factors of the Schur complement of a matrix; None where no unknown remains."""
+
+    elimination: Elimination
+    factors: Factored | None
+
+    @property
+    def sign(self) -> float:
+        """Sign of its determinant."""
+        return self.elimination.sign * (1.0 if self.factors is None else self.factors.sign)
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solve; see `Inverse`."""
+        left, inner = self.elimination.reduced(right[:, None], transposed=transposed)
+        if self.factors is None:
+            return inner[:, 0]
+        x = self.factors(left[:, 0], transposed=transposed)
+        return (inner + self.elimination.spread(x[:, None], transposed=transposed))[:, 0]
+
+
+def _is_eliminating(jac: Jacobian) -> TypeGuard[Eliminating]:
+    return hasattr(type(jac), "eliminated")
+
+
+def _elimination_of(jac: Jacobian) -> Elimination | None:
+    """Return the elimination of cheap unknowns from a Jacobian, borders included; None where there are none."""
+    inside = jac.flat.jac if isinstance(jac, Bordered) else jac
+    if not _is_eliminating(inside):
+        return None
+    own = inside.eliminated()
+    if own is None or not isinstance(jac, Bordered):
+        return own
+    return BorderedElimination(own, *jac.flat.borders)
+
+
+def reduced_factors(elimination: Elimination) -> Reduced | None:
+    """Factorise the Schur complement; None if it is singular to working precision."""
+    if elimination.size == 0:
+        return Reduced(elimination, None)
+    factors = _lu_factors(elimination.array())
+    return None if factors is None else Reduced(elimination, factors)

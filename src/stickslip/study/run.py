@@ -24,6 +24,7 @@ from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.questions import ANALYSES
 from stickslip.study.shard import Shard
+from stickslip.study.store.archive import PartStore
 from stickslip.study.store.atomic_write import whole_file
 from stickslip.study.store.attempts import file_at_work, new_owner
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
@@ -31,7 +32,6 @@ from stickslip.study.store.journal import SEALED, JobJournal, read_sealed
 from stickslip.study.store.netcdf import attributes_there, write_tree
 from stickslip.study.store.progress import LOG, Interrupted, written_down
 from stickslip.study.store.provenance import Provenance, as_text, library_versions
-from stickslip.study.store.shelf import PartStore
 from stickslip.study.store.worker_process import Limits, check_memory_limit
 from stickslip.study.store.workers import Hands, check_kind, executor
 

@@ -12,8 +12,14 @@ from stickslip.analyses.residual_tractions.table import ResidualTractionsTable
 from stickslip.analyses.residual_tractions.verdicts import case_verdicts, tables
 from stickslip.assembly.model import Model
 from stickslip.contact.initial_sliders import starts_of
-from stickslip.response.residual_tractions.bounds import End, TractionBounds, resonance_bounds, traction_bounds
-from stickslip.response.residual_tractions.confirming import Confirmation, confirmed
+from stickslip.response.residual_tractions.bounds import (
+    Confirmation,
+    End,
+    TractionBounds,
+    confirmed,
+    resonance_bounds,
+    traction_bounds,
+)
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
 from stickslip.study.store.progress import advance
 from stickslip.units import HZ, millimetres_between

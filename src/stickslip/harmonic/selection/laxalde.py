@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import to_complex
 from stickslip.harmonic.selection.spectrum import contacts_of_reference, foretold, up_to
 from stickslip.harmonic.selection.strategy import Step, Verdict
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.harmonic.factors import solved
-from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.harmonic_set import to_complex, to_real
 from stickslip.harmonic.selection.alert import solve_array
 from stickslip.harmonic.selection.spectrum import above, foretold, padded_solution, spectral_shares
 from stickslip.harmonic.selection.strategy import Step, Verdict

@@ -8,8 +8,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.stability.found import Stability
-from stickslip.response.time.floquet import UNIT_TOLERANCE
+from stickslip.response.stability.found import UNIT_TOLERANCE, Stability
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.branch_events import FOLD, Mark, located
 from stickslip.solve.continuation import start_point

@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.factors import solved, with_contacts
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.harmonic_set import to_complex
 from stickslip.harmonic.harmonics_per_dof import AnyBalance
 from stickslip.response.continuation.starting_solutions import at_rest
 from stickslip.response.equilibrium import bonded_start

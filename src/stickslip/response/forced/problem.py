@@ -11,8 +11,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import padded
-from stickslip.harmonic.harmonic_set import ByDof, Harmonics, is_full, kept_by_dof, supports_of
+from stickslip.harmonic.harmonic_set import ByDof, Harmonics, is_full, kept_by_dof, padded, supports_of
 from stickslip.harmonic.harmonics_per_dof import AnyBalance, LocalBalance
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, always_kept

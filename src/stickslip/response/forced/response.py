@@ -11,12 +11,11 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.accepted import accepted_pairs, accepted_points
 from stickslip.response.forced.along import along_the_branch
-from stickslip.response.forced.double_passage import double_passage
 from stickslip.response.forced.from_time import found_in_time
+from stickslip.response.forced.passages import double_passage, single_passage
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.resonance import resolve_peak
 from stickslip.response.forced.settled import settle
-from stickslip.response.forced.single_passage import single_passage
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 

@@ -16,8 +16,7 @@ from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart
-from stickslip.response.time.stepping.marcher import prepared
-from stickslip.response.time.stepping.step_choice import FINE, with_enough_steps
+from stickslip.response.time.stepping.marcher import FINE, prepared, with_enough_steps
 
 KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared

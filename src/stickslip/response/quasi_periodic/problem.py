@@ -11,9 +11,14 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import driven_by, judging_indices
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.travelling import condense_side
-from stickslip.harmonic.two_frequency import MAX_DENSE_UNKNOWNS, TorusBalance, TorusLinearisation, torus_balance
+from stickslip.harmonic.two_frequency import (
+    MAX_DENSE_UNKNOWNS,
+    TorusBalance,
+    TorusLinearisation,
+    TorusSide,
+    torus_balance,
+)
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath, closed_path, half_plane
-from stickslip.harmonic.two_frequency_side import TorusSide
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.response.equilibrium import preload

@@ -17,8 +17,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.engine_order_line import TurningStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of
+from stickslip.harmonic.harmonic_set import Harmonics, harmonics_of, to_complex, to_real
 from stickslip.harmonic.structured import real_matrix
 from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.system import System

@@ -14,10 +14,9 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.self_excited.curve import AmplitudePoint, at_amplitude
 from stickslip.response.self_excited.problem import SelfExcited
-from stickslip.response.stability.found import Stability
+from stickslip.response.stability.found import Floquet, Stability
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.stability.waves import WaveDisturbance, growing_wave, wave_disturbances
-from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import all_in_time
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton

@@ -6,8 +6,6 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
-from stickslip.response.stability.modulus import modulus_text
-from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
 
 ROUGH = 0.5  # error of a multiplier, relative to it, beyond which it shows no growth
 NEUTRAL = 1e-3  # change of a disturbance in a period, relative to it, that is neither growth nor decay
@@ -15,6 +13,58 @@ TURNED = 0.1  # part of a multiplier's change along its circle that counts for i
 CLEAR = 2.0  # times that change, from the real axis: a pair that is nearer may meet there and part
 
 Verdict = Literal["stable", "unstable", "neutral", "undecided"]
+ROUNDS_TO_ONE = 5e-4  # off 1, below which four digits may say 1
+UNIT_TOLERANCE = 1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
+
+
+@dataclass(frozen=True, eq=False)
+class Floquet:
+    """Multipliers of a periodic motion.
+
+    A multiplier within `UNIT_TOLERANCE` of 1 is called neutral and is not judged: residual tractions of contacts that
+    never slip, and places of bodies that nothing holds, form families of periodic motions beside each other. One on the
+    unit circle elsewhere belongs to a vibration that nothing damps; it neither grows nor dies, and counts as stable.
+
+    Parameters
+    ----------
+    multipliers
+        (n_states,) eigenvalues of the derivative of the period map, largest first.
+    """
+
+    multipliers: ComplexArray
+
+    @property
+    def neutral(self) -> int:
+        """Number of multipliers that are 1."""
+        return int(np.count_nonzero(self._neutral))
+
+    @property
+    def ringing(self) -> int:
+        """Number of multipliers on the unit circle that are not 1."""
+        on = np.abs(np.abs(self.multipliers) - 1.0) <= UNIT_TOLERANCE
+        return int(np.count_nonzero(on & ~self._neutral))
+
+    @property
+    def growth(self) -> float:
+        """Largest modulus of the multipliers that are not neutral; 0 if there are none."""
+        return float(np.max(np.abs(self.multipliers[~self._neutral]), initial=0.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether no small disturbance grows: all moduli but those of neutral multipliers are at most 1."""
+        return self.growth <= 1.0 + UNIT_TOLERANCE
+
+    @property
+    def _neutral(self) -> BoolArray:
+        return np.asarray(np.abs(self.multipliers - 1.0) <= UNIT_TOLERANCE)
+
+
+def floquet(monodromy: FloatArray) -> Floquet:
+    """Return the multipliers of a monodromy matrix, which is NaN where the motion was lost."""
+    if not np.all(np.isfinite(monodromy)):
+        return Floquet(np.full(len(monodromy), np.nan, dtype=complex))
+    values = np.linalg.eigvals(monodromy)
+    return Floquet(np.asarray(values[np.argsort(-np.abs(values), kind="stable")], dtype=complex))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,3 +241,12 @@ def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, Float
     moduli = np.maximum(2.0 * np.abs(np.abs(found) - np.abs(theirs)), TURNED * distance)
     may_meet = np.abs(found.imag) <= CLEAR * distance
     return distance, np.where(may_meet, distance, np.minimum(moduli, distance))
+
+
+def modulus_text(size: float, error: float = 0.0) -> str:
+    """Return a modulus with four digits and its error; beside 1 by how much it is off, since that decides."""
+    off = size - 1.0
+    text = f"{size:.4g}"
+    if 0.0 < abs(off) < ROUNDS_TO_ONE:
+        text = f"1 {'-' if off < 0.0 else '+'} {abs(off):.2g}"
+    return f"{text} ± {error:.2g}" if error > 0.0 else text

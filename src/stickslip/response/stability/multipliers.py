@@ -13,11 +13,14 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.structure import Structure
 from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_part, located_states
 from stickslip.response.stability.flow_map.modal_states import ModalStates, modal_states
-from stickslip.response.stability.flow_map.monodromy import monodromy, share_of_monodromy
-from stickslip.response.stability.flow_map.sampled_monodromy import sample_times, sampled_monodromy
+from stickslip.response.stability.flow_map.monodromy import (
+    monodromy,
+    sample_times,
+    sampled_monodromy,
+    share_of_monodromy,
+)
 from stickslip.response.stability.flow_map.sampled_tangents import Path, SampledTangents, sampled_tangents
-from stickslip.response.stability.found import Stability, changes, partners
-from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet, floquet
+from stickslip.response.stability.found import UNIT_TOLERANCE, Floquet, Stability, changes, floquet, partners
 from stickslip.response.time.sectors import InTime
 
 SAMPLES = 256  # of a period, where laws are known by their tangents; and twice as many

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.response.time.floquet import Floquet, floquet
+from stickslip.response.stability.found import Floquet, floquet
 from stickslip.response.time.sectors import WaveMotion
 from stickslip.response.time.settling import overflowed
 from stickslip.response.time.start import TransientStart

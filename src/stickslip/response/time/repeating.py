@@ -18,9 +18,8 @@ from stickslip.harmonic.linear import LinearSide
 from stickslip.response.time.settling import overflowed, period_harmonics
 from stickslip.response.time.start import rest
 from stickslip.response.time.stepping.contact_step import StepState
-from stickslip.response.time.stepping.marcher import Marcher, prepared
+from stickslip.response.time.stepping.marcher import MOST_STEPS, ROUGH, Marcher, prepared, with_enough_steps
 from stickslip.response.time.stepping.propagator import PeriodicLoad
-from stickslip.response.time.stepping.step_choice import MOST_STEPS, ROUGH, with_enough_steps
 
 Told = Literal["periodic", "not periodic", "not known"]
 STEPS = 512  # in a period, at least
@@ -146,7 +145,7 @@ def repetition(
         Highest harmonic.
     steps
         Smallest number of steps in a period, doubled until half the step resolves the impacts, see
-        `stickslip.response.time.stepping.step_choice`.
+        `stickslip.response.time.stepping.marcher`.
     """
 
     def made(steps: int) -> Marcher:

@@ -18,7 +18,7 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.harmonic_set import to_real
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure

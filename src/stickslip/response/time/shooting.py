@@ -1,12 +1,8 @@
-"""Shooting: Newton's method on the period map.
-
-The map from a state to the state one period later is that of `integrate`, step for step; its derivative, the monodromy
-matrix, comes from tangents carried along the steps. The method finds unstable motions as well as stable ones, does not
-wait for undamped vibrations of a damper to die, and gives the Floquet multipliers.
-"""
+"""Shooting: Newton's method on the period map, and the time-step error of the motion that it finds."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -16,14 +12,14 @@ from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
-from stickslip.response.time.period_map import Derivative, PeriodMap, period_map
+from stickslip.response.stability.found import UNIT_TOLERANCE, Floquet
+from stickslip.response.time.period_map import Derivative, Image, PeriodMap, period_map
 from stickslip.response.time.sectors import WaveMotion
-from stickslip.response.time.settling import remaining_change
+from stickslip.response.time.settling import period_harmonics, remaining_change
 from stickslip.response.time.start import TransientStart, check_start, rest
 from stickslip.response.time.stepping.marcher import Marcher, prepared
 from stickslip.response.time.stepping.propagator import PeriodicLoad
-from stickslip.response.time.stepping.step_check import COARSE, StepErrors, harmonics, step_errors
+from stickslip.response.time.stepping.step_tangent import tangent_operators
 from stickslip.response.time.transient import TimeStepping, check_outputs
 
 ShootingStatus = Literal["converged", "coarse", "not converged", "diverged"]
@@ -35,6 +31,12 @@ CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, 
 FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
 ANEW = 8  # corrections of a search begun anew: from where the plain periods near an orbit four are enough
 RESERVE = 2 * ANEW  # periods left for them
+COARSE = 0.01  # of the largest harmonic: a step that errs by more has not found the motion
+NEUTRAL_DISTANCE = 0.05  # distance of the growth from 1 below which its error is looked for
+JUMP = 1.5  # times the largest friction force: a change within a step that passes over stick
+TURNS = 2.0  # the same of first order: of the derivative, which feels where in a step a slider turns
+RICHARDSON = 4.0 / 3.0  # error of a method of second order over its change when the step is halved
+ERRATIC = 10.0  # the most: where the second of two changes is as large as the first nothing says that more steps lead anywhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,7 +316,7 @@ def _result(
         multipliers = mapping.floquet(found)
     errors = StepErrors(np.nan, np.nan)
     if found is not None and status == "converged":
-        errors = step_errors(mapping, finer, search.state, found, outputs, stepping.harmonics)
+        errors = _step_errors(mapping, finer, search.state, found, outputs, stepping.harmonics)
         status = "converged" if errors.motion <= COARSE else "coarse"
     return ShootingResult(
         status=status,
@@ -334,3 +336,114 @@ def _result(
         gap=known * record.gap,
         contact_force=known * record.force,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class StepErrors:
+    """Estimates of what the step makes wrong.
+
+    Parameters
+    ----------
+    motion
+        Of the harmonics of the outputs, relative to the largest; infinite where more steps overflow.
+    growth
+        Of the largest modulus of the multipliers, where that is close to 1 or a contact opens or closes; infinite where a slider
+        turns within a step, which no derivative sees; 0 elsewhere.
+    """
+
+    motion: float
+    growth: float
+
+
+def _step_errors(
+    mapping: PeriodMap,
+    finer: Callable[[int], Marcher],
+    state: FloatArray,
+    found: Derivative,
+    outputs: IntArray,
+    order: int,
+) -> StepErrors:
+    """Compare a periodic motion with twice as many steps; where a contact opens or closes with four times as many, too.
+
+    Parameters
+    ----------
+    mapping, state
+        The period map and its fixed point.
+    finer
+        Gives the same structure with so many times as many steps.
+    found
+        Derivative of the map there.
+    outputs, order
+        What is compared, and up to which harmonic.
+    """
+    image, growth = mapping.period(state), mapping.floquet(found).growth
+    known = harmonics(mapping, state, image, outputs, order)[1:]
+    fine, there = _corrected(mapping, finer(2), state, found)
+    moved = fine.period(there)
+    if not moved.failures >= 0:
+        return StepErrors(np.inf, np.inf)
+    size, jumps = float(np.max(np.abs(known), initial=0.0)), _jumps(image)
+    change = _change(known, harmonics(fine, there, moved, outputs, order)[1:], size)
+    opens = _opens(image) or _opens(moved)
+    if RICHARDSON * change > COARSE or not opens:
+        error = np.inf if jumps or opens else 0.0
+        if error == 0.0 and abs(growth - 1.0) < NEUTRAL_DISTANCE:
+            error = TURNS * abs(fine.floquet(fine.derivative(there)).growth - growth)
+        return StepErrors(RICHARDSON * change, error)
+    motions, growths = [known], [growth]
+    for marcher in (fine.marcher, finer(4)):
+        fine, there = _corrected(mapping, marcher, state, found)
+        found = fine.derivative(there)
+        if not found.image.failures >= 0:
+            return StepErrors(np.inf, np.inf)
+        state = there + found.inverse() @ (found.image.state - there)
+        motions.append(harmonics(fine, state, fine.period(state), outputs, order)[1:])
+        growths.append(fine.floquet(found).growth)
+    first, second = (_change(a, b, size) for a, b in pairwise(motions))
+    motion = _scattered(max(first, change), second, RICHARDSON)
+    error = _scattered(abs(growths[1] - growth), abs(growths[2] - growths[1]), TURNS)
+    return StepErrors(motion, np.inf if jumps else error)
+
+
+def _change(one: ComplexArray, other: ComplexArray, size: float) -> float:
+    return float(np.max(np.abs(other - one), initial=0.0)) / size if size > 0.0 else 0.0
+
+
+def _corrected(
+    mapping: PeriodMap, marcher: Marcher, state: FloatArray, found: Derivative
+) -> tuple[PeriodMap, FloatArray]:
+    """Return the map with finer steps, and a state corrected towards its fixed point with the derivative at hand."""
+    fine = replace(mapping, marcher=marcher, linear=tangent_operators(marcher))
+    return fine, state + found.inverse() @ (fine.image(state).state - state)
+
+
+def _scattered(first: float, second: float, least: float) -> float:
+    """Return the error of the first of three values by their two changes, of which chance has its part; infinite if they are lost.
+
+    Changes that go on falling as these two did add up to a geometric series; `least` bounds its sum over the first change.
+    """
+    if not np.isfinite(first + second):
+        return np.inf
+    falls = first - second > first / ERRATIC
+    return max(least, first / (first - second)) * first if falls else ERRATIC * max(first, second)
+
+
+def _opens(image: Image) -> bool:
+    """Return whether a contact is open for a part of the period: it presses with nothing there."""
+    is_open = image.record.force[:, :, 2] == 0.0
+    return bool(np.any(np.any(is_open, axis=0) & ~np.all(is_open, axis=0)))
+
+
+def _jumps(image: Image) -> bool:
+    """Return whether a friction force changes sides from one step to the next: from its largest value to the opposite one."""
+    force = image.record.force[:, :, :2]
+    largest = np.max(np.abs(force), axis=0, initial=0.0)
+    return bool(np.any(np.abs(np.diff(force, axis=0)) > JUMP * largest[None]))
+
+
+def harmonics(mapping: PeriodMap, state: FloatArray, image: Image, outputs: IntArray, order: int) -> ComplexArray:
+    """Return the (order + 1, n_outputs) harmonics of a period from a state, m."""
+    marcher = mapping.marcher
+    began = mapping.start_of(state).x[: marcher.n]
+    modal = period_harmonics(began, image.record.motion, order)
+    return np.asarray(modal @ marcher.modes.basis[outputs].T)

@@ -15,8 +15,7 @@ from stickslip.contact.addresses import law_at
 from stickslip.contact.cache import njit
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
-from stickslip.response.time.stepping.contact_step import KERNEL, PARAMETERS, STATES
-from stickslip.response.time.stepping.contacts import TimeContacts, time_contacts
+from stickslip.response.time.stepping.contact_step import KERNEL, PARAMETERS, STATES, TimeContacts, time_contacts
 from stickslip.response.time.stepping.propagator import require_array
 
 SAMPLES = 1024  # of a period over which laws are marched

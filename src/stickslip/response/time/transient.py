@@ -22,9 +22,8 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.time.settling import Progress, SettlingStatus, overflowed, period_harmonics
 from stickslip.response.time.start import TransientStart, check_start, rest
 from stickslip.response.time.stepping.contact_step import StepState
-from stickslip.response.time.stepping.marcher import Marcher, Record, prepared
+from stickslip.response.time.stepping.marcher import FINE, Marcher, Record, prepared
 from stickslip.response.time.stepping.propagator import PeriodicLoad
-from stickslip.response.time.stepping.step_choice import FINE
 from stickslip.units import check_quantities, quantity
 
 MOST_STEPS = 10_000_000  # a period of which fills the memory of a large machine
@@ -111,7 +110,7 @@ class TransientResult:
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     step_angle
         Phase angle per step, rad, of the fastest contact that opens or closes in the last period: the frequency of its stiffness and the
-        mass that moves with it, times the step. See `stickslip.response.time.stepping.step_choice`.
+        mass that moves with it, times the step. See `stickslip.response.time.stepping.marcher`.
     """
 
     status: SettlingStatus

@@ -1,16 +1,20 @@
-"""Named arrays, numbers and texts as NumPy archives with a checksum, without pickle."""
+"""Named arrays, numbers and texts as NumPy archives with a checksum, without pickle; and the cache of parts of a model that consists of them."""
 
 import io
 import zipfile
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
 from functools import cache, lru_cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from stickslip.model.checksum import checked, with_checksum
+from stickslip.study.store.atomic_write import write_whole
+from stickslip.study.store.progress import LOG
 
 # bytes before the description of an array: what NumPy marks its files with, then the length of the description
 HEADER = np.lib.format.MAGIC_LEN + 2
@@ -121,3 +125,39 @@ def _record(values: dict[str, Any], kind: type[Any]) -> Any:
             own[field] = tuple(_record(inner[field][i], row) for i in range(count))
     missing = {f.name: None for f in fields(kind) if f.init and f.name not in own}
     return kind(**own, **missing)
+
+
+@dataclass(frozen=True, eq=False)
+class PartStore:
+    """Cache of named arrays, numbers and texts under the hash of their inputs.
+
+    Parameters
+    ----------
+    folder
+        Folder of the files; None: nothing is stored.
+    fresh
+        Whether files of earlier runs are ignored.
+    written
+        Files written by this run.
+    """
+
+    folder: Path | None = None
+    fresh: bool = False
+    written: set[Path] = field(default_factory=set)
+
+    def kept(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+        """Return the result of `make`, stored or new; `content` is everything that it depends on."""
+        if self.folder is None:
+            return make()
+        named = sha256(f"{FORMAT} {content}".encode()).hexdigest()
+        path = self.folder / f"{named}.npz"
+        if path.is_file() and (path in self.written or not self.fresh):
+            try:
+                return decode(path.read_bytes())
+            except (ValueError, OSError) as error:
+                LOG.info(f"{path} is damaged and made anew ({error})")
+        # what is computed and what is read are the same to the last bit, and of the same kinds
+        payload = encode(make())
+        write_whole(path, payload)
+        self.written.add(path)
+        return decode(payload)

@@ -17,7 +17,7 @@ from stickslip.report.quantities import (
     quantity,
     scale_for,
 )
-from stickslip.response.stability.modulus import modulus_text
+from stickslip.response.stability.found import modulus_text
 from stickslip.study.verdict import said
 
 BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided

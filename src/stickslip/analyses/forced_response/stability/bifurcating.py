@@ -27,7 +27,7 @@ from stickslip.response.bifurcations.locate import MAX_EXAMINED_MOTIONS, bifurca
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability import Stability, hill_stability, stability
-from stickslip.response.time.floquet import Floquet
+from stickslip.response.stability.found import Floquet
 from stickslip.study.analysis import Notes, Pieces
 from stickslip.units import HZ
 

@@ -15,8 +15,7 @@ from stickslip.analyses.forced_response.stability.stable import Examined, why_no
 from stickslip.analyses.forced_response.verdicts.curve import branch_length, jumps, stored_energy
 from stickslip.arrays import IntArray
 from stickslip.model.structure import Structure
-from stickslip.response.stability.course import Course, course_of
-from stickslip.response.stability.cycle import has_transitions
+from stickslip.response.stability.course import Course, course_of, has_transitions
 from stickslip.response.stability.found import changes
 from stickslip.response.stability.missing_harmonics import newton_work
 from stickslip.units import HZ

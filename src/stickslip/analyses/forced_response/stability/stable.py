@@ -21,9 +21,9 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import Stability, hill_stability, settled_stability
+from stickslip.response.stability.found import modulus_text
 from stickslip.response.stability.hill_method.hill_segment import Keep, not_kept
 from stickslip.response.stability.missing_harmonics import with_more
-from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.stability.waves import WaveDisturbance, growing_wave, point_disturbances
 from stickslip.units import HZ
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.stability.stable import Examined
-from stickslip.response.stability.modulus import modulus_text
+from stickslip.response.stability.found import modulus_text
 from stickslip.study.verdict import said
 from stickslip.units import HZ
 

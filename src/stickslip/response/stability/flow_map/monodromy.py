@@ -1,15 +1,31 @@
-"""Monodromy matrix with located transitions: matrix exponentials between them, projections at them."""
+"""Monodromy matrix: matrix exponentials between located transitions, projections at them, and kicks where tangents are known on samples only.
+
+A kick acts at each sample, and between samples everything is propagated exactly (the splitting of Strang 1968): the error is of second
+order in the step. The means of the tangents over the period are springs, and part of what is propagated.
+
+Over a block of samples the gaps follow from the states at its beginning and from the forces of the samples before, by small matrices; the
+large ones are multiplied once a block. Rounding apart the result is that of one sample after the other.
+"""
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
+from numba import types
 
 from stickslip.arrays import BoolArray, FloatArray
+from stickslip.contact.cache import njit
 from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.flow_map.contact_states import ContactStates
 from stickslip.response.stability.flow_map.low_rank_flow import flow_of
 from stickslip.response.stability.flow_map.modal_states import ModalStates
+from stickslip.response.stability.flow_map.propagation import transition
+from stickslip.response.stability.flow_map.sampled_tangents import SampledTangents
 from stickslip.response.time.sectors import InTime
+from stickslip.response.time.stepping.contact_step import inner
+
+MAX_SAMPLES = 32  # in a block; 8 to 64 cost the same within a tenth, one contact on 60 modes
 
 
 @dataclass(slots=True)
@@ -95,3 +111,260 @@ def identity(n: int, held: BoolArray, more: int) -> Disturbance:
     sliders = np.zeros((len(held), size + more))
     sliders[held, 2 * n : size] = np.eye(size - 2 * n)
     return Disturbance(np.eye(2 * n, size + more), sliders)
+
+
+def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list[FloatArray]:
+    """Return the samples of each interval between transitions, equally spaced and its beginning among them.
+
+    Parameters
+    ----------
+    contacts
+        Those with located transitions.
+    samples
+        Least number over the period.
+    halves
+        How many halves of it are taken; twice as many halve each step.
+    """
+    out = []
+    for left, right in zip(contacts.times[:-1], contacts.times[1:], strict=True):
+        least = max(1, int(np.ceil((right - left) * samples / (2.0 * np.pi))))
+        count = (least * halves + 1) // 2
+        out.append(left + (right - left) / count * np.arange(count))
+    return out
+
+
+class _Kicks:
+    """Sampled contacts: their states, and what their forces do to the motion."""
+
+    def __init__(self, modes: ModalStates, tangents: SampledTangents, weights: FloatArray, size: int) -> None:
+        n, most = tangents.kept.shape
+        self.modes, self.jac = modes, tangents.jac
+        self.by_rate = bool(np.any(tangents.jac[:, :, :, 3:6] != 0.0))
+        self.alone = np.ascontiguousarray(np.delete(tangents.jac, [3, 4, 5], axis=3))  # where no rate acts
+        self.factors = weights
+        index = 3 * tangents.contacts[:, None] + np.arange(3)
+        self.gaps = modes.gaps[index.reshape(-1)]  # (3 n, n_modes)
+        self.rates = self.gaps * (modes.omega * modes.speed)
+        self.pull = modes.pull(self.gaps)
+        self.weights = np.repeat(weights, 3)[:, None]
+        own_stiffness = np.diagonal(tangents.jac[:, :, :3, :3], axis1=2, axis2=3)
+        self.springs = self.weights * own_stiffness.mean(axis=0).reshape(-1, 1)
+        self.real = tangents.kept
+        self.states = np.zeros((n, most, size))
+        self.before = np.zeros((n, 3, size))  # gaps at the sample before
+        own = int(self.real.sum())
+        self.states[self.real, size - 3 * n - own : size - 3 * n] = np.eye(own)
+        self.before[:, :, size - 3 * n :] = np.eye(3 * n).reshape(n, 3, 3 * n)
+
+    def advance(self, first: int, shares: FloatArray, step: FloatArray, states: FloatArray) -> FloatArray:
+        """Return the states after the kicks at samples from `first` on, each with its share of the period, and a step after each."""
+        if self.by_rate:
+            for i, share in enumerate(shares, first):
+                self.kick(i, share, states)
+                states = step @ states
+            return states
+        half, (rows, columns) = self.modes.n, (len(self.gaps), states.shape[1])
+        gaps, push = np.zeros((rows, len(step))), np.zeros((len(step), rows))
+        gaps[:, :half], push[half : 2 * half] = self.gaps, self.pull
+        known, springs = np.zeros((self.alone.shape[3], columns)), self.springs.ravel()
+        for block in _blocks(step, gaps, push, len(shares)):
+            samples = len(block.gaps)
+            now, forces = block.gaps @ states, np.zeros((samples, rows, columns))
+            contacts = self.alone[first : first + samples], self.factors, springs
+            compiled_kicks()(
+                contacts, shares[:samples], block.gap_response, now, self.states, self.before, known, forces
+            )
+            states = block.step @ states + block.force_effect @ forces.reshape(-1, columns)
+            first, shares = first + samples, shares[samples:]
+        return states
+
+    def kick(self, sample: int, share: float, motion: FloatArray) -> None:
+        """Change velocities and states at a sample; velocities decay as the kick goes on."""
+        n, half = len(self.states), self.modes.n
+        gap = self.gaps @ motion[:half]
+        now = gap.reshape(n, 3, -1)
+        jac, rate = self.jac[sample], self.rates @ motion[half : 2 * half]
+        known = np.concatenate([now, np.zeros_like(now), self.states, self.before], axis=1)
+        force = self.weights * (jac[:, :3] @ known).reshape(3 * n, -1) - self.springs * gap
+        damping = np.zeros((n, 3, n, 3))
+        damping[np.arange(n), :, np.arange(n)] = jac[:, :3, 3:6]
+        damping = self.weights * damping.reshape(3 * n, 3 * n)
+        mobility = share * (self.rates @ self.pull)
+        force = _decayed(damping @ mobility) @ (force + damping @ rate)
+        rate = rate - 0.5 * mobility @ force
+        known[:, 3:6] = rate.reshape(n, 3, -1)
+        motion[half : 2 * half] -= share * (self.pull @ force)
+        self.states, self.before = jac[:, 3:] @ known, now
+
+    @property
+    def rows(self) -> FloatArray:
+        """The states that there are and the gaps at the last sample, (n_states, k)."""
+        return np.vstack([self.states[self.real], self.before.reshape(-1, self.before.shape[2])])
+
+
+def _decayed(x: FloatArray) -> FloatArray:
+    """Return ``(1 - exp(-X)) / X``, the mean of a force that decays by its own effect, from a rational function of X / 2ᵏ."""
+    halvings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(x, 1)), 1e-9)))) + 2)
+    part, one = x / 2**halvings, np.eye(len(x))
+    square = part @ part
+    out = np.linalg.solve(one + 0.5 * part + 0.1 * square + part @ square / 120.0, one + square / 60.0)
+    for _ in range(halvings):
+        out -= 0.5 * out @ part @ out
+        part = 2.0 * part
+    return np.asarray(out)
+
+
+def sampled_monodromy(
+    modes: ModalStates, contacts: ContactStates, times: list[FloatArray], tangents: SampledTangents, weights: FloatArray
+) -> FloatArray:
+    """Return the derivative of all states after a period by those before.
+
+    Parameters
+    ----------
+    modes
+        Of the structure.
+    contacts
+        Those with located transitions.
+    times
+        From `sample_times`.
+    tangents
+        The other contacts, at these times.
+    weights
+        (n,) factors of their forces.
+    """
+    count = len(times)
+    lengths = np.diff(contacts.times) / [t.size for t in times]
+    steps = np.repeat(lengths, [t.size for t in times])
+    shares = 0.5 * (steps + np.roll(steps, 1))
+    held = contacts.sticks[0]
+    more = int(tangents.kept.sum()) + 3 * len(tangents.kept)
+    now: Disturbance = identity(modes.n, held, more)
+    kicks = _Kicks(modes, tangents, weights, now.motion.shape[1])
+    springs = np.zeros_like(contacts.stiffness[0])
+    springs[tangents.contacts] = kicks.springs.reshape(-1, 3, 1) * np.eye(3)
+    places = Sliders(modes.gaps, contacts)
+    pull = modes.pull(places.own) * contacts.springs
+    sample = 0
+    for here in range(count):
+        stuck = contacts.sticks[here]
+        matrix = modes.matrix(contacts.stiffness[here] + springs)
+        exponential, driven = transition(matrix, pull[:, stuck], lengths[here])
+        step = np.block([[exponential, driven], [np.zeros(driven.T.shape), np.eye(driven.shape[1])]])
+        following = sample + times[here].size
+        moved = kicks.advance(sample, shares[sample:following], step, np.vstack([now.motion, now.sliders[stuck]]))
+        now.motion, sample = moved[: 2 * modes.n], following
+        places.take_hold((here + 1) % count, now)
+    return np.vstack([now.motion, now.sliders[held], kicks.rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Propagation of states (N, k) over a number of equally spaced samples.
+
+    Attributes
+    ----------
+    gaps
+        (samples, m, N) those of the sampled contacts while no force acts.
+    gap_response
+        (samples, m, m) response of the gaps one, two and more samples after a unit force.
+    step
+        (N, N) of all samples.
+    force_effect
+        (N, samples m) effect of forces at the samples on the states after the last.
+    """
+
+    gaps: FloatArray
+    gap_response: FloatArray
+    step: FloatArray
+    force_effect: FloatArray
+
+
+def _blocks(step: FloatArray, gaps: FloatArray, push: FloatArray, count: int) -> list[Block]:
+    """Return blocks of `count` samples in all, the same one as often as it can be.
+
+    Parameters
+    ----------
+    step
+        (N, N) from just after a kick to the next sample.
+    gaps
+        (m, N) gaps of the sampled contacts.
+    push
+        (N, m) change of the states by forces on these.
+    count
+        Samples.
+    """
+    most = min(count, int(np.clip(len(step) // max(len(gaps), 1), 1, MAX_SAMPLES)))
+    rows, force_effect = [gaps], [step @ push]
+    for _ in range(most - 1):
+        rows.append(rows[-1] @ step)
+        force_effect.append(step @ force_effect[-1])
+    gap_response = np.array([gaps @ p for p in force_effect])
+
+    def of(samples: int) -> Block:
+        powered = np.linalg.matrix_power(step, samples)
+        return Block(
+            np.array(rows[:samples]), gap_response[:samples], powered, np.hstack(force_effect[samples - 1 :: -1])
+        )
+
+    whole, rest = divmod(count, most)
+    return [of(most)] * whole + [of(rest)] * (rest > 0)
+
+
+@inner
+def _add(factor, row, out):  # type: ignore[no-untyped-def]
+    """Add a multiple of a row to another."""
+    if factor != 0.0:
+        for c in range(row.size):
+            out[c] += factor * row[c]
+
+
+@inner
+def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
+    """Add what forces at the samples before the i-th have done to its gaps."""
+    for j in range(i):
+        for a in range(gaps.shape[0]):
+            for b in range(gaps.shape[0]):
+                _add(gap_response[i - j - 1, a, b], forces[j, b], gaps[a])
+
+
+@inner
+def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[no-untyped-def]
+    """Find the forces (3, k) of one contact and its new states (s, k) from gaps, states and the gaps before, `known`."""
+    for d in range(3):
+        forces[d] = 0.0
+        _add(share * springs[d], known[d], forces[d])
+        for b in range(known.shape[0]):
+            _add(-share * weight * jac[d, b], known[b], forces[d])
+    for d in range(states.shape[0]):
+        states[d] = 0.0
+        for b in range(known.shape[0]):
+            _add(jac[3 + d, b], known[b], states[d])
+
+
+def _run(contacts, shares, gap_response, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
+    """Kick by the contacts at each sample of a block.
+
+    `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and the gaps before, factors (n,) of the forces, and
+    springs (3 n,) that are part of the propagation; `shares` (samples,) those of the period. In place: `gaps` (samples, 3 n, k) without forces of the block
+    become those with them, `states` (n, s, k), `before` (n, 3, k); `forces` (samples, 3 n, k) is filled; `known` (6 + s, k) is room.
+    """
+    jac, weights, springs = contacts
+    kept = states.shape[1]
+    for i in range(gaps.shape[0]):
+        _add_effects(gap_response, forces, i, gaps[i])
+        for p in range(states.shape[0]):
+            own = slice(3 * p, 3 * p + 3)
+            known[:3] = gaps[i, own]
+            known[3 : 3 + kept] = states[p]
+            known[3 + kept :] = before[p]
+            before[p] = gaps[i, own]
+            _kick(jac[i, p], weights[p], springs[own], shares[i], known, states[p], forces[i, own])
+
+
+@cache
+def compiled_kicks() -> Any:
+    """Return `_run`, compiled."""
+    kinds: Any = types
+    vector, matrix, block = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+    contacts = kinds.Tuple((types.float64[:, :, :, ::1], vector, vector))
+    return njit(types.void(contacts, vector, block, block, block, block, matrix, block), cache=True)(_run)

@@ -10,11 +10,11 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
-from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.harmonic_set import to_real
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_states
-from stickslip.response.stability.found import Stability
+from stickslip.response.stability.found import Floquet, Stability
 from stickslip.response.stability.hill_method.contact_tangent import contact_tangents
 from stickslip.response.stability.hill_method.hill_modes import HillSide
 from stickslip.response.stability.hill_method.hill_segment import Hill, Keep, not_kept
@@ -22,7 +22,6 @@ from stickslip.response.stability.hill_method.hill_spectrum import Exponents, ex
 from stickslip.response.stability.missing_harmonics import corrected, more_harmonics
 from stickslip.response.stability.waves import WaveDisturbance
 from stickslip.response.system import System
-from stickslip.response.time.floquet import Floquet
 
 # harmonics of disturbances: so many times those of the motion, and more, within the limits, and few enough for the rows
 HARMONICS_FACTOR, HARMONICS_MORE = 2, 3
