@@ -24,16 +24,16 @@ class Course:
     Parameters
     ----------
     order
-        Their positions in the response.
+        (n,) positions of the points in the response.
     sign
-        (n,) sign of the determinant of the balance's Jacobian: the parity of the number of real multipliers above 1, up to one sign for
-        the whole branch; NaN where it is not known.
+        (n,) sign of the determinant of the Jacobian of the balance, NaN where unknown. It is the parity of the number of real multipliers
+        above 1, up to one sign for the whole branch.
     cycle
-        The transitions of each, see `cycle_of`.
+        (n,) transitions of each point; see `cycle_of`.
     fold
-        (n - 1,) whether the branch turns back between neighbours, or beside one of them.
+        (n - 1,) whether the branch folds between two neighbours, or beside one of them.
     cut
-        (n - 1,) whether the branch is not known to run on between them: a point was not found, or the response jumps.
+        (n - 1,) whether the branch is interrupted between two neighbours: a point is missing, or the response jumps.
     """
 
     order: tuple[int, ...]
@@ -43,7 +43,7 @@ class Course:
     cut: BoolArray
 
     def like(self, a: int, b: int) -> bool:
-        """Whether the same is known of all points from a to b, so that what holds at both ends holds between: no fold, one sign, one list of transitions."""
+        """Whether all points from a to b have the same sign and transitions without a fold; then a verdict at both ends holds between them."""
         a, b = min(a, b), max(a, b)
         signs, cycles = self.sign[a : b + 1], set(self.cycle[a : b + 1])
         one = bool(np.all(signs == signs[0])) and len(cycles) == 1 and None not in cycles
@@ -60,7 +60,7 @@ class Course:
         return np.asarray(self.sign[1:] * self.sign[:-1] < 0.0)
 
     def runs(self) -> Iterator[range]:
-        """Yield the places between which the branch runs on."""
+        """Yield the ranges without interruption of the branch."""
         ends = [0, *(np.flatnonzero(self.cut) + 1).tolist(), len(self.order)]
         yield from (range(a, b) for a, b in pairwise(ends) if a < b)
 
@@ -71,13 +71,13 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
     Parameters
     ----------
     problem
-        What was solved.
+        The problem that was solved.
     points
-        The accepted points; those from `along` on resolve the peak, and find their place on the branch by their distance from it.
+        The accepted points. Those from `along` on resolve the peak; their place on the branch is the nearest one.
     along
         Number of points in the order of the branch.
     jumps
-        Positions of points behind which the response jumps.
+        Positions of the points after which the response jumps.
     """
     branch = [i for i in range(along) if points[i].converged]
     others = [i for i in range(along, len(points)) if points[i].converged]
@@ -105,8 +105,8 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
 def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
     """Return the sign of the determinant of the balance's Jacobian at a solution; NaN where it is not known.
 
-    Along a branch it follows from the tangent and the sign of the bordered determinant, which the follower has found (Cramer's rule). Else a
-    small Jacobian is factorised.
+    On a branch it follows from the tangent and the sign of the bordered determinant, which the continuation knows (Cramer's rule).
+    Elsewhere a small Jacobian is factorised.
     """
     if point.tangent.size and point.orientation:
         return float(np.sign(point.tangent[-1]) * point.orientation) or np.nan
@@ -119,7 +119,7 @@ def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _inserted(points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]) -> dict[int, list[int]]:
-    """Return the points that lie within each step of a branch: where they make its way the least longer."""
+    """Return the additional points within each step of a branch, each where it lengthens the branch least."""
     if not others:
         return {}
     rows = _scaled([points[i] for i in (*branch, *others)])
@@ -134,7 +134,7 @@ def _inserted(points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequ
 
 
 def _scaled(points: Sequence[ForcedPoint]) -> FloatArray:
-    """Return frequency and motion of points as rows of numbers without units."""
+    """Return frequency and motion of points as rows of dimensionless numbers."""
     order = max(len(p.coefficients) for p in points)
     motions = np.zeros((len(points), order, points[0].coefficients.shape[1]), dtype=complex)
     for row, p in zip(motions, points, strict=True):
@@ -147,10 +147,10 @@ def _scaled(points: Sequence[ForcedPoint]) -> FloatArray:
 
 
 def cycle_of(problem: ForcedProblem, point: ForcedPoint) -> bytes | None:
-    """Return a text that is the same for motions with the same transitions in the cycle of each contact; None where it is not known.
+    """Return a text that identifies the transitions in the cycle of each contact; None where they are unknown.
 
-    Two contacts that change their states at the same time may do so in either order: nothing jumps there. States of laws whose transitions
-    are not located are those at the samples.
+    The order of simultaneous transitions of two contacts does not matter, since no multiplier jumps there. For laws without located
+    transitions the states at the samples count.
     """
     balance = problem.balance(point.support)
     if not isinstance(balance, HarmonicBalance):
@@ -183,7 +183,7 @@ def _located(states: ContactStates, contact: int) -> bytes:
 
 
 def _cycle(rows: FloatArray) -> bytes:
-    """Return rows (n, k) that follow each other in a cycle, the repeated ones once, wherever the cycle begins: their number and themselves."""
+    """Return the number of different successive rows (n, k) of a cycle, and these rows from a start that does not depend on the beginning."""
     changed = np.any(rows != np.roll(rows, 1, axis=0), axis=1)
     chosen = rows[changed] if np.any(changed) else rows[:1]
     # a contact changes at few of the times at which any of them does

@@ -74,23 +74,22 @@ class Stability:
     Parameters
     ----------
     floquet
-        Multipliers of the structure's states and of the moving sliders, without those of `resting` sliders, which are 1.
+        Multipliers of the states of structure and moving sliders; those of `resting` sliders, which are 1, are left out.
     errors
-        (n_states,) how far each multiplier may be from that of the motion with all harmonics: what more harmonics change in it, and
-        its change when the step was halved, where laws are known by sampled tangents. Not finite where nothing is known.
-        The part of the step is too small where friction stops a light mass within a step, by up to twenty times in cases measured,
-        and where planar contacts close into stick, by up to ten.
+        (n_states,) error of each multiplier against the motion with all harmonics: its change with more harmonics and, for laws with
+        sampled tangents, with half the step. Not finite where unknown. The error of the step is underestimated where friction stops a
+        light mass within a step (measured: up to twenty times) and where planar contacts close into stick (up to ten times).
     resting
         Number of tangential springs, planar contacts included, whose sliders rest for the whole period. Each slider is a parameter of the
         motion, not a state.
     grazing
-        Number of these that have reached their limit before and rest since: the multipliers are those of the side on which they rest.
+        Number of these that touched their limit once and rest since; the multipliers are one-sided, of the resting side.
     transitions
-        Number of changes of state that were located over the period.
+        Number of transitions located in the period.
     moduli
-        (n_states,) the same errors of the moduli, which damping fixes far better than the places on the circle; None: those of the multipliers.
+        (n_states,) errors of the moduli, which are smaller than those of the angles since damping fixes the moduli; None: `errors`.
     work
-        Floating point operations that the examination took, by the rows of its matrices.
+        Estimated floating point operations of the examination, from the sizes of its matrices.
     """
 
     floquet: Floquet
@@ -108,11 +107,11 @@ class Stability:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether disturbances die, one grows, or none does either; undecided where the error of a modulus reaches the unit circle.
+        """Stable, unstable or neutral; undecided where the error of a modulus reaches the unit circle.
 
-        A multiplier above 1 whose error is more than half of itself does not show that a disturbance grows: so much is no estimate.
-        Multipliers of 1 are not judged while their errors are of rounding: they belong to families of motions. Any other that stays on
-        the unit circle within `NEUTRAL`, its error included, is neutral: a vibration that nothing damps, or the drift of a slider.
+        A multiplier above 1 with an error above half its value proves no growth. Multipliers of 1 within rounding belong to families of
+        motions and are not judged. Any other multiplier within `NEUTRAL` of the unit circle, error included, is neutral: an undamped
+        vibration, or the drift of a slider.
         """
         size, errors = self._judged
         if np.any(self._outside):
@@ -125,7 +124,7 @@ class Stability:
 
     @property
     def settled(self) -> bool:
-        """Whether more harmonics would tell nothing else."""
+        """Whether more harmonics cannot change the verdict."""
         verdict = self.verdict
         return verdict in ("stable", "unstable") or (
             verdict == "neutral" and bool(np.all(self._judged[1][self._reaching] <= 0.1 * NEUTRAL))
@@ -171,7 +170,7 @@ class Stability:
 
     @property
     def _judged(self) -> tuple[FloatArray, FloatArray]:
-        """Moduli of the multipliers that are judged, and their errors."""
+        """Return the moduli of the judged multipliers, and their errors."""
         off = np.abs(self.floquet.multipliers - 1.0) > UNIT_TOLERANCE
         judged = off | ~(self.errors <= UNIT_TOLERANCE)
         errors = self.errors if self.moduli is None else self.moduli
@@ -179,19 +178,19 @@ class Stability:
 
     @property
     def _outside(self) -> BoolArray:
-        """Which of these show that a disturbance grows."""
+        """Return which of these prove growth."""
         size, errors = self._judged
         return (size - errors > 1.0 + UNIT_TOLERANCE) & (errors <= ROUGH * size)
 
     @property
     def _reaching(self) -> BoolArray:
-        """Which of these may lie on the unit circle or outside."""
+        """Return which of these may lie on or outside the unit circle."""
         size, errors = self._judged
         return ~(size + errors < 1.0 - UNIT_TOLERANCE)
 
     @property
     def _decisive(self) -> tuple[float, float]:
-        """Modulus and error of the largest multiplier among those that make the verdict what it is."""
+        """Return modulus and error of the largest multiplier among those that decide the verdict."""
         size, errors = self._judged
         of_verdict = next((own for own in (self._outside, self._reaching) if np.any(own)), size >= 0.0)
         if not np.any(of_verdict):
@@ -207,7 +206,7 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Whether it is known that every small disturbance dies."""
+        """Whether every small disturbance is known to decay."""
         return self.verdict == "stable"
 
 
@@ -225,10 +224,10 @@ def partners(coarse: ComplexArray, fine: ComplexArray) -> ComplexArray:
 
 
 def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far multipliers are from those of a worse motion, and how far their moduli may be off for that.
+    """Return the changes of multipliers against a less accurate motion, and the errors of their moduli that follow from these.
 
-    The modulus of a pair is that of its damping, whatever the frequency, until the pair meets on the real axis. What moves along the circle
-    counts with a share `TURNED`, twice the change of the modulus counts, and all of the change where the pair may meet.
+    Damping alone gives the modulus of a complex pair until the pair meets on the real axis. So the error is twice the change of the
+    modulus plus the share `TURNED` of the change of the angle; where the pair may meet it is the whole change.
 
     Parameters
     ----------
@@ -244,7 +243,7 @@ def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, Float
 
 
 def modulus_text(size: float, error: float = 0.0) -> str:
-    """Return a modulus with four digits and its error; beside 1 by how much it is off, since that decides."""
+    """Return a modulus with four digits and its error; close to 1 its difference from 1, which decides."""
     off = size - 1.0
     text = f"{size:.4g}"
     if 0.0 < abs(off) < ROUNDS_TO_ONE:

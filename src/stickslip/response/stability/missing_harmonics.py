@@ -32,11 +32,11 @@ class Corrected:
 
 
 def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, float] | None:
-    """Return a point after a Newton step with more harmonics, and how many times the change by it an error is.
+    """Return a point after a Newton step with more harmonics, and the ratio of an error to the change by this step.
 
-    It is the step that the Jacobian Alert predicts errors from; where it leaves a larger residual, Newton's method goes on to a solution,
-    with up to `MOST` harmonics, whose change counts `FARTHER` times. The point itself comes back where no force acts on the missing
-    ones, and None where nothing is found.
+    The Jacobian Alert predicts errors from this step. If it increases the residual, Newton's method continues to a solution with up to
+    `MOST` harmonics, whose change counts `FARTHER` times. The result is the point itself if no force acts on the missing harmonics,
+    and None if no solution is found.
     """
     step = corrected_by_step(problem, point)
     if step is not None:
@@ -48,7 +48,7 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
 
 
 def corrected_by_step(problem: ForcedProblem, point: ForcedPoint) -> Corrected | None:
-    """Return a point after a Newton step with more harmonics; itself where no force acts on these; None where the step leaves a larger residual."""
+    """Return a point after a Newton step with more harmonics: itself if no force acts on these, None if the step increases the residual."""
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
     fed = {*judging_set_of(low), *harmonics_of(max(MIN_HARMONICS, HARMONICS_FACTOR * low.order + HARMONICS_MORE))}
@@ -79,7 +79,7 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
 
 
 def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
-    """Yield the motion solved with more and more harmonics; where that fails, with fewer at a time."""
+    """Yield the motion solved with more and more harmonics, in smaller steps where a solution fails."""
     reached, order = point, max(HARMONICS_FACTOR * point.order + HARMONICS_MORE, MIN_HARMONICS)
     failed = 0
     for _ in range(SOLUTIONS):
@@ -101,7 +101,7 @@ def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corre
 
 
 def newton_work(rows: int) -> float:
-    """Return about the floating point operations of a Newton step, contacts and all: in proportion to its rows, from 99 to 3000 in cases measured."""
+    """Return an estimate of the floating point operations of a Newton step with its contacts, proportional to the rows (measured from 99 to 3000)."""
     return STEP_WORK * rows
 
 
@@ -129,6 +129,6 @@ def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPo
 
 
 def _more(problem: ForcedProblem, harmonics: Harmonics) -> HarmonicBalance:
-    """Return the problem with these harmonics, or as many of them as a wheel has waves for, and the samples that they need."""
+    """Return the problem with these harmonics, on a wheel those that its waves allow, and the samples that they need."""
     most = problem.high.linear.most
     return with_stiffness(problem.balance(tuple(h for h in harmonics if most is None or h <= most)))

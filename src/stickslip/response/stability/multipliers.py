@@ -33,7 +33,7 @@ DECOMPOSED = 25  # products of matrices that the eigenvalues of one take
 def motion_stability(
     structure: LinearSide, interface: Interface, gap_coefficients: FloatArray, omega: float
 ) -> Stability:
-    """Return the stability of a periodic motion of a structure with contacts, as it is given.
+    """Return the stability of a given periodic motion of a structure with contacts.
 
     Disturbances obey the linear equations of the structure and of the states that each contact is in; the motion enters through the
     times of the transitions and the rates there.
@@ -59,7 +59,7 @@ def motion_stability(
 
 
 def stability_in_time(own: InTime, omega: float) -> Stability:
-    """Return the stability of a motion of what is marched in time; see `motion_stability`."""
+    """Return the stability of a motion of a structure prepared for time stepping; see `motion_stability`."""
     modes = _prepared(own.structure, own.contacts, omega)
     contacts = located_states(own.contacts, own.gaps)
     if contacts is None:
@@ -73,10 +73,10 @@ def stability_in_time(own: InTime, omega: float) -> Stability:
 
 
 def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, int] | None:
-    """Return the derivative of all states after a period of a motion by those before, the modal ones first; None where nothing is known.
+    """Return the monodromy matrix of a motion, modal states first; None where unknown.
 
-    Of a travelling motion it is that after a share of the period, whose number is returned. Where laws are known by sampled tangents, it is
-    that of the finest samples.
+    For a travelling wave the matrix covers one share of the period, and the number of shares is returned. For laws with sampled tangents
+    it is that of the finest samples.
     """
     interface = own.contacts
     modes = _prepared(own.structure, interface, omega)
@@ -95,7 +95,7 @@ def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, i
 
 
 def _located_matrix(modes: ModalStates, contacts: ContactStates, own: InTime) -> tuple[FloatArray, int]:
-    """Return the matrix of a share of the period, where there are shares, and their number."""
+    """Return the matrix of a share of the period, and the number of shares (1 for a motion without any)."""
     share = share_of_monodromy(modes, contacts, own)
     return (monodromy(modes, contacts), 1) if share is None else (share, own.shares)
 
@@ -119,7 +119,7 @@ def _prepared(structure: Structure, interface: Interface, omega: float) -> Modal
 def _samples(
     contacts: ContactStates, own: IntArray, gap_coefficients: FloatArray, halves: int
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Return the samples of a period, `halves` halves of the least number, and the gaps of the contacts `own`."""
+    """Return the samples of a period (`halves` / 2 times the least number), and the gaps of the contacts `own`."""
     samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
     polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     return sample_times(contacts, samples, halves), polynomials
@@ -146,9 +146,9 @@ def _judged(
 def _sampled(
     modes: ModalStates, contacts: ContactStates, interface: Interface, own: IntArray, gap_coefficients: FloatArray
 ) -> Stability:
-    """Return the stability where the tangents of the contacts `own` are sampled: of two steps, extrapolated.
+    """Return the stability with sampled tangents of the contacts `own`, extrapolated from two steps.
 
-    A third step between these guards the errors against two that agree by chance, as errors of first order do now and then.
+    A third step between these protects the error against two steps that agree by chance, which happens with errors of first order.
     """
     laws = [interface.laws[c] for c in own]
     made = [_samples(contacts, own, gap_coefficients, halves) for halves in (2, 3, 4)]
@@ -177,7 +177,7 @@ def _sampled(
 def _tangents(
     laws: list[ContactLaw], own: IntArray, times: list[FloatArray], polynomials: FloatArray, omega: float
 ) -> SampledTangents:
-    """Return the tangents of laws at samples, without what of them is located."""
+    """Return the tangents of laws at samples, without their parts with located transitions."""
     found = sampled_tangents(laws, own, Path(np.concatenate(times), polynomials, omega))
     apart = [located_part(law) is not None for law in laws]
     found.jac[:, apart, 2] = 0.0
@@ -185,6 +185,6 @@ def _tangents(
 
 
 def _unknown(n: int) -> Stability:
-    """Return that nothing is known: rounding made more transitions than such gaps can have, or a law gave no tangents."""
+    """Return an unknown stability: rounding made more transitions than such gaps can have, or a law gave no tangents."""
     unknown = np.full(2 * n, np.nan, dtype=complex)
     return Stability(Floquet(unknown), np.full(2 * n, np.inf), 0, 0, 0)

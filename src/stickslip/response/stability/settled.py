@@ -21,7 +21,7 @@ OTHER = 2.0  # times more for either where the numbers of transitions differ
 
 @dataclass(frozen=True, eq=False)
 class _Rung:
-    """A motion on the way to one with all harmonics, and its relative difference from the one before."""
+    """A motion with more harmonics than the one before, and its relative difference from that."""
 
     point: ForcedPoint
     stability: Stability
@@ -35,10 +35,10 @@ class Settled:
     Parameters
     ----------
     stability
-        Of the motion with more harmonics.
+        Stability of the motion with more harmonics.
     motion
-        That motion, where the point as it was solved lies on the other side of the unit circle, or is not the same motion; its predicted
-        error is its change from fewer harmonics. None else.
+        The motion with more harmonics if the point as solved has another stability or is another motion; its predicted error is its
+        change from fewer harmonics. Otherwise None.
     """
 
     stability: Stability
@@ -55,27 +55,26 @@ def stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | No
 def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Settled:
     """Return the stability of a solved point of a forced response.
 
-    The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them, times `ROUGHLY`, is
-    their error. Where that leaves the verdict open the motion is solved, with about twice the harmonics each time, and the change from one
-    solution to the next is the error: few harmonics give the times of transitions less well than amplitudes.
+    The multipliers are those of the motion after a Newton step with more harmonics; their error is their change by this step times
+    `ROUGHLY`. If the verdict stays open, the motion is solved with about twice the harmonics each time, and the change from one solution
+    to the next is the error. Few harmonics give transition times less accurately than amplitudes.
 
-    Beside a fold, or where contacts bounce, several motions lie within a few percent of each other, and more harmonics may lead to another
-    one. The verdict is then that of the motion that it comes with. One that is farther from the point than the threshold of the strategy
-    says nothing of it.
+    Beside a fold, or where contacts bounce, several motions lie within a few percent, and more harmonics may lead to another of them. The
+    verdict then belongs to the returned motion. A motion farther away than the threshold of the strategy gives no verdict on the point.
 
     Parameters
     ----------
     problem
         The forced response that the point belongs to.
     point
-        A converged one.
+        A converged point.
     more
-        The same motion solved with more harmonics, if that is known: it takes the place of the Newton step.
+        The same motion solved with more harmonics, if known; it replaces the Newton step.
 
     Raises
     ------
     InputError
-        If the point did not converge, a contact is rigid, or what vibrates is one sector of a tuned wheel without all its waves.
+        If the point did not converge, a contact is rigid, or the structure is a sector of a tuned wheel without all its waves.
     """
     if not point.converged:
         raise input_error(
@@ -103,10 +102,10 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
 
 
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
-    """Return a verdict with its motion, where the point as it was solved has another or lies away; that nothing is known where that motion is no neighbour.
+    """Return the stability, with its motion if the point as solved has another stability or lies away; unknown if that motion is no neighbour.
 
-    Beside a fold a stable and an unstable motion lie within a percent of each other. A point with few harmonics may be nearer to the one, and
-    the motion with more harmonics be the other: the verdict then goes with its own motion.
+    Beside a fold a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to one of them while
+    more harmonics lead to the other; the verdict then belongs to the motion with more harmonics.
     """
     if last is first or found.verdict not in ("stable", "unstable"):
         return Settled(found)
@@ -123,7 +122,7 @@ def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung)
 
 
 def _unsure(rung: _Rung) -> Stability:
-    """Return the stability of a motion of which nothing says what more harmonics change."""
+    """Return the stability of a motion whose change with more harmonics is unknown."""
     own = rung.stability
     return replace(own, errors=np.full_like(own.errors, np.inf), moduli=None)
 
@@ -131,7 +130,7 @@ def _unsure(rung: _Rung) -> Stability:
 def _settled(
     problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
 ) -> tuple[Stability, _Rung]:
-    """Return the stability with more and more harmonics, until more would tell nothing else, and the last motion: errors are so many `times` the change from it."""
+    """Return the stability with more and more harmonics until it is settled, and the last motion; errors are `times` the change from it."""
     rungs = more_harmonics(problem, last.point)
     while not best.settled and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)
@@ -145,13 +144,13 @@ def _settled(
 
 
 def of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
-    """Return the stability of the motion of a point as it was solved; of a wheel that of all its sectors, each moving on its own."""
+    """Return the stability of a point as solved; for a wheel with independent disturbances of all sectors."""
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
     return stability_in_time(all_in_time(problem.system, gaps), point.omega)
 
 
 def _compared(found: Stability, other: _Rung, times: float) -> Stability:
-    """Return the stability of a motion with so many `times` its change from a worse one as errors."""
+    """Return the stability of a motion; its errors are `times` its change from a less accurate one."""
     worse = other.stability
     if worse.unknown:
         return replace(found, errors=np.full_like(found.errors, np.inf), moduli=None)

@@ -1,4 +1,4 @@
-"""Disturbances of a motion of a whole wheel, each a travelling wave: which nodal diameter grows."""
+"""Disturbances of the motion of a whole wheel as travelling waves: which nodal diameter grows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ class WaveDisturbance:
     Parameters
     ----------
     multiplier
-        By which it grows in a period.
+        Floquet multiplier: growth in a period.
     wave
-        Its wave number: the largest part of its shape. A disturbance of a travelling motion holds the waves that this one makes with
-        the harmonics of the motion, too.
+        Wave number of the largest part of its shape. A disturbance of a travelling motion also contains the waves that this one makes
+        with the harmonics of the motion.
     share
-        Part of that wave in the shape, by squares.
+        Share of that wave in the squared norm of the shape.
     omega
-        Frequency at which it vibrates, rad/s.
+        Frequency of the disturbance, rad/s.
     """
 
     multiplier: complex
@@ -44,19 +44,19 @@ class WaveDisturbance:
 
 @by_one_thread
 def point_disturbances(problem: ForcedProblem, point: ForcedPoint) -> list[WaveDisturbance]:
-    """Return the disturbances of a forced motion of a wheel as it was solved; see `wave_disturbances`."""
+    """Return the disturbances of a forced motion of a wheel as solved; see `wave_disturbances`."""
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
     return wave_disturbances(problem.system, gaps, point.omega)
 
 
 @by_one_thread
 def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[WaveDisturbance]:
-    """Return the disturbances of a motion of all sectors, the fastest growing first; none if nothing is known.
+    """Return the disturbances of a motion of all sectors, the fastest growing first; none where unknown.
 
     Parameters
     ----------
     system
-        With a tuned wheel that has every wave.
+        System with a tuned wheel and all its waves.
     gaps
         (H+1, 3 n_contacts) complex coefficients of the gaps of one sector, m.
     omega
@@ -79,19 +79,19 @@ def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[
 
 
 def growing_wave(disturbances: Sequence[WaveDisturbance], modulus: float) -> WaveDisturbance | None:
-    """Return the disturbance whose multiplier has a modulus; None among none."""
+    """Return the disturbance whose multiplier has this modulus; None without disturbances."""
     if not disturbances or not np.isfinite(modulus):
         return None
     return min(disturbances, key=lambda d: abs(abs(d.multiplier) - modulus))
 
 
 def _by_wave(rows: ComplexArray, sectors: int) -> ComplexArray:
-    """Return (n_s, p, k) the waves of rows (n_s p, k), sector by sector."""
+    """Return the waves (n_s, p, k) of rows (n_s p, k) given sector by sector."""
     return np.asarray(np.fft.fft(rows.reshape(sectors, -1, rows.shape[1]), axis=0) / sectors)
 
 
 def _described(multiplier: complex, moved: ComplexArray, rate: ComplexArray, sectors: int) -> WaveDisturbance:
-    """Return what a shape is: a real motion is the sum of it and its conjugate, of which that with a positive frequency is named."""
+    """Return the disturbance of a complex shape; of the shape and its conjugate the one with positive frequency is named."""
     size = np.sum(np.abs(moved) ** 2, axis=1)
     at, total = int(np.argmax(size)), float(np.sum(size))
     if total == 0.0:

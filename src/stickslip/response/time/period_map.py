@@ -94,7 +94,7 @@ class PeriodMap:
     Parameters
     ----------
     marcher
-        What marches.
+        The structure prepared for time stepping.
     linear
         Matrices of its tangents.
     scale

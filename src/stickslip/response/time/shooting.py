@@ -340,15 +340,15 @@ def _result(
 
 @dataclass(frozen=True, eq=False)
 class StepErrors:
-    """Estimates of what the step makes wrong.
+    """Estimates of the time-step error.
 
     Parameters
     ----------
     motion
-        Of the harmonics of the outputs, relative to the largest; infinite where more steps overflow.
+        Error of the harmonics of the outputs, relative to the largest; infinite where more steps overflow.
     growth
-        Of the largest modulus of the multipliers, where that is close to 1 or a contact opens or closes; infinite where a slider
-        turns within a step, which no derivative sees; 0 elsewhere.
+        Error of the largest modulus of the multipliers where it is close to 1 or a contact opens or closes; infinite where a slider
+        reverses within a step, which derivatives miss; 0 elsewhere.
     """
 
     motion: float
@@ -363,18 +363,18 @@ def _step_errors(
     outputs: IntArray,
     order: int,
 ) -> StepErrors:
-    """Compare a periodic motion with twice as many steps; where a contact opens or closes with four times as many, too.
+    """Compare a periodic motion with twice as many steps, and with four times as many where a contact opens or closes.
 
     Parameters
     ----------
     mapping, state
         The period map and its fixed point.
     finer
-        Gives the same structure with so many times as many steps.
+        Function that returns the same structure with a multiple of the steps.
     found
-        Derivative of the map there.
+        Derivative of the map at the fixed point.
     outputs, order
-        What is compared, and up to which harmonic.
+        Compared outputs, and the highest harmonic.
     """
     image, growth = mapping.period(state), mapping.floquet(found).growth
     known = harmonics(mapping, state, image, outputs, order)[1:]
@@ -412,15 +412,15 @@ def _change(one: ComplexArray, other: ComplexArray, size: float) -> float:
 def _corrected(
     mapping: PeriodMap, marcher: Marcher, state: FloatArray, found: Derivative
 ) -> tuple[PeriodMap, FloatArray]:
-    """Return the map with finer steps, and a state corrected towards its fixed point with the derivative at hand."""
+    """Return the map with finer steps, and a state corrected towards its fixed point with the known derivative."""
     fine = replace(mapping, marcher=marcher, linear=tangent_operators(marcher))
     return fine, state + found.inverse() @ (fine.image(state).state - state)
 
 
 def _scattered(first: float, second: float, least: float) -> float:
-    """Return the error of the first of three values by their two changes, of which chance has its part; infinite if they are lost.
+    """Return the error of the first of three values from their two changes, which are partly random; infinite without a value.
 
-    Changes that go on falling as these two did add up to a geometric series; `least` bounds its sum over the first change.
+    If later changes keep falling at the same ratio, they form a geometric series; `least` is the lower bound of its sum over the first change.
     """
     if not np.isfinite(first + second):
         return np.inf
@@ -429,13 +429,13 @@ def _scattered(first: float, second: float, least: float) -> float:
 
 
 def _opens(image: Image) -> bool:
-    """Return whether a contact is open for a part of the period: it presses with nothing there."""
+    """Return whether a contact is open for a part of the period, where its normal force is zero."""
     is_open = image.record.force[:, :, 2] == 0.0
     return bool(np.any(np.any(is_open, axis=0) & ~np.all(is_open, axis=0)))
 
 
 def _jumps(image: Image) -> bool:
-    """Return whether a friction force changes sides from one step to the next: from its largest value to the opposite one."""
+    """Return whether a friction force jumps within a step from its largest value to the opposite one."""
     force = image.record.force[:, :, :2]
     largest = np.max(np.abs(force), axis=0, initial=0.0)
     return bool(np.any(np.abs(np.diff(force, axis=0)) > JUMP * largest[None]))

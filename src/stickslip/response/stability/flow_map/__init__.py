@@ -1,1 +1,1 @@
-"""The monodromy matrix: disturbances carried over a period."""
+"""The monodromy matrix: propagation of disturbances over a period."""

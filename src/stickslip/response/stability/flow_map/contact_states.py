@@ -1,8 +1,8 @@
 """Piecewise-linear contacts in a disturbed motion: stiffness between transitions, and jumps at them.
 
-A tangential spring that sticks is a spring ``k`` from the structure to its slider, one that slips a force ``±μ`` times the pressure, an
-open one nothing. Forces are continuous at every transition, so that the motion of the structure has no jumps in its derivative; only
-what the slider knows changes: slip and lift-off erase it, and the beginning of stick sets it anew.
+A sticking tangential spring connects the structure to its slider with stiffness ``k``; a slipping one is a force ``±μ`` times the normal
+force; an open one is nothing. Forces are continuous at every transition, so disturbances of the structure do not jump. Only the slider
+position does: slip and lift-off erase it, and the beginning of stick sets it anew.
 """
 
 from dataclasses import dataclass
@@ -26,29 +26,29 @@ class ContactStates:
     Attributes
     ----------
     times
-        (n_intervals + 1,) their ends, from the first transition to the same one a period later; τ = ωt.
+        (n_intervals + 1,) ends of the intervals, from the first transition to the same one a period later; τ = ωt.
     stiffness
         (n_intervals, n_contacts, 3, 3) derivative of the forces by the gaps where sliders rest, N/m.
     rows
-        (n_sliders,) row t or w of the gap operator that each slider belongs to; those that neither stick nor slip for ever.
+        (n_sliders,) row t or w of the gap operator of each slider that sticks for part of the period.
     normals
         (n_sliders,) row n of the same contact.
     springs
-        (n_sliders,) their stiffness, N/m.
+        (n_sliders,) spring stiffness, N/m.
     sticks
-        (n_intervals, n_sliders) whether a slider rests.
+        (n_intervals, n_sliders) whether a slider sticks.
     takes_hold
-        (n_intervals, n_sliders) whether it begins to at the beginning of the interval.
+        (n_intervals, n_sliders) whether stick begins with the interval.
     by_normal
-        (n_intervals, n_sliders) derivative of the slider's place by the normal gap where it does; that by its own gap is one.
+        (n_intervals, n_sliders) derivative of the slider position by the normal gap where stick begins; that by its own gap is one.
     resting
-        Number of sliders that rest for the whole period: parameters of the motion.
+        Number of sliders that stick for the whole period; they are parameters of the motion, not states.
     grazing
-        Number of these that have reached their limit, and rest since.
+        Number of these that touched their limit once and stick since.
     always_slipping
-        Number of sliders that never rest.
+        Number of sliders that never stick.
     transitions
-        Number of changes of state over the period.
+        Number of transitions in the period.
     """
 
     times: FloatArray
@@ -76,7 +76,7 @@ class _Spring:
 
     @property
     def changes(self) -> BoolArray:
-        """Return which segments begin with a change of state; the first may go on from the last of the period before."""
+        """Return which segments begin with a transition; the first may continue the last one of the period before."""
         states = self.segments[:, [STATE, SIGN]]
         return np.asarray(np.any(states != np.roll(states, 1, axis=0), axis=1))
 
@@ -95,14 +95,14 @@ def is_located(law: ContactLaw) -> bool:
 
 
 def located_states(interface: Interface, gap_coefficients: FloatArray) -> ContactStates | None:
-    """Return the states over a period of what can be located of contacts; None where rounding made more transitions than there can be.
+    """Return the contact states over a period for laws with located transitions; None where rounding made more transitions than possible.
 
     Parameters
     ----------
     interface
         The contacts.
     gap_coefficients
-        (2H+1, 3 n_contacts) real Fourier coefficients of their gaps, m.
+        (2H+1, 3 n_contacts) real Fourier coefficients of the gaps, m.
     """
     laws = [located_part(law) for law in interface.laws]
     own = np.array([c for c, law in enumerate(laws) if law is not None], dtype=np.int64)
@@ -116,16 +116,16 @@ def located_states(interface: Interface, gap_coefficients: FloatArray) -> Contac
 
 
 def contact_states(events: Events, compiled: CompiledContacts, own: IntArray, n_contacts: int) -> ContactStates:
-    """Lay the states of all contacts out over the intervals between their transitions.
+    """Return the states of all contacts in the intervals between their transitions.
 
     Parameters
     ----------
     events
         All events of the motion.
     compiled
-        The laws with which they were found, all of them piecewise linear.
+        The laws of these events, all piecewise linear.
     own, n_contacts
-        Which contacts of an interface they are, and how many that has; the others have no stiffness here.
+        Indices of these contacts in the interface, and the number of contacts there; the others have no stiffness here.
     """
     springs = _springs(events, compiled)
     openings = [events.crossings[e, : events.n_crossings[e]] for e in range(len(compiled.elements))]
@@ -175,7 +175,7 @@ def _springs(events: Events, compiled: CompiledContacts) -> list[_Spring]:
 
 
 def _has_slipped(spring: _Spring, row: FloatArray) -> bool:
-    """Whether a slider that rests for the whole period does not rest where it began."""
+    """Whether a slider that sticks for the whole period has moved from its initial position."""
     began = NO_ANCHOR if np.isnan(row[RESIDUAL]) else 0.0
     return bool(spring.segments[0, ANCHOR] != began)
 
@@ -199,7 +199,7 @@ def _segment_at(spring: _Spring, middle: FloatArray) -> IntArray:
 
 
 def _add_tangential(stiffness: FloatArray, spring: _Spring, row: FloatArray, middle: FloatArray) -> None:
-    """Add one tangential spring: its stiffness where it sticks, its share of the pressure where it slips."""
+    """Add one tangential spring: its stiffness where it sticks, its share of the normal force where it slips."""
     at = spring.segments[_segment_at(spring, middle)]
     c, d = spring.contact, spring.tangent
     stiffness[at[:, STATE] == STICK, c, d, d] += row[d]
@@ -211,7 +211,7 @@ def _add_tangential(stiffness: FloatArray, spring: _Spring, row: FloatArray, mid
 def _sliders(
     springs: list[_Spring], elements: FloatArray, times: FloatArray, middle: FloatArray
 ) -> tuple[BoolArray, BoolArray, FloatArray]:
-    """Return where sliders rest, where they take hold, and how their place then depends on the normal gap."""
+    """Return where sliders stick, where stick begins, and how their position then depends on the normal gap."""
     shape = (middle.size, len(springs))
     sticks, takes_hold = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     by_normal = np.zeros(shape)

@@ -1,14 +1,14 @@
 """Disturbances over the intervals of a period whose contact states differ in a few springs.
 
-One state of the contacts, that in which each contact is longest, is decomposed into eigenvectors, with which its exponential is a product
-per eigenvalue. Another state is that one and a matrix of rank r, one for each spring row that differs, ``A = A₀ + U V``. What this adds to the
-exponential is an integral along a hyperbola around the eigenvalues (Weideman & Trefethen 2007) of what it adds to the resolvent,
+The base state, in which each contact stays longest, is decomposed into eigenvectors; its exponential is then a product per eigenvalue.
+Another state differs by a matrix of rank r, one for each spring row that differs, ``A = A₀ + U V``. The difference of the exponentials is
+an integral of the difference of the resolvents along a hyperbola around the eigenvalues (Weideman & Trefethen 2007),
 
     exp(hA) - exp(hA₀) = 1/(2πi) ∫ exp(zh) R U (1 - V R U)⁻¹ V R dz,    R = (z - A₀)⁻¹,
 
-a product of two thin matrices by the trapezoidal rule. Overdamped modes lie far within the hyperbola and ask for no halvings of the interval,
-of which the exponential of a full matrix needs five or more. The integral is taken for a vector with other nodes as well; where the two do not
-agree, the interval is halved once more, and what still fails is left to the full matrix.
+a product of two thin matrices by the trapezoidal rule. Overdamped modes lie far inside the hyperbola and need no halving of the interval;
+the exponential of a full matrix needs five or more. The integral is repeated for one vector with other nodes. If the two differ, the
+interval is halved once more; if they still differ, the full matrix is used.
 """
 
 from typing import Protocol
@@ -33,7 +33,7 @@ ILL = 1e5  # condition of the eigenvectors beyond which they are not used
 
 
 class Flow(Protocol):
-    """How states go through intervals, in coordinates of its own."""
+    """Propagation of states through intervals, in coordinates of its own."""
 
     into: FloatArray  # (2n, 2n) these coordinates of the modal states
     out: FloatArray  # (2n, 2n) and back
@@ -45,7 +45,7 @@ class Flow(Protocol):
 
 
 class FullFlow:
-    """The exponential of a full matrix each, on the modal states."""
+    """Propagation by the exponential of a full matrix, on the modal states."""
 
     def __init__(self, modes: ModalStates, contacts: ContactStates) -> None:
         self.modes, self.contacts = modes, contacts
@@ -62,7 +62,7 @@ class FullFlow:
 
 
 class LowRankFlow:
-    """Eigenvectors of one state of the contacts, and what the others add; `full` takes what fails."""
+    """Propagation by the eigenvectors of the base state and low-rank differences; `full` is the fallback."""
 
     def __init__(self, full: FullFlow, base: FloatArray) -> None:
         self.full, self.contacts, self.base = full, full.contacts, base
@@ -82,7 +82,7 @@ class LowRankFlow:
         self.probe = np.cos(np.arange(2.0 * n) ** 2)
 
     def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
-        """Propagate by eigenvalues where the contacts are in the base's state, else by the exponential that thin matrices make."""
+        """Propagate by eigenvalues where the contacts are in the base state, else by low-rank differences."""
         if length == 0.0:  # two changes of state at one time
             return states
         stuck = self.contacts.sticks[interval]
@@ -108,7 +108,7 @@ class LowRankFlow:
         return float(np.linalg.norm(self.into, 1) * np.linalg.norm(self.out, 1))
 
     def _difference(self, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return U (2n, r) and V (r, 2n) of a state that differs from the base by such a stiffness."""
+        """Return U (2n, r) and V (r, 2n) of the state with this difference of stiffness from the base."""
         changed = np.flatnonzero(np.any(stiffness != 0.0, axis=2))
         contact, direction = np.divmod(changed, 3)
         own = self.gaps.reshape(-1, 3, self.gaps.shape[1])[contact]
@@ -116,14 +116,14 @@ class LowRankFlow:
         return -self.pull[:, changed], rows
 
     def _base_functions(self, length: float) -> tuple[ComplexArray, ComplexArray]:
-        """Return, by eigenvalue of the base, the exponential of an interval and its integral."""
+        """Return the exponential of an interval and its integral for each eigenvalue of the base."""
         value = self.rate + 1j * self.turn
         still = np.abs(value * length) < 1e-12
         mean = np.expm1(value * length) / np.where(still, 1.0, value)
         return np.exp(value * length), np.where(still, length, mean)
 
     def _times(self, function: ComplexArray, columns: FloatArray) -> FloatArray:
-        """Return a function of the base's matrix, known by its eigenvalues, times columns."""
+        """Return a function of the base matrix, given by its eigenvalues, times columns."""
         out = function.real[:, None] * columns
         out += function.imag[:, None] * columns[self.other]
         return np.asarray(out)
@@ -131,7 +131,7 @@ class LowRankFlow:
     def _transition(
         self, columns: FloatArray, rows: FloatArray, pulled: FloatArray, length: float
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Return the (2n, 2n) matrix of an interval and the (2n, m) one that adds what sliders do; None where its nodes do not suffice."""
+        """Return the (2n, 2n) matrix of an interval and the (2n, m) effect of sliders; None where the nodes do not suffice."""
         n2, r = columns.shape
         nodes, weights = HYPERBOLA
         own, cross = self._resolvent(nodes / length)
@@ -154,13 +154,13 @@ class LowRankFlow:
         return added[:, :n2], added[:, n2:] + self._times(mean, pulled)
 
     def _resolvent(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return (nodes, 2n) what the base's resolvent takes of a column itself and of the other one of its pair."""
+        """Return (nodes, 2n) the factors of the base resolvent on a column and on the other column of its pair."""
         off = z[:, None] - self.rate
         inverse = 1.0 / (off * off + self.turn * self.turn)
         return off * inverse, np.asarray(self.turn * inverse, dtype=complex)
 
     def _spread(self, place: int, own: ComplexArray, cross: ComplexArray, rows: FloatArray) -> FloatArray:
-        """Return (nodes, 2 r, 2n) the real parts of a resolvent's products with rows (r, 2n), and their imaginary parts."""
+        """Return (nodes, 2 r, 2n) real and imaginary parts of the products of the resolvent with rows (r, 2n)."""
         shape = (len(own), 2, *rows.shape)
         out, more = self._room(place, shape), self._room(3, shape)
         for each, of, into in ((own, rows, out), (cross, rows[:, self.other], more)):
@@ -170,7 +170,7 @@ class LowRankFlow:
         return out.reshape(len(own), -1, rows.shape[1])
 
     def _room(self, place: int, shape: tuple[int, ...]) -> FloatArray:
-        """Return an array of this shape in a place that is kept: to ask the system for room costs as much as to fill it."""
+        """Return an array of this shape from reused memory; a new allocation would cost as much as filling it."""
         size = int(np.prod(shape))
         if self.rooms[place].size < size:
             self.rooms[place] = np.empty(size)
@@ -185,7 +185,7 @@ class LowRankFlow:
     def _on_probe(
         self, own: ComplexArray, cross: ComplexArray, small: ComplexArray, columns: FloatArray, rows: FloatArray
     ) -> FloatArray:
-        """Return what the state adds to the exponential, times one vector."""
+        """Return the difference of the exponentials times one vector."""
         known = own @ (rows * self.probe).T - cross @ (rows[:, self.other] * self.probe).T
         forces = (small @ known[:, :, None])[:, :, 0]
         out = own * (forces @ columns.T)
@@ -194,7 +194,7 @@ class LowRankFlow:
 
 
 def _real(matrices: ComplexArray) -> FloatArray:
-    """Return (k, 2 r, 2 r) what complex matrices (k, r, r) do to real and imaginary parts."""
+    """Return complex matrices (k, r, r) as real ones (k, 2 r, 2 r) for real and imaginary parts."""
     real, imaginary = matrices.real, matrices.imag
     return np.concatenate(
         [np.concatenate([real, -imaginary], axis=2), np.concatenate([imaginary, real], axis=2)], axis=1
@@ -202,7 +202,7 @@ def _real(matrices: ComplexArray) -> FloatArray:
 
 
 def flow_of(modes: ModalStates, contacts: ContactStates) -> Flow:
-    """Return the flow that costs less."""
+    """Return the cheaper flow."""
     full = FullFlow(modes, contacts)
     if modes.n < FEW:
         return full
@@ -216,7 +216,7 @@ def flow_of(modes: ModalStates, contacts: ContactStates) -> Flow:
 
 
 def _longest(contacts: ContactStates) -> FloatArray:
-    """Return the stiffness of the contacts (n_contacts, 3, 3), each in the state in which it is longest."""
+    """Return the stiffness (n_contacts, 3, 3) of each contact in the state in which it stays longest."""
     base: FloatArray = contacts.stiffness[0].copy()
     lengths = np.diff(contacts.times)
     for c in np.flatnonzero(np.any(contacts.stiffness != base, axis=(0, 2, 3))):

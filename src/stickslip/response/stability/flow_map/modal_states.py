@@ -15,8 +15,8 @@ from stickslip.model.structure import Structure
 class ModalStates:
     """``u = basis p``, ``u̇ = ω basis (speed w)`` and the states (p, w), in the time τ = ωt.
 
-    The basis are the modes with every contact stuck, normalised to unit mass, so that any contact that slips or opens takes
-    stiffness away; `speed` makes both halves of a state alike in size.
+    The basis are the mass-normalised modes with all contacts stuck, so that slip and lift-off reduce the stiffness. `speed` scales both
+    halves of a state to similar size.
     """
 
     omega: float
@@ -43,7 +43,7 @@ class ModalStates:
         return a
 
     def pull(self, rows: FloatArray) -> FloatArray:
-        """Return the (n, k) rate of w that unit forces along the gap operator's rows, modal (k, n), cause."""
+        """Return the (n, k) rate of w by unit forces along rows (k, n) of the modal gap operator."""
         return rows.T / (self.omega**2 * self.speed[:, None])
 
 
@@ -57,7 +57,7 @@ def modal_states(structure: Structure, gap_operator: Matrix, springs: FloatArray
     gap_operator
         (3 n_contacts, n).
     springs
-        (3 n_contacts,) stiffness of contacts that stick, N/m.
+        (3 n_contacts,) stiffness of sticking contacts, N/m.
     omega
         rad/s.
 

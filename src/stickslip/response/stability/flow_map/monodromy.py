@@ -3,8 +3,8 @@
 A kick acts at each sample, and between samples everything is propagated exactly (the splitting of Strang 1968): the error is of second
 order in the step. The means of the tangents over the period are springs, and part of what is propagated.
 
-Over a block of samples the gaps follow from the states at its beginning and from the forces of the samples before, by small matrices; the
-large ones are multiplied once a block. Rounding apart the result is that of one sample after the other.
+Within a block the gaps follow by small matrices from the states at its beginning and from the forces at earlier samples; large matrices
+are multiplied once per block. The result equals that of single samples up to rounding.
 """
 
 from dataclasses import dataclass
@@ -37,14 +37,14 @@ class Disturbance:
 
 
 class Sliders:
-    """What sets the places of the sliders, gaps being (3 n_contacts, k) of the first k states."""
+    """Operators that set slider positions from the gaps (3 n_contacts, k) of the first k states."""
 
     def __init__(self, gaps: FloatArray, contacts: ContactStates) -> None:
         self.contacts = contacts
         self.own, self.normal = gaps[contacts.rows], gaps[contacts.normals]
 
     def take_hold(self, interval: int, now: Disturbance) -> None:
-        """Set the sliders anew that begin to rest with an interval."""
+        """Set the positions of sliders that begin to stick with an interval."""
         new = self.contacts.takes_hold[interval]
         by_normal = self.contacts.by_normal[interval, new][:, None]
         row = self.own[new] + by_normal * self.normal[new]
@@ -52,10 +52,10 @@ class Sliders:
 
 
 def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
-    """Return the derivative of all states after a period by those before, where all transitions are located.
+    """Return the monodromy matrix where all transitions are located.
 
-    The states are those of the structure and the places of the sliders that rest at the time at which the period begins, which is
-    the transition after which the fewest do; the non-zero multipliers are those of any other.
+    The states are those of the structure and the positions of sliders that stick at the beginning of the period. The period begins at the
+    transition after which the fewest sliders stick; the non-zero multipliers do not depend on this choice.
     """
     flow, count = flow_of(modes, contacts), len(contacts.times) - 1
     places = Sliders(flow.gaps, contacts)
@@ -72,10 +72,10 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
 
 
 def share_of_monodromy(modes: ModalStates, contacts: ContactStates, wheel: InTime) -> FloatArray | None:
-    """Return the derivative of all states after a share of the period, sectors renumbered, by those before; None where the motion has no shares.
+    """Return the monodromy matrix of one share of the period with renumbered sectors; None where the motion has no shares.
 
-    The motion of a travelling wave does in every share what it does in the first one, in other sectors: the multipliers of the period are
-    those of the share to the power of their number. The share begins in the middle of the longest interval.
+    A travelling wave repeats its first share of the period in other sectors, so the multipliers of the period are those of the share to the
+    power of the number of shares. The share begins in the middle of the longest interval.
     """
     times, count = contacts.times, len(contacts.times) - 1
     sliders = contacts.rows.size
@@ -106,7 +106,7 @@ def share_of_monodromy(modes: ModalStates, contacts: ContactStates, wheel: InTim
 
 
 def identity(n: int, held: BoolArray, more: int) -> Disturbance:
-    """Return disturbances of one state each, `more` columns being left for others."""
+    """Return unit disturbances of each state, followed by `more` empty columns."""
     size = 2 * n + int(np.count_nonzero(held))
     sliders = np.zeros((len(held), size + more))
     sliders[held, 2 * n : size] = np.eye(size - 2 * n)
@@ -114,16 +114,16 @@ def identity(n: int, held: BoolArray, more: int) -> Disturbance:
 
 
 def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list[FloatArray]:
-    """Return the samples of each interval between transitions, equally spaced and its beginning among them.
+    """Return the samples of each interval between transitions, equally spaced from its beginning on.
 
     Parameters
     ----------
     contacts
-        Those with located transitions.
+        Contacts with located transitions.
     samples
-        Least number over the period.
+        Least number of samples in the period.
     halves
-        How many halves of it are taken; twice as many halve each step.
+        Multiple of half this number; twice the value halves each step.
     """
     out = []
     for left, right in zip(contacts.times[:-1], contacts.times[1:], strict=True):
@@ -134,7 +134,7 @@ def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list
 
 
 class _Kicks:
-    """Sampled contacts: their states, and what their forces do to the motion."""
+    """Sampled contacts: their states, and the effect of their forces on the motion."""
 
     def __init__(self, modes: ModalStates, tangents: SampledTangents, weights: FloatArray, size: int) -> None:
         n, most = tangents.kept.shape
@@ -157,7 +157,7 @@ class _Kicks:
         self.before[:, :, size - 3 * n :] = np.eye(3 * n).reshape(n, 3, 3 * n)
 
     def advance(self, first: int, shares: FloatArray, step: FloatArray, states: FloatArray) -> FloatArray:
-        """Return the states after the kicks at samples from `first` on, each with its share of the period, and a step after each."""
+        """Return the states after the impulses at the samples from `first` on and a step after each; `first` counts shares of the period."""
         if self.by_rate:
             for i, share in enumerate(shares, first):
                 self.kick(i, share, states)
@@ -179,7 +179,7 @@ class _Kicks:
         return states
 
     def kick(self, sample: int, share: float, motion: FloatArray) -> None:
-        """Change velocities and states at a sample; velocities decay as the kick goes on."""
+        """Change velocities and states at a sample; velocities decay during the impulse."""
         n, half = len(self.states), self.modes.n
         gap = self.gaps @ motion[:half]
         now = gap.reshape(n, 3, -1)
@@ -198,7 +198,7 @@ class _Kicks:
 
     @property
     def rows(self) -> FloatArray:
-        """The states that there are and the gaps at the last sample, (n_states, k)."""
+        """Existing states and gaps at the last sample, (n_states, k)."""
         return np.vstack([self.states[self.real], self.before.reshape(-1, self.before.shape[2])])
 
 
@@ -222,9 +222,9 @@ def sampled_monodromy(
     Parameters
     ----------
     modes
-        Of the structure.
+        Modes of the structure.
     contacts
-        Those with located transitions.
+        Contacts with located transitions.
     times
         From `sample_times`.
     tangents
@@ -264,13 +264,13 @@ class Block:
     Attributes
     ----------
     gaps
-        (samples, m, N) those of the sampled contacts while no force acts.
+        (samples, m, N) gaps of the sampled contacts without forces.
     gap_response
-        (samples, m, m) response of the gaps one, two and more samples after a unit force.
+        (samples, m, m) gaps one, two and more samples after a unit force.
     step
-        (N, N) of all samples.
+        (N, N) transition matrix of the block.
     force_effect
-        (N, samples m) effect of forces at the samples on the states after the last.
+        (N, samples m) effect of forces at the samples on the states after the last one.
     """
 
     gaps: FloatArray
@@ -280,18 +280,18 @@ class Block:
 
 
 def _blocks(step: FloatArray, gaps: FloatArray, push: FloatArray, count: int) -> list[Block]:
-    """Return blocks of `count` samples in all, the same one as often as it can be.
+    """Return blocks with `count` samples in total, the same block as often as possible.
 
     Parameters
     ----------
     step
-        (N, N) from just after a kick to the next sample.
+        (N, N) transition matrix from just after an impulse to the next sample.
     gaps
         (m, N) gaps of the sampled contacts.
     push
-        (N, m) change of the states by forces on these.
+        (N, m) change of the states by forces on these gaps.
     count
-        Samples.
+        Number of samples.
     """
     most = min(count, int(np.clip(len(step) // max(len(gaps), 1), 1, MAX_SAMPLES)))
     rows, force_effect = [gaps], [step @ push]
@@ -320,7 +320,7 @@ def _add(factor, row, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
-    """Add what forces at the samples before the i-th have done to its gaps."""
+    """Add the effect of forces at earlier samples to the gaps of the i-th."""
     for j in range(i):
         for a in range(gaps.shape[0]):
             for b in range(gaps.shape[0]):
@@ -329,7 +329,7 @@ def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
 
 @inner
 def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[no-untyped-def]
-    """Find the forces (3, k) of one contact and its new states (s, k) from gaps, states and the gaps before, `known`."""
+    """Compute forces (3, k) and new states (s, k) of one contact from gaps, states and the gaps before, `known`."""
     for d in range(3):
         forces[d] = 0.0
         _add(share * springs[d], known[d], forces[d])
@@ -342,7 +342,7 @@ def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[n
 
 
 def _run(contacts, shares, gap_response, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
-    """Kick by the contacts at each sample of a block.
+    """Apply the contact impulses at each sample of a block.
 
     `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and the gaps before, factors (n,) of the forces, and
     springs (3 n,) that are part of the propagation; `shares` (samples,) those of the period. In place: `gaps` (samples, 3 n, k) without forces of the block

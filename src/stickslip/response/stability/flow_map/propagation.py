@@ -1,8 +1,8 @@
 """Propagation of disturbances between transitions: the matrix exponential, to rounding.
 
-Reduced structures are stiff: their fastest modes turn a thousand times in a period. Short intervals take the Taylor series of the
-exponential on the disturbances themselves. Longer ones are halved until a rational function is exact to rounding, whose squares are the
-exponential (Higham 2005); the constant pull of the sliders that rest is carried along by as many columns.
+Reduced structures are stiff: their fastest modes vibrate a thousand times in a period. Short intervals apply the Taylor series of the
+exponential to the disturbances. Longer intervals are halved until a rational approximation is exact to rounding and then squared (Higham
+2005). Additional columns carry the constant force of sticking sliders.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ NUMERATOR = (
 
 
 def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: FloatArray, length: float) -> FloatArray:
-    """Return what becomes of the columns of `states` after `length` under ``dy/dτ = A y + (0, pull @ sliders)``.
+    """Return the columns of `states` after `length` under ``dy/dτ = A y + (0, pull @ sliders)``.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: Floa
     states
         (2n, k).
     pull, sliders
-        (n, m) and (m, k) what keeps its place over the interval.
+        (n, m) and (m, k) operator and positions of sliders, constant over the interval.
     length
         Of the interval, rad.
     """
@@ -55,12 +55,12 @@ def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: Floa
 
 
 def transition(a: FloatArray, pull: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the (2n, 2n) matrix that takes states through an interval and the (2n, m) one that adds what the sliders do.
+    """Return the (2n, 2n) transition matrix of an interval and the (2n, m) effect of the sliders.
 
     Raises
     ------
     FloatingPointError
-        If the motion turns or grows so fast that no digit of the states is left.
+        If the motion oscillates or grows too fast for double precision.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         a2 = _times(a, a)
@@ -98,7 +98,7 @@ def _size(a: FloatArray) -> float:
 
 
 def _series(a: FloatArray, rate: FloatArray, length: float) -> FloatArray:
-    """Return the increase over an interval at whose beginning the columns have these rates, by its Taylor series."""
+    """Return the increase over an interval from the rates at its beginning, by the Taylor series."""
     term = length * rate
     total = term.copy()
     enough = ACCURACY * np.max(np.abs(total), initial=0.0)

@@ -1,8 +1,8 @@
 """Tangents of contact laws without located transitions, on samples of a period.
 
-Hysteresis turns where a gap does. A step over such a time is taken in parts, the gap there being interpolated between both samples:
-a step that jumps over it would have the slope of one side for both. Friction that depends on the velocity is steep for a moment where
-that passes zero: its tangents are integrated over the steps on both sides of a sample, with as many points as they need.
+Hysteresis reverses where a gap does. A step across a reversal is divided there, with an interpolated gap; an undivided step would use the
+slope of one side for both. Velocity-dependent friction is steep where the velocity passes zero; its tangents are integrated adaptively
+over the steps on both sides of a sample.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,13 +34,13 @@ class SampledTangents:
     Attributes
     ----------
     contacts
-        (n,) which contacts.
+        (n,) indices of the contacts.
     kept
-        (n, s) which states are states of the motion: forces depend on them, and something moves them or lets them decay.
+        (n, s) which law states are states of the motion: forces depend on them, and they change in the period.
     jac
         (samples, n, 3 + s, 9 + s).
     resting, grazing
-        (n,) number of sliders that rest for the whole period, and of these that do not rest where they began.
+        (n,) number of sliders that stick for the whole period, and of these that have moved from their initial position.
     """
 
     contacts: IntArray
@@ -88,12 +88,12 @@ def sampled_tangents(laws: Sequence[ContactLaw], contacts: IntArray, path: Path)
 
 
 def _unmoved(jac: FloatArray, size: int) -> BoolArray:
-    """Return which states stay for the whole period, whatever the disturbance."""
+    """Return which states stay constant over the period for any disturbance."""
     return np.asarray(np.all(np.abs(jac[:, 3:] - np.eye(size, 9 + size, 6)) <= EQUAL, axis=(0, 2)))
 
 
 def _felt(jac: FloatArray, size: int) -> BoolArray:
-    """Return on which states a force depends, at once or through others."""
+    """Return the states on which a force depends, directly or through others."""
     by_state = np.any(jac[:, :, 6 : 6 + size] != 0.0, axis=0)
     felt = np.any(by_state[:3], axis=0)
     for _ in range(size):
@@ -221,21 +221,21 @@ def _fourier_basis(tau: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
 def _hat_integrals(
     tangents: Callable[[FloatArray, IntArray], FloatArray], ends: FloatArray, step: IntArray, samples: FloatArray
 ) -> FloatArray:
-    """Return means of tangents about each sample, their weight falling linearly to zero at the neighbouring samples.
+    """Return means of tangents about each sample with a weight that falls linearly to zero at the neighbouring samples.
 
-    A force that lasts much less than a step acts as two kicks with the same sum and the same mean time. Pieces are halved until the
-    rule of Simpson does not change.
+    A force much shorter than a step acts as two impulses with the same sum and the same mean time. Parts are halved until Simpson's rule
+    converges.
 
     Parameters
     ----------
     tangents
-        Gives the (k, ...) tangents at k times, each of which lies in a part of a step.
+        Function that returns the (k, ...) tangents at k times, each within a part of a step.
     ends
-        (n_parts, 2) between which times the parts lie; a moment in which the tangents are large has to be one of these.
+        (n_parts, 2) beginning and end of the parts; times of steep tangents must be among them.
     step
-        (n_parts,) the sample at which the step of each part ends.
+        (n_parts,) sample at the end of the step of each part.
     samples
-        (n_samples,) times, the first step beginning at the last of the period before.
+        (n_samples,) times; the first step begins at the last sample of the period before.
     """
     lengths = np.diff(samples, prepend=samples[-1] - 2 * np.pi)
     part, left, right = np.arange(len(ends)), ends[:, 0], ends[:, 1]

@@ -1,8 +1,8 @@
 """Contact forces under a disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of the gaps, along a motion with known transitions.
 
-The forces are ``e^{στ} Σ_h F_h e^{ihτ}``, and F follows from G by a matrix that depends on the exponent: a slider that takes hold at τ_0 keeps
-the place that the disturbance had then, while the disturbance itself goes on growing. With the tangent of the periodic motion alone,
-the matrix at σ = 0, exponents elsewhere are wrong.
+The forces are ``e^{στ} Σ_h F_h e^{ihτ}``. The matrix from G to F depends on the exponent σ: a slider that sticks from τ_0 on keeps the
+displacement of the disturbance at τ_0 while the disturbance grows. The tangent of the periodic motion is the matrix at σ = 0 and gives
+wrong exponents elsewhere.
 """
 
 from dataclasses import dataclass, field
@@ -19,18 +19,18 @@ UNCHANGED_STIFFNESS_SHARE = 1e-12  # of the largest stiffness: what changes less
 
 @dataclass(frozen=True, eq=False)
 class Rests:
-    """When sliders of one contact rest.
+    """The stick intervals of the sliders of one contact.
 
     Attributes
     ----------
     own, normal
-        (q,) which of its ports a slider belongs to, and which one is the normal gap, or its own where that does not matter.
+        (q,) port of each slider, and port of the normal gap (its own where the normal gap has no influence).
     by_normal
-        (q,) derivative of the slider's place by the normal gap where it takes hold.
+        (q,) derivative of the slider position by the normal gap at the beginning of stick.
     stiffness
-        (q,) of the spring that it holds, N/m.
+        (q,) stiffness of its spring, N/m.
     start, length
-        (q,) when it takes hold and for how long, rad.
+        (q,) beginning and length of stick, rad.
     """
 
     own: IntArray
@@ -43,18 +43,18 @@ class Rests:
 
 @dataclass(frozen=True, eq=False)
 class ContactTangent:
-    """One contact over a period as a disturbance sees it, beside springs that stand for its mean.
+    """Tangent of one contact over a period, relative to springs that represent its mean.
 
     Attributes
     ----------
     ports
-        (m,) in which it differs from these springs at any time, among the ports of all contacts.
+        (m,) ports, among those of all contacts, at which it differs from these springs at any time.
     times
-        (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same a period later.
+        (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same transition a period later.
     changes
-        (n_intervals, m, m) stiffness in each interval beyond the springs, N/m, with the sliders at rest where they stick.
+        (n_intervals, m, m) stiffness in each interval minus the springs, N/m, with sticking sliders at rest.
     rests
-        Of its sliders.
+        Stick intervals of its sliders.
     """
 
     ports: IntArray
@@ -64,14 +64,14 @@ class ContactTangent:
     known: dict[bytes, ComplexArray] = field(default_factory=dict)
 
     def matrix(self, sigma: complex, rows: IntArray, columns: IntArray) -> ComplexArray:
-        """Return the (r m, c m) forces in the harmonics `rows` by the disturbance in the harmonics `columns`, harmonic by harmonic."""
+        """Return the matrix (r m, c m) from the disturbance in the harmonics `columns` to the forces in the harmonics `rows`."""
         m = self.ports.size
         held = self._held(sigma, rows).reshape(rows.size * m, -1)
         placed = self._placed(columns).reshape(-1, columns.size * m)
         return np.asarray(self._without_sliders(rows, columns) - held @ placed)
 
     def _without_sliders(self, rows: IntArray, columns: IntArray) -> ComplexArray:
-        """Return the matrix of springs that change over the period."""
+        """Return the matrix of springs with periodic stiffness."""
         key = rows.tobytes() + b"|" + columns.tobytes()
         if key not in self.known:
             apart = rows[:, None] - columns
@@ -90,7 +90,7 @@ class ContactTangent:
         return np.asarray(found.reshape(-1, *self.changes.shape[1:]))
 
     def _held(self, sigma: complex, harmonics: IntArray) -> ComplexArray:
-        """Return the (k, m, q) forces that each slider takes off while it rests where a unit disturbance has put it."""
+        """Return the (k, m, q) forces that a unit displacement of each slider relieves while it sticks."""
         rests, h = self.rests, harmonics[:, None]
         share = rests.stiffness / PERIOD * _lasting(sigma + 1j * h, rests.length)
         out = np.zeros((harmonics.size, self.ports.size, rests.own.size), dtype=complex)
@@ -98,7 +98,7 @@ class ContactTangent:
         return out
 
     def _placed(self, harmonics: IntArray) -> ComplexArray:
-        """Return the (q, k, m) places, over ``e^{σ τ_0}``, where sliders take hold by the harmonics of the disturbance."""
+        """Return the (q, k, m) slider positions at the beginning of stick, over ``e^{σ τ_0}``, by the harmonics of the disturbance."""
         rests, each = self.rests, np.arange(self.rests.own.size)
         turns = np.exp(1j * harmonics * rests.start[:, None])
         out = np.zeros((each.size, harmonics.size, self.ports.size), dtype=complex)
@@ -113,11 +113,11 @@ def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, lis
     Returns
     -------
     springs
-        (3 n_contacts,) stiffness of the springs that stand for their mean, N/m.
+        (3 n_contacts,) stiffness of the springs that represent their mean, N/m.
     ports
         Rows of the gap operator in which some contact differs from them.
     tangents
-        Of the contacts that do.
+        Tangents of these contacts.
     """
     lengths = np.diff(contacts.times)
     mean = np.tensordot(lengths / PERIOD, contacts.stiffness, axes=1)
@@ -139,7 +139,7 @@ def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, lis
 
 
 def _rests(contacts: ContactStates, contact: int, own: IntArray) -> Rests:
-    """Return all rests of the sliders of a contact within a period; `own` are its directions that are ports."""
+    """Return all stick intervals of the sliders of a contact within a period; `own` are its directions that are ports."""
     lengths, count = np.diff(contacts.times), len(contacts.times) - 1
     place = np.searchsorted(own, contacts.rows % 3)
     found = []

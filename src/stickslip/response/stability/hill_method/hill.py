@@ -1,4 +1,4 @@
-"""Hill's method, exact for friction: of a wheel against every wave, one sector at a time."""
+"""Hill's method, exact for friction; for a wheel against every wave, on one sector."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -53,10 +53,10 @@ class HillStability:
     stability
         Verdict, and the multipliers near the unit circle and outside.
     disturbance
-        That whose multiplier decides; None where there is none near the unit circle.
+        The disturbance whose multiplier decides; None if there is none near the unit circle.
     missing
-        Multipliers outside the unit circle that are there by the turns of the determinant and were not found; None where they
-        could not be counted.
+        Number of multipliers outside the unit circle that the winding of the determinant counts and the search did not find; None if
+        they could not be counted.
     """
 
     stability: Stability
@@ -82,15 +82,15 @@ class HillStability:
 def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept) -> HillStability:
     """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
 
-    As in `stability`, the multipliers are those of the motion with more harmonics, and what these change is part of their errors. Structural damping
-    and aerodynamic coefficients that follow the frequency act as in the balance.
+    As in `stability`, the multipliers are those of the motion with more harmonics, and their change is part of the errors. Structural
+    damping and frequency-dependent aerodynamic coefficients act as in the balance.
 
     Parameters
     ----------
     problem, point
         As in `stability`.
     keep
-        Keeps pieces under what they were made of, so that an interrupted examination goes on where it was.
+        Cache of intermediate results by their inputs, from which an interrupted examination continues.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_
 def _climbed(
     problem: ForcedProblem, point: ForcedPoint, hill: Hill, found: Exponents, first: HillStability, keep: Keep
 ) -> HillStability:
-    """Return what the motion with about twice the harmonics says, and the one with twice these, where the first leaves the verdict open."""
+    """Return the stability of the motion with about twice the harmonics; with four times as many if the verdict stays open."""
     system, best = problem.system.at(point.omega), first
     for more in islice(more_harmonics(problem, point), FURTHER_MOTIONS):
         if best.stability.settled:
@@ -141,18 +141,18 @@ def _climbed(
 
 @by_one_thread
 def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int | None = None) -> Exponents:
-    """Return the Floquet exponents near the imaginary axis and right of it of a motion as it is given.
+    """Return the Floquet exponents of a given motion near the imaginary axis and right of it.
 
     Parameters
     ----------
     system
-        A structure, or a tuned wheel that has every wave.
+        A structure, or a tuned wheel with all its waves.
     gaps
-        (H+1, 3 n_contacts) complex coefficients of the gaps, of a wheel those of sector 0, m.
+        (H+1, 3 n_contacts) complex coefficients of the gaps (of sector 0 for a wheel), m.
     omega
-        Of the motion, rad/s.
+        Frequency of the motion, rad/s.
     order
-        Highest harmonic of the disturbances that is solved; those beyond act to first order. None: by that of the motion.
+        Highest harmonic of the disturbances that is solved; higher ones act to first order. None: chosen from that of the motion.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int 
 
 
 def _refined(hill: Hill) -> tuple[Hill, Exponents]:
-    """Return the exponents with so many harmonics that those beyond hardly change what decides, as far as that can be had."""
+    """Return the exponents with enough harmonics for the deciding exponent to be converged, if the limits allow."""
     found = exponents(hill)
     while True:
         deciding = np.max(found.errors[found.values.real > DECIDING_REAL_PART], initial=0.0)
@@ -224,7 +224,7 @@ def _prepared(
 
 
 def _order(hill: Hill, motion: int) -> int:
-    """Return how many harmonics are solved: so many that each mode rings in one of them, or each that may grow, if that is cheap."""
+    """Return the number of solved harmonics: each mode, or each that may grow, resonates in one of them if that is affordable."""
     ports = max(hill.side.ports.size, 1)
     ratios = hill.side.modes(0, 0).ratios
     least = min(max(HARMONICS_FACTOR * motion + HARMONICS_MORE, MIN_HILL_HARMONICS), MAX_HILL_HARMONICS)
@@ -237,7 +237,7 @@ def _order(hill: Hill, motion: int) -> int:
 
 
 def _changes(found: Exponents, solved: Hill) -> FloatArray:
-    """Return how far each multiplier of a motion is from that of the motion as it was solved, of a large wheel by a few waves."""
+    """Return the change of each multiplier from that of the motion as solved; for a large wheel from a few waves."""
     waves = solved.side.waves
     if waves <= COMPARED_WAVES or solved.rows <= MAX_ROWS_OF_COMPARED_WAVES:
         return _distances(found, exponents(solved, segments_of(solved)), solved)
@@ -254,7 +254,7 @@ def _changes(found: Exponents, solved: Hill) -> FloatArray:
 
 
 def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
-    """Return the distance of each multiplier from the nearest of the same wave among others, whichever harmonic that is counted from."""
+    """Return the distance of each multiplier from the nearest other one of the same wave, for any shift of the harmonic."""
     own, theirs = found.multipliers, other.multipliers
     out = np.abs(own)  # one that was not there has come from far left
     for i, wave in enumerate(found.waves):
@@ -283,7 +283,7 @@ def _judged(found: Exponents, change: FloatArray, states: ContactStates, hill: H
 
 
 def _disturbance(found: Exponents, at: int, side: HillSide) -> WaveDisturbance:
-    """Return which disturbance an exponent belongs to: its strongest harmonic, as a wave with a positive frequency."""
+    """Return the disturbance of an exponent: its strongest harmonic, as a wave with positive frequency."""
     value, harmonic = found.values[at], int(found.harmonics[at])
     frequency = float(value.imag) + harmonic
     wave = side.wave_of(int(found.waves[at]), harmonic)

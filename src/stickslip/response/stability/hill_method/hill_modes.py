@@ -1,7 +1,7 @@
 """Modes of the dynamic stiffness of each harmonic, for a disturbance with a complex exponent.
 
-The modes are those with springs in place of the contacts that stand for their mean. Damping may couple them, damping by loss factors and
-aerodynamic forces may add to them: all that a harmonic balance knows acts here as it does there.
+The modes are those with mean springs in place of the contacts. Viscous damping may couple them; loss factors and aerodynamic forces act
+on them as in the harmonic balance.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ COUPLED = 1e-9  # of the largest entry: what couples modes less does not
 
 @dataclass(frozen=True, eq=False)
 class HillModes:
-    """The modes ``u = Φ q`` of what one harmonic vibrates as, ``Φᴴ(K + α M)Φ = 1``, all over the frequency of the motion.
+    """The modes ``u = Φ q`` of the structure of one harmonic, ``Φᴴ(K + α M)Φ = 1``, scaled by the frequency of the motion.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class HillModes:
             return np.sqrt(np.abs(self.stiffness) / self.mass)
 
     def diagonal(self, z: complex, sign: float) -> ComplexArray | None:
-        """Return the (n,) dynamic stiffness at ``z = σ + ih`` but for what `springs` take away; None where it is no diagonal matrix."""
+        """Return the (n,) dynamic stiffness at ``z = σ + ih`` without the part of `springs`; None where it is not diagonal."""
         if self.damping.ndim == 2 or self.feedback is not None:
             return None
         more = z * self.damping + self.rest + 1j * sign * self.loss
@@ -73,7 +73,7 @@ class HillModes:
         return np.asarray(out if self.feedback is None else out - self._air(self.feedback, z))
 
     def _air(self, force: Feedback, z: complex) -> ComplexArray:
-        """Return what a table of frequencies adds to the frozen force, at the frequency of the disturbance."""
+        """Return the difference of the tabulated aerodynamic force from the frozen one at the frequency of the disturbance."""
         s = self.omega * z.imag
         stiff, damp = force.influence.frozen(force.phase_angle, force.reference)
         if s >= 0.0:
@@ -92,7 +92,7 @@ def hill_modes(
     omega: float,
     feedback: Feedback | None,
 ) -> HillModes:
-    """Decompose what a harmonic vibrates as.
+    """Return the modes of the structure of a harmonic.
 
     Parameters
     ----------
@@ -101,11 +101,11 @@ def hill_modes(
     gap_operator
         (3 n_contacts, n).
     springs
-        (3 n_contacts,) that stand for the contacts, N/m.
+        (3 n_contacts,) springs that represent the contacts, N/m.
     ports
         Rows of the gap operator where contacts differ from them.
     omega
-        Of the motion, rad/s.
+        Frequency of the motion, rad/s.
     feedback
         Aerodynamic force, of which the structure holds the frozen form; None for none.
     """
@@ -144,7 +144,7 @@ def hill_modes(
 
 @dataclass(frozen=True, eq=False)
 class HillSide:
-    """What vibrates, as a disturbance of a motion sees it: harmonic h of a disturbance of wave k' is the wave ``k' + h m``.
+    """The linear structure for disturbances of a motion: harmonic h of a disturbance of wave k' is the wave ``k' + h m``.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class HillSide:
     springs, ports
         From `contact_tangents`.
     omega
-        Of the motion, rad/s.
+        Frequency of the motion, rad/s.
     """
 
     system: System
@@ -164,7 +164,7 @@ class HillSide:
 
     @property
     def waves(self) -> int:
-        """Number of waves that a disturbance may have."""
+        """Number of possible waves of a disturbance."""
         wheel = self.system.structure.wheel
         return 1 if wheel is None else wheel.sectors
 
@@ -199,7 +199,7 @@ class HillSide:
 
 
 def _share_of_springs(damping: Matrix, held: Matrix) -> float:
-    """Return how much of the stiffness of springs the damping lacks that couples modes, by least squares."""
+    """Return the share of the springs' stiffness that is missing in the coupling damping, by least squares."""
     springs = held.conj().T @ held
     off = springs - np.diag(np.diagonal(springs))
     size = float(np.vdot(off, off).real)

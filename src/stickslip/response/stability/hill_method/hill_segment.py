@@ -1,9 +1,9 @@
 """Hill's problem in a frequency interval of the disturbance, as a small matrix of the modes that resonate there.
 
 A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h q_h`` and contact forces
-``f = D(σ) g``. Modes whose frequency is far from that of a harmonic are eliminated with the contacts: what is left of the others is a matrix
-S(σ) that has no poles near the segment, and a polynomial through a few σ is exact to many digits. Harmonics of the contacts beyond those
-that are solved act through their first passage, ``-D R D`` with the receptance R at the ports.
+``f = D(σ) g``. Modes far from resonance are eliminated with the contacts. The matrix S(σ) of the remaining modes has no poles near the segment, so a
+polynomial through a few σ is accurate to many digits. Harmonics of the contacts above the solved ones act to first order, ``-D R D``
+with the receptance R at the ports.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +31,7 @@ Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
 
 def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
-    """Return the highest frequency, over that of the motion, at which a mode rings that contacts may make grow; 0 where there is none."""
+    """Return the highest mode frequency, over that of the motion, at which contacts can destabilise a mode; 0 if there is none."""
     if not tangents:
         return 0.0
     tops = (_top(side.modes(wave, 0), tangents) for wave in range(side.waves // 2 + 1))
@@ -39,10 +39,10 @@ def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
 
 
 def _top(modes: HillModes, tangents: Sequence[ContactTangent]) -> float:
-    """Return the highest frequency, over that of the motion, of a mode of one wave that contacts may make grow; 0 where there is none.
+    """Return the highest mode frequency of one wave, over that of the motion, at which contacts can destabilise a mode; 0 if there is none.
 
-    The amplitude of a fast mode grows at a sudden change of its stiffness by at most the root of the ratio of its frequencies before and
-    after, at the phase that is worst, and decays by its damping. A mode for which the sum over the period is negative cannot grow.
+    At a sudden change of stiffness the amplitude of a fast mode grows at most by the square root of the ratio of its frequencies before
+    and after, at the worst phase; between changes it decays by damping. A mode with a negative sum over the period cannot grow.
     """
     share = _relative(modes, tangents)
     own = np.log(np.maximum(1.0 + share, LET_GO))
@@ -73,24 +73,24 @@ TAIL, MOST_TAIL = (3, 60)  # times the harmonics that are solved: up to which th
 
 
 def not_kept(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Return what is made, which is kept nowhere."""
+    """Return the result of the function without a cache."""
     return make()
 
 
 @dataclass(frozen=True, eq=False)
 class Hill:
-    """A motion as its disturbances see it.
+    """Hill's problem of a motion.
 
     Attributes
     ----------
     side
-        What vibrates.
+        Linear structure of the disturbances.
     tangents
-        The contacts that change.
+        Tangents of the contacts that change in the period.
     order
         Highest harmonic of disturbances that is solved.
     keep
-        Keeps the matrices of a segment, which take the time, under what they were made of.
+        Cache of the matrices of a segment by their inputs.
     """
 
     side: HillSide
@@ -100,22 +100,22 @@ class Hill:
 
     @cached_property
     def reach(self) -> float:
-        """Number of harmonics up to which modes ring that contacts may make grow."""
+        """Number of harmonics up to which contacts can destabilise a mode."""
         return reach(self.side, self.tangents)
 
     @property
     def rows(self) -> int:
-        """Number of gaps in all harmonics that are solved: rows of the matrices that are factorised."""
+        """Number of gaps in all solved harmonics: rows of the factorised matrices."""
         return (2 * self.order + 1) * int(self.side.ports.size)
 
     @property
     def core(self) -> IntArray:
-        """Harmonics that are solved."""
+        """The solved harmonics."""
         return np.arange(-self.order, self.order + 1)
 
     @property
     def tail(self) -> IntArray:
-        """Harmonics beyond."""
+        """The harmonics above the solved ones."""
         last = min(TAIL * self.order, self.order + MOST_TAIL)
         beyond = np.arange(self.order + 1, last + 1)
         return np.concatenate([-beyond[::-1], beyond])
@@ -128,13 +128,13 @@ class Node:
     Attributes
     ----------
     whole
-        (s, s) with the contacts.
+        (s, s) matrix with the contacts.
     beyond
-        (s, s) part of it that harmonics beyond those solved have.
+        (s, s) part of the harmonics above the solved ones in it.
     alone
-        (s, s) with springs in place of the contacts.
+        (s, s) matrix with springs in place of the contacts.
     phase
-        Argument of the determinant of what was eliminated, over that without contacts.
+        Argument of the determinant of the eliminated part, relative to that without contacts.
     """
 
     whole: ComplexArray
@@ -155,12 +155,12 @@ class Segment:
 
     @property
     def high(self) -> float:
-        """Its upper end."""
+        """Upper end of the segment."""
         return self.low + HALF
 
     @cached_property
     def slow(self) -> list[IntArray]:
-        """The modes of each harmonic that can ring."""
+        """The modes of each harmonic that can resonate."""
         found = []
         for h in self.hill.core:
             ratios = self.hill.side.modes(self.wave, int(h)).ratios
@@ -171,13 +171,13 @@ class Segment:
 
     @cached_property
     def heights(self) -> FloatArray:
-        """(NODES,) imaginary parts of the nodes, from end to end."""
+        """(NODES,) imaginary parts of the nodes, ends included."""
         x = np.cos(np.pi * np.arange(NODES)[::-1] / (NODES - 1))
         return self.low + 0.5 * HALF * (1.0 + x)
 
     @cached_property
     def smooth(self) -> bool:
-        """Whether the polynomial is near the matrix everywhere between the nodes."""
+        """Whether the polynomial approximates the matrix everywhere between the nodes."""
         values = np.array([node.whole for node in self.nodes])
         if not values.size:
             return True
@@ -213,7 +213,7 @@ class Segment:
         return np.asarray(share / share.sum(axis=1, keepdims=True))
 
     def node(self, sigma: complex) -> Node:
-        """Eliminate the modes that do not ring, and the contacts, at an exponent."""
+        """Eliminate non-resonant modes and contacts at an exponent."""
         core, tail = self.hill.core, self.hill.tail
         parts = [self._part(sigma, int(h), own) for h, own in zip(core, self.slow, strict=True)]
         alone = scipy.linalg.block_diag(*(p.alone for p in parts))
@@ -246,7 +246,7 @@ class Segment:
         return Node(whole + change, change, alone, float(turns + swaps))
 
     def _beyond(self, sigma: complex, core: IntArray, tail: IntArray, gaps: ComplexArray) -> ComplexArray:
-        """Return the change of the forces (k m, s) by harmonics beyond those that are solved."""
+        """Return the change of the forces (k m, s) by harmonics above the solved ones."""
         k, m = core.size, self.hill.side.ports.size
         there = [t.matrix(sigma, tail, core) for t in self.hill.tangents]
         back = [t.matrix(sigma, core, tail) for t in self.hill.tangents]
@@ -261,7 +261,7 @@ class Segment:
         return self._felt(back, answer.reshape(tail.size * m, -1), tail.size, k)
 
     def _felt(self, matrices: Sequence[ComplexArray], gaps: ComplexArray, before: int, after: int) -> ComplexArray:
-        """Return the forces (after m, s) by the gaps (before m, s), contact by contact."""
+        """Return the forces (after m, s) of the gaps (before m, s), contact by contact."""
         m = self.hill.side.ports.size
         given = gaps.reshape(before, m, -1)
         out = np.zeros((after, m, given.shape[2]), dtype=complex)
@@ -278,7 +278,7 @@ class Segment:
 
 
 def fitted(segment: Segment) -> Segment:
-    """Return a segment with so many modes kept that what is left has no poles near it, as far as that can be had."""
+    """Return a segment with enough modes kept to have no poles near it, if the limits allow."""
     for factor in FARTHER:
         trial = replace(segment, away=factor * AWAY)
         if sum(own.size for own in trial.slow) > MOST_RINGING:
@@ -291,7 +291,7 @@ def fitted(segment: Segment) -> Segment:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One harmonic without the modes that do not ring."""
+    """One harmonic with its non-resonant modes eliminated."""
 
     alone: ComplexArray  # (s, s) of those that do
     ports: ComplexArray  # (m, s) gaps by them
@@ -325,7 +325,7 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
 
 
 def _receptance(modes: HillModes, z: complex, away: BoolArray) -> ComplexArray:
-    """Return the (m, m) receptance at the ports of modes that are `away` from ringing, without the damping that couples them."""
+    """Return the (m, m) receptance at the ports of the modes `away` from resonance, without their coupling damping."""
     damping, rest = (np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest))
     own = damping - np.sum(np.abs(modes.springs) ** 2, axis=0)
     Z = modes.stiffness + z * z * modes.mass + z * own + rest

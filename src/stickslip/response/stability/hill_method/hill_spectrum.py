@@ -26,19 +26,19 @@ WHOLE = 0.05  # farther from a whole number the turns of a determinant are no co
 
 @dataclass(frozen=True, eq=False)
 class Exponents:
-    """Exponents σ = λ/ω of the disturbances of a motion, that which grows most first.
+    """Exponents σ = λ/ω of the disturbances of a motion, in order of falling growth.
 
     Attributes
     ----------
     values
         (e,) with imaginary parts from -1/2 to 1/2.
     errors
-        (e,) what the harmonics beyond those that are solved change in them, to first order.
+        (e,) change by the harmonics above the solved ones, to first order.
     waves, harmonics
-        (e,) wave numbers of the disturbances, and the harmonic in which they vibrate most.
+        (e,) wave number and strongest harmonic of each disturbance.
     missing
-        How many more lie right of the imaginary axis than were found; None where they could not be counted. Then that which grows most
-        among those that more harmonics confirm is the only one right of the axis.
+        Number of exponents right of the imaginary axis that were not found; None if they could not be counted. Then only the fastest
+        growing one that more harmonics confirm is kept right of the axis.
     """
 
     values: ComplexArray
@@ -55,7 +55,7 @@ class Exponents:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Exponents about a segment."""
+    """Exponents near a segment."""
 
     segment: Segment
     values: ComplexArray
@@ -63,14 +63,14 @@ class Part:
     harmonics: IntArray
 
     def taken(self, which: BoolArray | IntArray) -> "Part":
-        """Return some of them."""
+        """Return the exponents at some indices."""
         return Part(self.segment, self.values[which], self.errors[which], self.harmonics[which])
 
 
 def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
-    """Return the exponents of all disturbances of a motion near the imaginary axis, and all right of it; or those about some segments.
+    """Return all exponents of a motion near the imaginary axis and right of it, or those near some segments.
 
-    Of a wheel each wave has a problem of its own. Disturbances are real: those of wave -k are the conjugates of those of wave k.
+    For a wheel each wave is a separate problem. Since disturbances are real, those of wave -k are the conjugates of those of wave k.
     """
     if segments:
         return _gathered([_zeros(fitted(segment)) for segment in segments], hill, None)
@@ -90,7 +90,7 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
 
 
 def _confirmed(parts: list[Part]) -> list[Part]:
-    """Return the parts with no exponent right of the axis but that which grows most among those that more harmonics confirm."""
+    """Return the parts with only one exponent right of the axis: the fastest growing one that more harmonics confirm."""
     growing = [(i, int(j)) for i, p in enumerate(parts) for j in np.flatnonzero(p.values.real > ON_AXIS)]
     growing.sort(key=lambda at: -parts[at[0]].values[at[1]].real)
     out = [p.taken(p.values.real <= ON_AXIS) for p in parts]
@@ -109,7 +109,7 @@ def _confirmed(parts: list[Part]) -> list[Part]:
 
 
 def segments_of(hill: Hill) -> list[Segment]:
-    """Return the segments of the imaginary axis that stand for all disturbances."""
+    """Return the segments of the imaginary axis that cover all disturbances."""
     waves, found = hill.side.waves, []
     for wave in range(waves // 2 + 1):
         lows = (0.0,) if 2 * wave in (0, waves) else (-HALF, 0.0)
@@ -118,7 +118,7 @@ def segments_of(hill: Hill) -> list[Segment]:
 
 
 def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
-    """Return how many exponents lie right of the imaginary axis, by the turns of the determinant along it; None where these are not known."""
+    """Return the number of exponents right of the imaginary axis, from the winding of the determinant along it; None where unknown."""
     if not all(segment.smooth for segment in axis) or not _rings(axis):
         return None
     each = [_turns(segment, zeros) for segment, zeros in zip(axis, found, strict=True)]
@@ -138,7 +138,7 @@ def _rings(axis: Sequence[Segment]) -> bool:
 
 
 def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
-    """Return how often the determinant turns along a segment, and how many exponents springs in place of the contacts have right of it."""
+    """Return the winding of the determinant along a segment, and the number of exponents right of it with springs in place of the contacts."""
     whole, alone = _matrix(segment, "whole"), _matrix(segment, "alone")
     path = ON_AXIS + 1j * np.linspace(segment.low, segment.high, PATH)
     without = _raw(segment, "alone").values
@@ -152,9 +152,9 @@ def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
 
 
 def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
-    """Return the exponents about a segment, their errors, and the harmonics in which they vibrate most.
+    """Return the exponents near a segment, their errors, and their strongest harmonics.
 
-    Far from the segment the polynomial has zeros that the matrix has not: those right of it are solved again with the matrix itself.
+    Far from the segment the polynomial has spurious zeros, so zeros right of the segment are solved again with the matrix itself.
     """
     found = _raw(segment, "whole") if zeros is None else zeros
     beside = found.values.real - segment.growth
@@ -179,7 +179,7 @@ def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
 def _solved(
     segment: Segment, sigma: complex
 ) -> tuple[complex, ComplexArray, ComplexArray, ComplexArray, complex] | None:
-    """Return an exponent by Newton's method on the matrix itself, with its vectors, the part of harmonics beyond and the slope; None where there is none."""
+    """Return an exponent by Newton's method on the matrix itself, with its vectors, the part of higher harmonics and the slope; None without convergence."""
     start = sigma
     for _ in range(ROUNDS):
         here, beside = segment.node(sigma), segment.node(sigma + STEP)
@@ -213,7 +213,7 @@ def _matrix(segment: Segment, name: str) -> Matrix:
 
 
 def _slope(segment: Segment, name: str) -> Matrix:
-    """Return its derivative, by central differences along the real axis."""
+    """Return the derivative of the matrix, by central differences along the real axis."""
     nodes, step = np.array([getattr(node, name) for node in segment.nodes]), 1e-5
 
     def slope(sigma: ComplexArray) -> ComplexArray:
@@ -224,12 +224,12 @@ def _slope(segment: Segment, name: str) -> Matrix:
 
 
 def _growing(parts: list[Part], hill: Hill) -> int:
-    """Return the number of exponents right of the imaginary axis that are known, with the conjugates."""
+    """Return the number of known exponents right of the imaginary axis, conjugates included."""
     return int(np.count_nonzero(_gathered(parts, hill, None).values.real > ON_AXIS))
 
 
 def _gathered(parts: list[Part], hill: Hill, missing: int | None) -> Exponents:
-    """Return all exponents with their conjugates, each once, that which grows most first."""
+    """Return all exponents and their conjugates once each, in order of falling growth."""
     waves = hill.side.waves
     segment = np.concatenate([np.full(p.values.size, i) for i, p in enumerate(parts)])
     wave = np.concatenate([np.full(p.values.size, p.segment.wave) for p in parts])

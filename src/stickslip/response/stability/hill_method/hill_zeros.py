@@ -24,7 +24,7 @@ Matrix = Callable[[ComplexArray], ComplexArray]  # (k,) exponents -> (k, s, s)
 
 @dataclass(frozen=True, eq=False)
 class Zeros:
-    """Where a matrix is singular.
+    """Zeros of the determinant of a matrix function, with their vectors.
 
     Attributes
     ----------
@@ -46,14 +46,14 @@ class Zeros:
 
 
 def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high: float) -> Zeros:
-    """Return the zeros within an ellipse, and those beside it that the integral shows, too.
+    """Return the zeros within an ellipse, and zeros beside it that the integral contains.
 
     Parameters
     ----------
     matrix, slope
-        Of exponents (k,): (k, s, s) and its derivative.
+        Matrix (k, s, s) at exponents (k,), and its derivative.
     centre, wide, high
-        Of the ellipse, and its half axes along the real and the imaginary axis.
+        Centre of the ellipse, and its half axes along the real and the imaginary axis.
     """
     angle = 2.0 * np.pi * (np.arange(POINTS) + 0.5) / POINTS
     around = wide * np.cos(angle) + 1j * high * np.sin(angle)
@@ -81,7 +81,7 @@ def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high
 
 
 def _polished(matrix: Matrix, slope: Matrix, starts: ComplexArray, vectors: ComplexArray, scale: FloatArray) -> Zeros:
-    """Return the zeros next to starts by inverse iteration, those that it does not find being left out."""
+    """Return the zeros next to the starts by inverse iteration; starts without convergence are left out."""
     now, right = starts.astype(complex), vectors.copy()
     change = np.full_like(now, np.inf)
     for _ in range(ROUNDS):
@@ -114,9 +114,9 @@ def _times(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
 
 
 def turning(matrix: Matrix, zeros: ComplexArray, path: ComplexArray) -> float:
-    """Return by how much the determinant turns along a path, rad; NaN where it turns too fast to tell.
+    """Return the change of the argument of the determinant along a path, rad; NaN where the path is too coarse.
 
-    The zeros near the path that are known are taken out before, and what they turn is added exactly.
+    Known zeros near the path are divided out, and their contribution is added exactly.
     """
     values = matrix(path)
     if not values.shape[1]:

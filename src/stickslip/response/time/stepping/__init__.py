@@ -1,1 +1,1 @@
-"""The compiled time step, and what it is made of."""
+"""The compiled time step and its parts."""

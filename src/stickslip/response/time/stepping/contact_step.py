@@ -1,9 +1,8 @@
 """Any contact law over one time step: force, new state and their derivatives at a guess of the gap at its end.
 
-A law that lets go of its contact forgets: what it does after the next landing is counted from where the gap closes, not
-from the sample before, or its force would be off by an amount of first order for as long as it sticks. A step in which a
-contact lands is therefore given to the law in two parts, up to the place on the straight path of the gap where the normal
-force begins, and on from there.
+A law forgets its state at lift-off. After the next closure friction counts from the gap at closure; counted from the sample before, the
+force would have an error of first order for as long as the contact sticks. A step with a closure is therefore evaluated in two parts: to
+the point of the straight gap path where the normal force begins, and on from there.
 """
 
 from collections.abc import Sequence
@@ -41,7 +40,7 @@ class ContactTable(NamedTuple):
 
 
 class StepState(NamedTuple):
-    """State between steps; r is the contact force beyond the springs of the linear structure."""
+    """State between steps; r is the contact force minus that of the springs of the linear structure."""
 
     x: FloatArray  # (m + 3 n,) motion and r
     seen: FloatArray  # (3, 3 n) gap, rate, force
@@ -50,7 +49,7 @@ class StepState(NamedTuple):
 
 
 class LawWork(NamedTuple):
-    """What the laws answer at an iterate, and arrays to write on."""
+    """Forces and derivatives of the laws at an iterate, and work arrays."""
 
     seen: FloatArray  # (3, 3 n) gap and rate of the iterate, force
     law: FloatArray  # (2, n_states) states after the step, and where a gap closes
@@ -63,7 +62,7 @@ class LawWork(NamedTuple):
 
 @inner
 def _way(c, state, work, jac):  # type: ignore[no-untyped-def]
-    """Write the way of a gap over the step and the gradient of its normal force; return how much of the force is on the way."""
+    """Write the gap path over the step and the gradient of its normal force; return the share of the force along the path."""
     slope = 0.0
     for d in range(3):
         work.place[3, d] = work.seen[GAP, 3 * c + d] - state.seen[GAP, 3 * c + d]
@@ -74,9 +73,9 @@ def _way(c, state, work, jac):  # type: ignore[no-untyped-def]
 
 @large
 def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-def]
-    """Turn derivatives by the state at the closing into those by gap, rate and state before the step.
+    """Convert derivatives by the state at closure into derivatives by gap, rate and state before the step.
 
-    The place of closing moves with the path: of its change the part along the path is lost, as the time of closing moves.
+    The point of closure moves with the path; the component of its change along the path vanishes, since the time of closure moves.
     """
     n_state, along = there.shape[0] - 3, 0.0
     for d in range(3):
@@ -106,7 +105,7 @@ def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-de
 def evaluate(table, state, work):  # type: ignore[no-untyped-def]  # noqa: C901, PLR0912, PLR0915
     """Fill `work` with forces, new states and derivatives of all contacts at the iterate of gap and rate.
 
-    The law is called at one place of the code, whatever it is asked: each place would be compiled for itself.
+    The law is called at a single place of the code, since each call would be compiled separately.
     """
     places, n = table.places, table.weight.size
     for c in range(n):
@@ -169,7 +168,7 @@ def evaluate(table, state, work):  # type: ignore[no-untyped-def]  # noqa: C901,
 
 
 def law_work(n: int, n_states: int, n_jac: int) -> LawWork:
-    """Return arrays for n contacts with so many states and derivatives."""
+    """Return work arrays for n contacts with these numbers of states and derivatives."""
     return LawWork(
         np.zeros((3, 3 * n)),
         np.zeros((2, n_states)),
@@ -188,9 +187,9 @@ class TimeContacts:
     Parameters
     ----------
     table
-        Their laws as arrays.
+        Laws as arrays.
     start
-        (n_states,) the laws' own initial states, one after the other.
+        (n_states,) initial states of all laws in sequence.
     """
 
     table: ContactTable
@@ -202,16 +201,16 @@ class TimeContacts:
         return self.table.weight.size
 
     def on(self, springs: FloatArray) -> "TimeContacts":
-        """Return the contacts of a structure that has the springs (3 n,)."""
+        """Return the contacts on a structure that contains the springs (3 n,)."""
         return replace(self, table=self.table._replace(springs=springs))
 
     def separate(self, states: FloatArray) -> tuple[FloatArray, ...]:
-        """Return the states of each contact."""
+        """Return the states of each contact separately."""
         return tuple(np.split(states, self.state_places[1:-1])) if self.n else ()
 
     @property
     def state_places(self) -> IntArray:
-        """(n + 1,) where the states of each contact begin among all."""
+        """(n + 1,) offsets of the states of each contact."""
         return np.asarray(self.table.places[STATES])
 
     @property
@@ -221,7 +220,7 @@ class TimeContacts:
 
 
 def time_contacts(laws: Sequence[ContactLaw], weights: FloatArray | None, caller: str) -> TimeContacts:
-    """Lay the laws of contacts out for the time step.
+    """Return the laws of contacts as arrays for the time step.
 
     Parameters
     ----------
@@ -263,7 +262,7 @@ def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
 
 
 def _places(kernels: Sequence[int], parameters: Sequence[FloatArray], states: Sequence[FloatArray]) -> IntArray:
-    """Return (5, n + 1) where everything of each contact is, see `ContactTable.places`."""
+    """Return the (5, n + 1) offsets of each contact; see `ContactTable.places`."""
     sizes = np.array([s.size for s in states], dtype=np.int64)
     widths = [np.array([p.size for p in parameters]), sizes, (3 + sizes) * (12 + sizes)]
     begins = [np.concatenate([[0], np.cumsum(w)]) for w in widths]

@@ -1,8 +1,8 @@
 """A structure with contacts, prepared for time stepping with a step that follows its impacts.
 
-A contact of stiffness k on the mass m that moves with it alone vibrates with √(k/m). An impact lasts half such a vibration. What the step makes
-of it depends on the angle ``√(k/m) h``. Masses on stops, held against an integrator with exact events (`tests/test_step_choice.py`), are off by
-less than 1 % below `FINE` and by 2 % below `ROUGH`. A contact that stays closed needs no fine steps, nor does one that slips.
+A contact of stiffness k with the effective mass m vibrates at √(k/m); an impact lasts half such a vibration. The accuracy depends on the
+angle ``√(k/m) h``. For masses on stops the error against an integrator with exact events (`tests/test_step_choice.py`) is below 1 % for
+angles below `FINE`, and 2 % below `ROUGH`. Contacts that stay closed or slip need no fine steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ MOST_STEPS = 8192  # in a period
 
 
 def step_work(coordinates: int, gaps: int) -> float:
-    """Return about how many floating point operations a step takes: of so many coordinates of a structure, and gaps, three a contact."""
+    """Return an estimate of the floating point operations of a step, from the coordinates of the structure and the gaps (three a contact)."""
     return STEP_FLOPS + 8.0 * coordinates**2 + float(gaps) ** 3
 
 
@@ -80,12 +80,12 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Marcher:
-    """What marches.
+    """A structure with contacts, prepared for time stepping.
 
     Parameters
     ----------
     operators, modes, contacts
-        Matrices of a step, the coordinates they act on, and the laws.
+        Matrices of a step, their coordinates, and the laws.
     labels
         Names of the coordinates.
     """
@@ -113,17 +113,17 @@ class Marcher:
 
     @property
     def slowest(self) -> float:
-        """Share that a period leaves of the slowest free motion, all contacts stuck."""
+        """Share of the slowest free motion that remains after a period, contacts stuck."""
         step = np.linalg.eigvals(self.operators.transfer[: 2 * self.n])
         return float(np.abs(step).max(initial=0.0) ** self.steps)
 
     @property
     def work(self) -> float:
-        """Floating point operations of a period, about; see `step_work`."""
+        """Estimated floating point operations of a period; see `step_work`."""
         return self.steps * step_work(self.n, self.k)
 
     def turn(self, record: Record) -> float:
-        """Return by how much the fastest contact that opens or closes in a record turns within a step, rad: pace times step.
+        """Return the largest phase within a step of a contact that opens or closes in a record, rad: contact frequency times step.
 
         Where it is large the step cannot follow an impact; see `stickslip.response.time.stepping.marcher`.
         """
@@ -133,13 +133,13 @@ class Marcher:
         return step * float(np.max(self.modes.paces[2::3][hits], initial=0.0))
 
     def begun(self, start: TransientStart) -> StepState:
-        """Return a start in the form that the step takes."""
+        """Return an initial state in the form of the time step."""
         states = [np.asarray(s, dtype=float).ravel() for s in start.states]
         motion = self.modes.motion(start.displacement, start.velocity)
         return self.begin(motion, np.concatenate([*states, np.zeros(0)]))[0]
 
     def begin(self, motion: FloatArray, law: FloatArray) -> tuple[StepState, FloatArray]:
-        """Return a state with the forces that its gaps, rates and states of laws (n_states,) have, and the laws' derivatives there."""
+        """Return a state with the contact forces of its gaps, rates and law states (n_states,), and the derivatives of the laws."""
         seen = np.vstack([(self.modes.seen @ motion).reshape(2, self.k), np.zeros((1, self.k))])
         status = np.full((self.contacts.n, 2), -1)  # as if it had not been open before
         state = StepState(np.concatenate([motion, np.zeros(self.k)]), seen, law.copy(), status)
@@ -148,23 +148,23 @@ class Marcher:
         return state, log.jac[0]
 
     def end(self, state: StepState) -> TransientStart:
-        """Return a state as one from which another march can begin."""
+        """Return a state as the start of another march."""
         displacement, velocity = self.modes.physical(state.x[: 2 * self.n])
         states = tuple(s.copy() for s in self.contacts.separate(state.law))
         return TransientStart(displacement, velocity, states)
 
     def record(self, steps: int | None = None) -> Record:
-        """Return room for a period, or for so many steps."""
+        """Return an empty record for a period, or for this number of steps."""
         steps = self.steps if steps is None else steps
         return Record(np.empty((steps, self.n + 2 * self.k)), self.n)
 
     def march(self, state: StepState, record: Record) -> int:
-        """Fill the record with as many steps from t = 0 on; return the number that failed, or -1 if the motion overflowed."""
+        """Fill the record with steps from t = 0 on; return the number of failed steps, or -1 after an overflow."""
         plan = self._run(state, record, self._log(0), {STEPS: len(record.rows)})
         return int(plan[FAILED])
 
     def march_logged(self, state: StepState, record: Record, use: Callable[[StepLog, int], None]) -> int:
-        """March as `march` does, and hand over the log of the laws' derivatives, and how many rows it has, as often as it is full."""
+        """March like `march`, and pass on the log of the derivatives of the laws with its number of rows whenever it is full."""
         steps, taken, failures = len(record.rows), 0, 0
         log = self._log(max(1, min(steps, LOG_NUMBERS // max(self.contacts.log_width, 1))))
         while taken < steps:
@@ -196,7 +196,7 @@ def prepared(
     weights: FloatArray | None = None,
     caller: str = "integrate",
 ) -> Marcher:
-    """Return what marches with `steps` steps a period; the rest as in `integrate`.
+    """Return the prepared structure with `steps` steps a period; other arguments as in `integrate`.
 
     Parameters
     ----------
@@ -215,18 +215,18 @@ def prepared(
 def with_enough_steps(
     made: Callable[[int], Marcher], start: TransientStart, least: int, angle: float = FINE
 ) -> Marcher:
-    """Return a marcher whose step follows the impacts of its first periods.
+    """Return the prepared structure with a step that resolves the impacts of its first periods.
 
     Parameters
     ----------
     made
-        Gives the marcher with so many steps a period.
+        Function that prepares the structure with a number of steps a period.
     start
-        Where the motion begins.
+        Initial state of the motion.
     least
-        Steps in a period, which are doubled as often as necessary, up to `MOST_STEPS`.
+        Least number of steps in a period; it is doubled as often as necessary, up to `MOST_STEPS`.
     angle
-        Largest one, rad.
+        Largest angle, rad.
     """
     marcher = made(least)
     state, record, seen = marcher.begun(start), marcher.record(), 0.0

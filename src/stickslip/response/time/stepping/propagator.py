@@ -54,7 +54,7 @@ class ModalCoordinates:
 
 
 def require_array(name: str, array: FloatArray | ComplexArray, shape: tuple[int, ...]) -> None:
-    """Refuse an array that has another shape or entries that are not finite."""
+    """Refuse an array of another shape or with entries that are not finite."""
     if np.shape(array) != shape:
         raise input_error(name, f"has shape {np.shape(array)}", f"It must be {shape}.")
     if not np.all(np.isfinite(array)):
@@ -66,7 +66,7 @@ def _dense(matrix: Matrix) -> FloatArray:
 
 
 def _paces(structure: Structure, gap_operator: FloatArray, stuck: FloatArray) -> FloatArray:
-    """Return how fast each gap vibrates on its contact's spring, rad/s: of the mass ``1 / B M⁻¹ Bᵀ`` moves with the gap alone."""
+    """Return the frequency of each gap on the spring of its contact, rad/s, with the effective mass ``1 / B M⁻¹ Bᵀ``."""
     mass = _dense(structure.mass)
     try:
         root = scipy.linalg.cholesky(mass, lower=True)
@@ -104,12 +104,12 @@ def step_operators(
     steps: int,
     caller: str = "integrate",
 ) -> tuple[StepOperators, ModalCoordinates, FloatArray]:
-    """Return the matrices of one of `steps` time steps in a period, the coordinates they act on, and the springs (3 n_contacts,) in them.
+    """Return the matrices of one of `steps` time steps in a period, their coordinates, and the springs (3 n_contacts,) in them.
 
     Parameters
     ----------
     stuck
-        (3 n_contacts,) stiffnesses of the contacts where all stick, N/m; the rest as in `integrate`.
+        (3 n_contacts,) stiffness of sticking contacts, N/m; other arguments as in `integrate`.
     caller
         Public function that errors name.
     """
@@ -149,7 +149,7 @@ def step_operators(
 
 
 def _turn(step: FloatArray) -> FloatArray:
-    """Return the (4, n) parts of a step (2n, 2n) of the motion that act within a mode; (0, n) where modes move each other."""
+    """Return the (4, n) entries of a step (2n, 2n) within each mode; (0, n) where modes are coupled."""
     n = len(step) // 2
     parts = [step[a : a + n, b : b + n] for a in (0, n) for b in (0, n)]
     if any(np.any(np.abs(part - np.diag(np.diag(part))) > COUPLED) for part in parts):
@@ -168,11 +168,10 @@ def _motion_matrix(stiffness: FloatArray, damping: FloatArray, modes: ModalCoord
 def _step_exponential(
     motion: FloatArray, gaps: FloatArray, modes: ModalCoordinates, load: PeriodicLoad, step: float
 ) -> FloatArray:
-    """Rows of the motion in the exponential of one block matrix, which holds all that a step needs.
+    """Return the rows of the motion in the exponential of one block matrix with all parts of a step.
 
-    The columns are those of the motion, of the contact force at the beginning of the step, of its increase over the step
-    (it is linear in time), and of the clock ``(1, cos hτ, sin hτ, ...)`` that drives the loads. No stiffness is inverted,
-    so that a free rigid body is welcome.
+    The columns belong to the motion, the contact force at the beginning of the step, its increase over the step (linear in time), and the
+    clock ``(1, cos hτ, sin hτ, ...)`` of the loads. No stiffness is inverted, so free rigid bodies are allowed.
     """
     m, n, k = len(motion), len(motion) // 2, len(gaps)
     orders = sorted(load.harmonics)

@@ -1,7 +1,7 @@
 """Newton's matrix of a time step: derivatives of the contact forces at its end, LU, and steps with it; compiled, without allocations.
 
-With many contacts few change their state in a step. The LU is then kept, and the rows of the matrix that differ from it are
-taken into account by their own small system (Woodbury), until they are a quarter of all.
+Of many contacts only few change their state in a step. The LU is then kept, and changed rows of the matrix enter by a small system
+(Woodbury formula), until they are a quarter of all rows.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -17,7 +17,7 @@ SHARE = 4  # rows that differ from the LU are at most one in so many
 
 
 class Changes(NamedTuple):
-    """Rows in which Newton's matrix differs from the one that its LU is of, at most `most`."""
+    """Rows in which Newton's matrix differs from the factorised one, at most `most`."""
 
     base: FloatArray  # (k, 6): slopes that the LU belongs to; NaN before the first
     taken: IntArray  # (1,) how many differ
@@ -32,7 +32,7 @@ class Changes(NamedTuple):
 
 
 class NewtonWork(NamedTuple):
-    """Arrays that the contact solve writes to, so that no step allocates."""
+    """Work arrays of the contact solution, so that no step allocates."""
 
     moved: FloatArray  # (m,) motion at the end of the step, with r held zero there
     free: FloatArray  # (2k,) gaps and rates then
@@ -50,7 +50,7 @@ class NewtonWork(NamedTuple):
 
 @inner
 def slopes(table, laws, work):  # type: ignore[no-untyped-def]
-    """Write the derivatives of r; return whether the steps are taken with them."""
+    """Write the derivatives of r; return whether the factors already contain them."""
     same = True
     for c in range(table.weight.size):
         columns = 6 + table.places[STATES, c + 1] - table.places[STATES, c]
@@ -67,7 +67,7 @@ def slopes(table, laws, work):  # type: ignore[no-untyped-def]
 
 @inner
 def _column(i, b, k):  # type: ignore[no-untyped-def]
-    """Return where the gap (b < 3) or rate that row i depends on stands in the response."""
+    """Return the index in the response of the gap (b < 3) or rate on which row i depends."""
     first = 3 * (i // 3)
     return first + b if b < 3 else k + first + b - 3
 
@@ -102,7 +102,7 @@ def _take_stiffest(work):  # type: ignore[no-untyped-def]
 
 @inner
 def _room(work):  # type: ignore[no-untyped-def]
-    """Whether the rows that now differ from the LU have room among the changes."""
+    """Whether all rows that differ from the LU fit into the changes."""
     changes = work.changes
     count, most = changes.taken[0], changes.row.size
     if most == 0 or np.isnan(changes.base[0, 0]):
@@ -126,7 +126,7 @@ def _is_factored(work, i):  # type: ignore[no-untyped-def]
 
 @inner
 def _change_row(ops, work, i):  # type: ignore[no-untyped-def]
-    """Write what row i of the matrix has less than that of the LU, and the LU's solution for a unit in it if it is a new one; return its place."""
+    """Write the difference of row i of the LU and of the matrix, for a new row also the solution of its unit vector; return its index."""
     k, changes = work.r.size, work.changes
     at = changes.place[i]
     if at < 0:
@@ -152,7 +152,7 @@ def _change_row(ops, work, i):  # type: ignore[no-untyped-def]
 
 @large
 def factor_slopes(ops, work):  # type: ignore[no-untyped-def]
-    """Make steps those with the slopes: the rows that changed are corrected, or all is factored anew."""
+    """Update the factors to the slopes: changed rows are corrected, or the matrix is factorised anew."""
     if not _room(work):
         factor_anew(ops, work)
         return

@@ -1,7 +1,7 @@
 """The derivative of a run of time steps, for `stickslip.response.time.shooting`.
 
-The state of a motion has a tangent, one column for each direction in which its start may change. The laws' own derivatives,
-logged by the march, make a step of it; steps in a row with the same derivatives are taken by squares of their common matrix.
+The tangent of a state has one column for each direction of its start. The derivatives of the laws, logged by the march, propagate it;
+successive steps with the same derivatives are combined by squaring their common matrix.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,7 +43,7 @@ class TangentOperators:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Where the logged derivatives of contacts with as many states go."""
+    """Positions of the logged derivatives of contacts with equal numbers of states."""
 
     jac: IntArray  # (contacts, (3 + s) (6 + s)) places in a row of the log
     entry: IntArray  # (contacts, (3 + s) 6)
@@ -52,7 +52,7 @@ class Block:
 
 
 def tangent_operators(marcher: Marcher) -> TangentOperators:
-    """Return the matrices that the tangents of a marcher need."""
+    """Return the matrices for the tangents of a prepared structure."""
     ops, k = marcher.operators, marcher.k
     places, begins = marcher.contacts.table.places, marcher.contacts.state_places
     sizes = np.diff(begins)
@@ -100,7 +100,7 @@ def law_derivatives(rows: FloatArray, linear: TangentOperators, n_states: int) -
 
 
 def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
-    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of how a march begins."""
+    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of the beginning of a march."""
     (laws,) = law_derivatives(row[None], linear, n_states)
     k, m = linear.springs.size, linear.seen.shape[1]
     by_motion = laws.force @ linear.seen - linear.springs[:, None] * linear.seen[:k]
@@ -127,7 +127,7 @@ def advanced(log: StepLog, rows: int, tangent: FloatArray, linear: TangentOperat
 
 
 def _steps(count: int, laws: LawDerivatives, tangent: FloatArray, linear: TangentOperators) -> FloatArray:
-    """Carry the tangent over steps with the same derivatives."""
+    """Propagate the tangent over steps with the same derivatives."""
     k = linear.springs.size
     beyond = laws.force.copy()
     beyond[:, :k] -= np.diag(linear.springs)
@@ -141,7 +141,7 @@ def _steps(count: int, laws: LawDerivatives, tangent: FloatArray, linear: Tangen
 
 
 def _holds_still(laws: LawDerivatives) -> bool:
-    """Whether states are forgotten in each step or kept for all: sliders that slip and stick."""
+    """Whether each state is forgotten in every step (slip) or constant (stick)."""
     force, new = laws.force_by_law, laws.law_by_law
     return not (
         np.any(force @ laws.law) or np.any(new @ laws.law) or np.any(force @ new != force) or np.any(new @ new != new)
@@ -156,7 +156,7 @@ def _many(
     tangent: FloatArray,
     linear: TangentOperators,
 ) -> FloatArray:
-    """Carry motion and r over steps in which all states hold still, by squares of ``x -> P x + Q c`` with their constant force c."""
+    """Propagate motion and r over steps with constant states, by squaring ``x -> P x + Q c`` with their constant force c."""
     m, k = linear.hold.shape
     held = np.flatnonzero(np.any(laws.force_by_law, axis=1))
     constant = laws.force_by_law[held] @ tangent[m + k :]
@@ -182,7 +182,7 @@ def _many(
 
 
 def _seen(linear: TangentOperators, motion: FloatArray, *, rates: bool) -> FloatArray:
-    """Return gaps and rates of tangents of motion; rates are zero where nothing asks for them."""
+    """Return gaps and rates of tangents of motion; rates are zero where no law needs them."""
     m, k = linear.hold.shape
     seen = np.zeros((2 * k, motion.shape[1]))
     seen[:k] = linear.seen[:k, : m // 2] @ motion[: m // 2]
@@ -194,7 +194,7 @@ def _seen(linear: TangentOperators, motion: FloatArray, *, rates: bool) -> Float
 def _step(
     laws: LawDerivatives, beyond: FloatArray, newton: FloatArray, tangent: FloatArray, linear: TangentOperators
 ) -> FloatArray:
-    """Carry the tangent over a step: the laws answer to gaps and rates that the change of r at its end moves, too."""
+    """Propagate the tangent over a step; the gaps and rates also depend on the change of r at its end."""
     m, k = linear.hold.shape
     states = tangent[m + k :]
     motion = linear.free @ tangent[: m + k]
@@ -210,7 +210,7 @@ def _step(
 
 
 def kept(monodromy: FloatArray, places: Sequence[int] | IntArray) -> IntArray:
-    """Return which of the states at `places` the period leaves as they are, whatever the others are."""
+    """Return which of the states at `places` stay constant over the period, whatever the others are."""
     rows = monodromy[places].copy()
     rows[np.arange(len(places)), places] -= 1.0
     return np.asarray(np.asarray(places)[~np.any(rows, axis=1)])

@@ -1,8 +1,8 @@
 """The compiled time step of `stickslip.response.time.transient`, for contacts of any law.
 
-The linear structure with every contact stuck is carried over the step exactly, the contact force beyond the stuck springs,
-r, as a line. Its end is the unknown: the laws answer the gaps and rates that it leads to. A contact that sticks answers the
-same r whatever its gap.
+The linear structure with all contacts stuck is propagated exactly. The contact force beyond the stuck springs, r, is linear within the
+step, and its value at the end is the unknown: it must equal the force of the laws at the resulting gaps and rates. A sticking contact
+has the same r for any gap.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -55,7 +55,7 @@ class StepOperators(NamedTuple):
 
 
 class StepLog(NamedTuple):
-    """Derivatives of the laws in every step, each kept once for steps in a row that have the same."""
+    """Derivatives of the laws in every step, stored once for successive steps with the same derivatives."""
 
     jac: FloatArray  # (rows, ...) as `LawWork.jac`
     steps: IntArray  # (rows,) steps in a row
@@ -68,7 +68,7 @@ BEGIN, FIRST, STEPS, LOGS, TAKEN, FAILED, ROWS = range(7)
 
 @inner
 def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
-    """``out += matrixᵀ x`` of as many columns as there is room for: plain loops, because calling a threaded BLAS costs more than it saves at this size."""
+    """``out += matrixᵀ x`` for all columns that fit, as plain loops: at this size the call of a threaded BLAS costs more than it saves."""
     whole = x.size - x.size % 4
     for j in range(0, whole, 4):
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
@@ -81,7 +81,7 @@ def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
-    """Write how far r at the iterate is from what the laws answer; return the largest change of a gap that this makes."""
+    """Write the difference of r at the iterate from the force of the laws; return the largest change of a gap by it."""
     k, largest = work.r.size, 0.0
     for i in range(k):
         work.defect[i] = laws.seen[FORCE, i] - table.springs[i] * laws.seen[GAP, i] - work.r[i]
@@ -110,7 +110,7 @@ def _at_guess(ops, laws, work):  # type: ignore[no-untyped-def]
 
 @inner
 def _foresee(state, laws, work):  # type: ignore[no-untyped-def]
-    """Put r where it ends if the laws go on as the LU has them: exact while piecewise linear laws stay in their states."""
+    """Predict r with the factorised derivatives; exact while piecewise-linear laws stay in their states."""
     k = work.r.size
     if k == 0 or np.isnan(work.factored[0, 0]):
         return
@@ -132,7 +132,7 @@ def _foresee(state, laws, work):  # type: ignore[no-untyped-def]
 
 @large
 def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
-    """Begin anew as if all contacts stuck or stayed open: between slip one way and the other steep laws have their solution."""
+    """Restart with all contacts stuck or open; steep laws have their solution between slip in both directions."""
     k = work.r.size
     m = state.x.size - k
     for i in range(k):
@@ -148,8 +148,8 @@ def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
 def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-untyped-def]
     """Semi-smooth Newton for r at the end of a step; return whether it reached rounding.
 
-    Where all laws are piecewise linear a step that ends in the states it was taken in is exact. Unless it `solves`, the laws
-    are asked about gaps and rates as they are.
+    For piecewise-linear laws a step that ends in its initial states is exact. Without `solves` the laws are evaluated at the given gaps and
+    rates.
     """
     for iteration in range(-1, NEWTON_STEPS):
         if iteration == FULL_STEPS:
@@ -175,7 +175,7 @@ def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-u
 
 @inner
 def _turn(turn, x, out):  # type: ignore[no-untyped-def]
-    """Add what the motion of each mode alone comes to."""
+    """Add the propagated motion of each mode."""
     n = turn.shape[1]
     for j in range(n):
         out[j] += turn[0, j] * x[j] + turn[1, j] * x[n + j]
@@ -184,7 +184,7 @@ def _turn(turn, x, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _take_over(table, state, laws):  # type: ignore[no-untyped-def]
-    """Make what the laws answered the state, r with it."""
+    """Accept the forces and states of the laws as the new state."""
     k = table.springs.size
     m = state.x.size - k
     for i in range(k):
@@ -232,7 +232,7 @@ def _write(row, state, n):  # type: ignore[no-untyped-def]
 
 @inner
 def _predict(ops, state, work, step):  # type: ignore[no-untyped-def]
-    """Write motion, gaps and rates at the end of a step with r held zero there; the first guess of r is that it does not change."""
+    """Write motion, gaps and rates at the end of a step with zero r there; the first guess of r is its last value."""
     n, k, moved, free = ops.gaps.shape[1], work.r.size, work.moved, work.free
     for j in range(moved.size):
         moved[j] = ops.drive[step, j]
@@ -248,7 +248,7 @@ def _predict(ops, state, work, step):  # type: ignore[no-untyped-def]
 
 @inner
 def _move(ops, state, work):  # type: ignore[no-untyped-def]
-    """Add what r at the end of the step does to the motion."""
+    """Add the effect of r at the end of the step to the motion."""
     moved, m = work.moved, work.moved.size
     _accumulate(ops.hold, state.x[m:], moved)
     for j in range(m):
@@ -256,7 +256,7 @@ def _move(ops, state, work):  # type: ignore[no-untyped-def]
 
 
 def _run_steps(table, ops, state, laws, work, record, log, plan):  # type: ignore[no-untyped-def]
-    """Take the steps of `plan`, as many as the log has room for."""
+    """Take the steps of `plan` until the log is full."""
     k, n = table.springs.size, ops.gaps.shape[1]
     for j in range(k):
         laws.seen[GAP, j], laws.seen[RATE, j] = state.seen[GAP, j], state.seen[RATE, j]
