@@ -251,13 +251,9 @@ def variables_of_tractions() -> str:
 
 def variables_of_models() -> str:
     """Return what the linear analyses say of the model."""
-    from stickslip.analyses.waves.records.about import NUMBERS
+    from stickslip.analyses.facts import ModelFacts
 
-    rows = [
-        f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
-        for name, (dims, units, about) in NUMBERS.items()
-    ]
-    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
+    return _variables(ModelFacts)
 
 
 def _unit(units: str) -> str:

@@ -95,6 +95,34 @@ def test_variables_say_unit_meaning_and_dimensions() -> None:
     assert set(documented) - set(told) == {"rings", "leaf_later"}  # what is None has no variable
 
 
+def test_variables_have_the_order_of_the_fields() -> None:
+    @dataclass(frozen=True, eq=False, kw_only=True)
+    class Hedge:
+        leaves: tuple[Leaf, ...] = rows("leaf")
+        length: float = column("m", "length of the hedge")
+
+    assert list(variables(Hedge(length=2.0, leaves=(Leaf(size=1.0, green=True, word="a"),))))[-1] == "length"
+
+
+def test_rows_may_have_variables_of_length_zero() -> None:
+    @dataclass(frozen=True, eq=False, kw_only=True)
+    class Bough:
+        number: int = column("1", "number of the bough")
+        leaves: tuple[Leaf, ...] = rows("leaf", "leaf_", "index of the bough", always=True)
+
+    @dataclass(frozen=True, eq=False, kw_only=True)
+    class Bush:
+        boughs: tuple[Bough, ...] = rows("bough")
+
+    bare = Bush(boughs=(Bough(number=0),))
+    found = variables(bare)
+    kinds = {name: found[name].dtype.kind for name in found if name != "number"}
+    assert kinds == {"leaf_bough": "i", "leaf_size": "f", "leaf_green": "i", "leaf_word": "U", "leaf_later": "f"}
+    assert all(found[name].shape == (0,) for name in kinds)
+    assert record_of(Bush, found).boughs[0].leaves == ()
+    assert variables(Bush()) == {}
+
+
 def test_a_value_that_one_row_lacks_is_no_variable() -> None:
     first, second = (Leaf(size=1.0, green=True, word="a", later=later) for later in (1.0, None))
     branch = Branch(number=0, omega=1.0, along=np.zeros(1), leaves=(first, second))

@@ -17,7 +17,8 @@ import xarray as xr
 
 from stickslip.analyses.all_motions.dataset import dataset as of_motions
 from stickslip.analyses.all_motions.dataset import noted
-from stickslip.analyses.columns import described
+from stickslip.analyses.columns import described, variables
+from stickslip.analyses.facts import ModelFacts
 from stickslip.analyses.forced_response.records.columns import KINDS
 from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
@@ -37,7 +38,7 @@ from stickslip.analyses.run_up.fast import name_of
 from stickslip.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
 from stickslip.analyses.run_up.values import dataset as of_run_up
 from stickslip.analyses.waves.of_wheel import variables as of_wheel
-from stickslip.analyses.waves.records.about import STATIC, skin_note, told
+from stickslip.analyses.waves.records.about import STATIC, skin_note
 from stickslip.analyses.waves.records.about import _static as static_numbers
 from stickslip.reduction.waves import wave
 from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC, Basins, share_interval
@@ -813,7 +814,7 @@ def test_static_numbers_of_a_model_and_its_skin() -> None:
     state: Any = SimpleNamespace(speed=500.0 * RPM, displacement=1e-3, strain=2e-3, rotation=3e-3)
     note = {**static_numbers(state), "stage_waves": [0, 3], "axis_origin": [1.0, 2.0, 3.0]}
     check(
-        told(note),
+        variables(ModelFacts(**note)),
         static_rpm=500.0,
         static_displacement_m=1e-3,
         static_strain=2e-3,
@@ -824,7 +825,7 @@ def test_static_numbers_of_a_model_and_its_skin() -> None:
     assert all(np.isnan(static_numbers(None)[name]) for name in STATIC)
     skin = SimpleNamespace(points=np.eye(3), triangles=np.array([[0, 1, 2]]), cut=np.array([1]))
     model: Any = SimpleNamespace(skin=skin)
-    check(told(skin_note(model)), skin_point=np.eye(3), skin_triangle=[[0, 1, 2]], skin_cut=[1])
+    check(variables(ModelFacts(**skin_note(model))), skin_point=np.eye(3), skin_triangle=[[0, 1, 2]], skin_cut=[1])
 
 
 def test_waves_have_the_diameters_of_their_numbers() -> None:
@@ -833,6 +834,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
 
 RECORDS = (
     LimitCycles,
+    ModelFacts,
     ModalSynthesis,
     NonlinearModes,
     QuasiPeriodic,

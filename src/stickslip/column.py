@@ -46,11 +46,14 @@ class Rows:
     owner
         Meaning of the variable ``prefix + dimension of the owner``, the index of the record that contains a row; empty if the rows belong
         to the case itself.
+    always
+        Whether a result without any records has the variables, of length zero.
     """
 
     dim: str
     prefix: str = ""
     owner: str = ""
+    always: bool = False
 
 
 def column(
@@ -60,9 +63,9 @@ def column(
     return field(default=default, metadata={"column": Column(unit, meaning, name, per, tuple(along.split()))})
 
 
-def rows(dim: str, prefix: str = "", owner: str = "") -> Any:
+def rows(dim: str, prefix: str = "", owner: str = "", *, always: bool = False) -> Any:
     """Return a field that holds a tuple of records; see `Rows`."""
-    return field(default=(), metadata={"rows": Rows(dim, prefix, owner)})
+    return field(default=(), metadata={"rows": Rows(dim, prefix, owner, always)})
 
 
 def columns_of(kind: type[Any]) -> dict[str, Column]:

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import variables
-from stickslip.analyses.waves.records.about import told
+from stickslip.analyses.facts import ModelFacts, facts_in
 from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
 from stickslip.study.store.netcdf import alike, one_case, stacked
@@ -52,7 +52,7 @@ def of_answers(
     """Return the node of all cases, as `of_cases`; `answer` turns the content of a job into one record."""
     answers = [answer(one) for one in solved]
     labels = [one.case.label for one in solved]
-    models = [told(one.notes.get("model", {})) for one in solved]
+    models = [variables(ModelFacts(**facts_in(one.notes))) for one in solved]
     cases = [model | variables(own) for model, own in zip(models, answers, strict=True)]
     found = [v for label, own in zip(labels, answers, strict=True) for v in verdicts(label, own)]
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": sum(map(lost, answers))}

@@ -1,6 +1,7 @@
 """Conversion between the record of a case and the variables of a result (`stickslip.column` describes the fields)."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from functools import cache
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -19,12 +20,17 @@ CASE = "case"  # the dimension of cases, which a record of one case lacks
 
 
 def variables(record: Any) -> dict[str, xr.Variable]:
-    """Return the variables of the record of a case; fields that are None or empty have none."""
+    """Return the variables of the record of a case in the order of its fields; fields that are None or empty have none."""
     kind = type(record)
-    found = {c.name or name: _stored(c, (), getattr(record, name)) for name, c in columns_of(kind).items()}
-    for name, inner in rows_of(kind).items():
-        found |= _of_rows(_row_type(kind, name), inner, getattr(record, name))
-    return {name: v for name, v in found.items() if v is not None and v.size}
+    columns, inner = columns_of(kind), rows_of(kind)
+    found: dict[str, xr.Variable] = {}
+    for name in (f.name for f in fields(record)):
+        value = getattr(record, name)
+        if name in columns:
+            found |= _told(columns[name].name or name, _stored(columns[name], (), value))
+        elif name in inner:
+            found |= _of_rows(_row_type(kind, name), inner[name], value)
+    return found
 
 
 def record_of(
@@ -59,20 +65,27 @@ def described(kind: type[Any], dim: str = "", prefix: str = "") -> Iterator[tupl
         yield from described(_row_type(kind, name), inner.dim, inner.prefix)
 
 
-def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.Variable | None]:
-    found: dict[str, xr.Variable | None] = {}
-    if not records:
+def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.Variable]:
+    found: dict[str, xr.Variable] = {}
+    if not records and not of.always:
         return found
     for name, c in columns_of(kind).items():
         each = [getattr(one, name) for one in records]
         told = None if any(value is None for value in each) else each
-        found[of.prefix + (c.name or name)] = _stored(c, (of.dim,), told)
+        if not records:
+            told = np.zeros(0, type(MISSING[_plain_type(kind, name)]))
+        found |= _told(of.prefix + (c.name or name), _stored(c, (of.dim,), told), always=not records)
     for name, inner in rows_of(kind).items():
         own = [getattr(one, name) for one in records]
         owner = np.repeat(np.arange(len(own)), [len(each) for each in own])
-        found[inner.prefix + of.dim] = variable(inner.dim, owner, "1", inner.owner)
+        found |= _told(inner.prefix + of.dim, variable(inner.dim, owner, "1", inner.owner), always=inner.always)
         found |= _of_rows(_row_type(kind, name), inner, [row for each in own for row in each])
     return found
+
+
+def _told(name: str, found: xr.Variable | None, *, always: bool = False) -> dict[str, xr.Variable]:
+    """Return a variable by its name; none if it is empty."""
+    return {} if found is None or not (found.size or always) else {name: found}
 
 
 def _stored(c: Column, own: tuple[str, ...], value: Any) -> xr.Variable | None:

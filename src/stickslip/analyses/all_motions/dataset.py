@@ -8,7 +8,8 @@ import xarray as xr
 
 from stickslip.analyses.all_motions.verdicts import case_verdicts
 from stickslip.analyses.collected import Variables, of_cases, rows
-from stickslip.analyses.waves.records.about import told
+from stickslip.analyses.columns import variables as variables_of
+from stickslip.analyses.facts import ModelFacts, facts_in
 from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC
 from stickslip.response.all_motions.found import AllMotions, AtFrequency
 from stickslip.study.analysis import Solved
@@ -25,7 +26,7 @@ def _of_case(solved: Solved) -> Variables:
     """Return the variables of a case: those of its last note, which is written when the search is over."""
     model = solved.notes.get("model", {})
     found = solved.notes.get("found", {})
-    variables = told(model) | {
+    variables = variables_of(ModelFacts(**facts_in(solved.notes))) | {
         "output": variable("", str(model.get("output", "")), "1", "output whose amplitude is given")
     }
     return variables | {

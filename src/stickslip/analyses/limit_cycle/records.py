@@ -97,7 +97,6 @@ class LimitCycles(KeptMotions):
     linear_damping_ratio: FloatArray | None = column(
         "1", "their damping ratio; negative: they grow", along="linear mode", default=None
     )
-    branches: tuple[CycleBranch, ...] = rows("branch")
     time: FloatArray | None = column(
         "s", "time since the mixed start of all unstable waves", along="window", default=None
     )
@@ -108,6 +107,7 @@ class LimitCycles(KeptMotions):
     outcome_missing: str | None = column(
         "1", "why there is no mixed start; empty where there is one or it was not asked for", default=None
     )
+    branches: tuple[CycleBranch, ...] = rows("branch")
 
     @property
     def cycles(self) -> list[tuple[CycleBranch, Cycle]]:

@@ -140,8 +140,8 @@ class ModalSynthesis:
     cycle_amplitude: FloatArray | None = column(
         "m", "amplitudes at which the damping is zero: limit cycles", along="cycle", default=None
     )
-    levels: tuple[SynthesisLevel, ...] = rows("level")
     passage_hz_per_s: FloatArray | None = column("Hz/s", "rates of the passages", along="rate", default=None)
+    levels: tuple[SynthesisLevel, ...] = rows("level")
 
     @property
     def direct(self) -> bool:

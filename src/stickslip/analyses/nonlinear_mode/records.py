@@ -199,7 +199,6 @@ class NonlinearModes(KeptMotions):
     """Record of a case."""
 
     output: str = column("1", "output whose amplitude is told", default="")
-    branches: tuple[ModeBranch, ...] = rows("branch")
     retained_displacement: FloatArray | None = column(
         "m",
         "the motion in each harmonic: the real and the imaginary part",
@@ -210,6 +209,7 @@ class NonlinearModes(KeptMotions):
         "m", "the same of the outputs", along="branch point harmonic reported part", default=None
     )
     concept: str | None = column("1", "which motions the modes are made of", default=None)
+    branches: tuple[ModeBranch, ...] = rows("branch")
 
 
 def answer(solved: Solved) -> NonlinearModes:

@@ -127,9 +127,9 @@ class ResidualTractions:
     output: str | None = column("1", "output whose amplitude is bounded", default=None)
     excitation_n: float | None = column("N", "amplitude of the harmonic force", default=None)
     harmonics: int | None = column("1", "highest harmonic of the motions", default=None)
+    spring: Any = column("1", "contact of each spring that has a start", along="traction_spring", default=None)
     points: tuple[TractionPoint, ...] = rows("traction_point")
     resonances: tuple[TractionResonance, ...] = rows("bound")
-    spring: Any = column("1", "contact of each spring that has a start", along="traction_spring", default=None)
     ends: tuple[ConfirmedEnd, ...] = rows("end")
 
     @property

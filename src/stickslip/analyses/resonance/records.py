@@ -43,8 +43,6 @@ class Resonances:
     output: str = column("1", "output whose amplitude peaks")
     parameter: str = column("1", "what varies")
     by: str = column("1", "what makes a peak")
-    peaks: tuple[PeakCurve, ...] = rows("peak")
-    overtakings: tuple[Overtaking, ...] = rows("overtaking", "overtaking_")
     smallest_value: float | None = column(
         "1", "value of the parameter at which the highest peak is lowest", default=None
     )
@@ -52,6 +50,8 @@ class Resonances:
     smallest_frequency_hz: float | None = column(
         "Hz", "frequency there; NaN where two peaks are equally high", default=None
     )
+    peaks: tuple[PeakCurve, ...] = rows("peak")
+    overtakings: tuple[Overtaking, ...] = rows("overtaking", "overtaking_")
 
     @property
     def smallest(self) -> tuple[float, float, float] | None:

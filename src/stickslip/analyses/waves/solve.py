@@ -10,7 +10,8 @@ from typing import TypeVar
 import numpy as np
 import scipy
 
-from stickslip.analyses.waves.records.about import ABOUT, about, skin_note
+from stickslip.analyses.facts import NOTE
+from stickslip.analyses.waves.records.about import about, skin_note
 from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes, Wheel
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import flow_around, holding_points
@@ -181,10 +182,10 @@ class Question:
 
 def each_wave(solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes) -> Iterator[W]:
     """Yield the records of unfinished waves; the note about the model comes first."""
-    if notes.get(ABOUT) is None:
+    if notes.get(NOTE) is None:
         note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1], asked.left_out)
         note |= {"parted": asked.wheel.parted}
-        notes.put(ABOUT, note | (skin_note(asked.model) if asked.shapes else {}))
+        notes.put(NOTE, note | (skin_note(asked.model) if asked.shapes else {}))
     known = {w.wave_number for w in done}
     for i, number in enumerate(asked.numbers):
         if number not in known:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.facts import facts_of
-from stickslip.analyses.waves.records.about import ABOUT, STATIC
+from stickslip.analyses.facts import NOTE, facts_of
+from stickslip.analyses.waves.records.about import STATIC
 from stickslip.analyses.waves.records.results import WaveModes
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
@@ -65,8 +65,8 @@ def stages_question(model: Model, diameters: Sequence[int] | None, n_modes: int)
 
 def each_diameter(asked: StagesQuestion, done: Sequence[WaveModes], notes: Notes) -> Iterator[WaveModes]:
     """Yield the modes of unfinished nodal diameters; the note about the model comes first."""
-    if notes.get(ABOUT) is None:
-        notes.put(ABOUT, _about(asked))
+    if notes.get(NOTE) is None:
+        notes.put(NOTE, _about(asked))
     known = {w.wave_number for w in done}
     for i, number in enumerate(asked.numbers):
         if number not in known:

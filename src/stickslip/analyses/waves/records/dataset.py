@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.waves.records.about import ABOUT, told
+from stickslip.analyses.columns import variables
+from stickslip.analyses.facts import NOTE, ModelFacts, facts_in
 from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes, wave_name
 from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
@@ -32,9 +33,11 @@ def dataset(solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variable
     cases = []
     doubts: list[Verdict] = []
     for one in solved:
-        note = one.notes.get(ABOUT, {})
+        note = one.notes.get(NOTE, {})
         own, said = of_case(one) if one.records else ({}, [])
-        cases.append(told(note) | _of_waves(one.records, int(note.get("sectors", 1))) | own)
+        cases.append(
+            variables(ModelFacts(**facts_in(one.notes))) | _of_waves(one.records, int(note.get("sectors", 1))) | own
+        )
         own_doubts = (*from_json(note.get("verdicts", "[]")), *said)
         doubts += [replace(v, case=one.case.label) for v in own_doubts]
     data = stacked(cases)
