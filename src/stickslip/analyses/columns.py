@@ -71,9 +71,8 @@ def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.
         return found
     for name, c in columns_of(kind).items():
         each = [getattr(one, name) for one in records]
-        told = None if any(value is None for value in each) else each
-        if not records:
-            told = np.zeros(0, type(MISSING[_plain_type(kind, name)]))
+        none = np.zeros(0, type(MISSING.get(_plain_type(kind, name), 0.0)))
+        told = None if any(value is None for value in each) else each or none
         found |= _told(of.prefix + (c.name or name), _stored(c, (of.dim,), told), always=not records)
     for name, inner in rows_of(kind).items():
         own = [getattr(one, name) for one in records]
