@@ -9,8 +9,7 @@ import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from stickslip.contact.surface import Surface, nodal_surface
-from stickslip.model.dofs import nodal_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, nodal_dofs
 
 YOUNG, POISSON, DENSITY = 210e9, 0.3, 7850.0
 

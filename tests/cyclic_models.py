@@ -7,9 +7,8 @@ import scipy.sparse
 import scipy.spatial
 
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs, nodal_dofs
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, nodal_dofs
 from stickslip.reduction.cyclic import CyclicSector
 
 Z = Axis()

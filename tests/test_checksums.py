@@ -11,8 +11,7 @@ import xarray as xr
 
 from stickslip.errors import InputError
 from stickslip.model.checksum import LENGTH, add_checksum, checked, with_checksum
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.model.structure_file import load_structure, save_structure
 from stickslip.study.store.archive import PartStore
 from stickslip.study.store.netcdf import attributes_there, read_tree, write_tree

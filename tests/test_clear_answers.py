@@ -18,12 +18,11 @@ import stickslip as ss
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError, did_you_mean, missing_package, nearest_and_known
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
-from stickslip.model.dofs import Dofs
 from stickslip.model.facts import unlike_units
 from stickslip.model.fe.solid import Material
 from stickslip.model.matrices import chain
 from stickslip.model.part import solid_part
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.system import System
 from stickslip.solve.krylov import Krylov

@@ -15,8 +15,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import numbered_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_points, forced_response
 from stickslip.response.forced.sweep import Sweep

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel, wheel_shape
 from stickslip.reduction.turning import dof_rotation

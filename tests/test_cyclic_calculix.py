@@ -8,9 +8,8 @@ import pytest
 import scipy.sparse
 
 from evidence.validation.reference_data import COMPLETE
-from stickslip.model.dofs import Dofs
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 
 FOLDER = COMPLETE / "calculix"

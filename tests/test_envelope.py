@@ -14,8 +14,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.rotating.envelope import SweepInTime, envelope
 from stickslip.response.system import System
 from stickslip.units import RPM

@@ -20,8 +20,8 @@ from stickslip.assembly.build import flow_around
 from stickslip.assembly.fluid.aero_forces import largest_displacements, phases
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
-from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
+from stickslip.model.structure import nodal_dofs
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction import InfluenceCoefficients
 from stickslip.response.rotating.flutter import flutter_of_wave

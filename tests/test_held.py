@@ -20,11 +20,10 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.polynomial_spring import PolynomialSpring
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
-from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.part import rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 

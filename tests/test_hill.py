@@ -15,8 +15,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.harmonic_set import to_complex, to_real
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.stability import hill_exponents, hill_stability, motion_stability, stability, wave_disturbances
 from stickslip.response.stability.flow_map.contact_states import located_states
 from stickslip.response.stability.hill_method.contact_tangent import contact_tangents

@@ -29,8 +29,7 @@ from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.harmonic.shared_factor import SharedFactor, SharedInverses
 from stickslip.harmonic.structured import HarmonicFactors, StructuredJacobian, real_matrix
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.operators import Bordered, Costs, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_problem, forced_response

@@ -24,8 +24,7 @@ from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.travelling import TravellingStiffness, condense_side
 from stickslip.harmonic.wave_condensation import ModalWave, SolvedWave, condense_wave
-from stickslip.model.dofs import modal_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, modal_dofs
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.full_wheel import wheel

@@ -12,8 +12,7 @@ from stickslip.analyses.forced_response.records.bounds import localisation, whit
 from stickslip.api.study import Study
 from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
-from stickslip.model.dofs import numbered_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.mistuned import mistuned_wheel
 
 ROOT = Path(__file__).parents[1]

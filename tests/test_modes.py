@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError, SingularError
-from stickslip.model.dofs import Dofs, nodal_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.lanczos import lanczos
 from stickslip.model.matrices import chain
 from stickslip.model.modes import Modes, lowest_modes, natural_frequencies, normal_modes
 from stickslip.model.rigid.motion import refuse_unheld
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join, nodal_dofs
 
 pytestmark = pytest.mark.kernel
 

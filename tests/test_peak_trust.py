@@ -12,10 +12,9 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import Damping
-from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.part import solid_part
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.choice import Reduction
 from stickslip.response.forced import other_motions
 from stickslip.response.forced.problem import forced_problem

@@ -10,8 +10,7 @@ import stickslip as ss
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import numbered_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep

@@ -42,8 +42,7 @@ from stickslip.analyses.forced_response.verdicts.rules import fewer
 from stickslip.cli import app
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
-from stickslip.model.dofs import numbered_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance

@@ -5,10 +5,9 @@ import pytest
 import scipy.sparse
 
 from stickslip.errors import InputError
-from stickslip.model.dofs import Dofs, modal_dofs, nodal_dofs
 from stickslip.model.matrices import chain, lumped
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join, modal_dofs, nodal_dofs
 from stickslip.reduction.fixed_interface import craig_bampton
 
 

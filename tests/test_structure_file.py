@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from stickslip import InputError
 from stickslip.model import chain, load_structure, save_structure
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 
 def travelling() -> Structure:

@@ -12,11 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
-from stickslip.model.dofs import modal_dofs
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import chain
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.structure import join
+from stickslip.model.structure import join, modal_dofs
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton

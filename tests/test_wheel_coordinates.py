@@ -14,8 +14,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.neighbours import neighbour_gaps
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.full_wheel import _from_wheel, wheel
 from stickslip.reduction.tuned import tuned_wheel

@@ -8,8 +8,7 @@ from evidence.models.lumped import blades_and_damper
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.time.start import TransientStart, start_from_harmonics
 
 # Exact event-driven |X1| of the oscillator with a friction damper (after Griffin 1980): m = 1, k = 1, c = 0.02,

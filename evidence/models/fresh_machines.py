@@ -35,8 +35,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import Iwan
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.forced.response import Sweep
 from stickslip.response.system import System
 

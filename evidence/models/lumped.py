@@ -10,8 +10,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.system import System
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.model.damping import modal_damping
-from stickslip.model.dofs import Dofs
 from stickslip.model.matrices import lumped
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.tuned import TunedWheel, tuned_wheel

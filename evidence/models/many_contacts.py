@@ -17,9 +17,8 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.model.damping import rayleigh_damping
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.system import System
 

@@ -41,9 +41,8 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join
 from stickslip.response.forced.response import Sweep
 from stickslip.response.system import System
 

@@ -9,8 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join
 from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.free_interface import rubin

@@ -11,8 +11,7 @@ from stickslip.contact.laws.dahl import Dahl
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import Iwan
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.system import System
 
 LAWS: dict[str, ContactLaw] = {

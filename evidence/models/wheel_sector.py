@@ -16,9 +16,8 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.damping import rayleigh_damping
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
-from stickslip.model.structure import Structure, join
+from stickslip.model.structure import Dofs, Structure, join
 from stickslip.reduction.contact_coordinates import in_relative_coordinates
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.fixed_interface import craig_bampton

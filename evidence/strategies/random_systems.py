@@ -34,8 +34,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.equilibrium import preload, static_contact_force
 from stickslip.response.system import System
 

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 import stickslip as ss
 from evidence.trust.draw import Contact, Machine
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 
 @dataclass(frozen=True)

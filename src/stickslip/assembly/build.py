@@ -1,7 +1,7 @@
 """Assembly of a model: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -10,11 +10,10 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
-from stickslip.assembly.coordinates import coordinates
+from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.fluid.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.joints.gap_coordinates import held_gaps, in_gaps, in_points, refuse_mixed_gaps
-from stickslip.assembly.joints.interface_modes import KEY, on_shapes
 from stickslip.assembly.joints.pairs import Pairs
 from stickslip.assembly.joints.unconstrained_bodies import held_warnings, refuse_pulled
 from stickslip.assembly.locations import picked, stacked
@@ -25,18 +24,20 @@ from stickslip.assembly.sides.unreduced import as_it_is, refuse_rigid
 from stickslip.assembly.sides.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
+from stickslip.reduction.fixed_interface import reduce_interface
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.equilibrium import preload, pressed_by, static_contact_force
 from stickslip.response.system import System
 
 MODES = 10  # natural frequencies compared
 UNKNOWN = Frequencies(*(np.zeros(0),) * 4)
+INTERFACE_MODES = "reduction.interface_modes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +165,9 @@ def linear_side(
     if model.neighbours is None:
         return _of_one(model, (kept, needed, np.concatenate([stay, bodies])), store)
     if model.interface_modes is not None:
-        raise input_error(KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel.")
+        raise input_error(
+            INTERFACE_MODES, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
+        )
     flow = flow_around(model, store)
     found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store, more, flow)
     at = model.coordinates
@@ -233,7 +236,7 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
     at = coordinates(np.concatenate(ids), model.ties)
     structure = at.tied(join(**{name: part.structure for name, part in parts.items()}))
     steady = at.load(np.concatenate([part.steady for part in parts.values()]))
-    few = on_shapes(model, structure, at, needed)
+    few = _on_shapes(model, structure, at, needed)
     gaps = few.columns(at.columns(model.pairs.own))
     found = in_gaps(model.pairs, few.structure, gaps)
     if found.place is None:
@@ -365,3 +368,72 @@ def contact_table(pairs: Pairs) -> ContactTable:
     """Return the table of the contact points for results."""
     laws = tuple(law_name(law) for law in pairs.laws)
     return ContactTable(pairs.names, pairs.groups, laws, pairs.position, pairs.frame, pairs.area)
+
+
+@dataclass(frozen=True, eq=False)
+class OnShapes:
+    """Joined structure whose joined surfaces may move in a few shapes.
+
+    Parameters
+    ----------
+    structure
+        The structure, without `basis`.
+    way
+        (n0, n) CSR from the new to the previous coordinates; None: they are the same.
+    place
+        (n0,) new position of each previous coordinate; -1 where shapes replace it.
+    """
+
+    structure: Structure
+    way: Matrix | None
+    place: IntArray
+
+    def columns(self, operator: Matrix) -> Matrix:
+        """Return an operator (m, n0) on the previous coordinates as one (m, n) on the new ones."""
+        return operator if self.way is None else scipy.sparse.csr_array(operator @ self.way)
+
+    def load(self, force: Matrix) -> Matrix:
+        """Return a load (n0,) on the previous coordinates as one (n,) on the new ones."""
+        return force if self.way is None else np.asarray(self.way.T @ force)
+
+
+def _on_shapes(model: Model, structure: Structure, at: Coordinates, needed: IntArray) -> OnShapes:
+    """Reduce joined surfaces to characteristic shapes, if the model has `interface_modes`.
+
+    Parameters
+    ----------
+    model
+        The model; `Model.interface_modes` is the number of shapes.
+    structure
+        All parts, reduced and joined.
+    at
+        Coordinates of the structure.
+    needed
+        Dofs of all parts that must stay coordinates, because contacts, loads, outputs or bodies use them.
+
+    Raises
+    ------
+    InputError
+        If no joined dofs are left to reduce.
+    """
+    same = OnShapes(structure, None, np.arange(structure.n))
+    if model.interface_modes is None:
+        return same
+    own = at.ids[at.stays]
+    joined = np.isin(own, np.union1d(model.ties.followers, model.ties.weights.nonzero()[1]))
+    joined[np.unique(at.columns(picked(needed, model.places.n)).nonzero()[1])] = False
+    interface = np.flatnonzero(joined & (own >= 0))
+    if not interface.size:
+        raise input_error(
+            INTERFACE_MODES,
+            f"is {model.interface_modes}, and no joined node is free for it: contacts, loads and outputs stay physical",
+            "Leave it out, or join surfaces beside them.",
+        )
+    try:
+        few = reduce_interface(structure, interface, min(model.interface_modes, interface.size))
+    except InputError as error:
+        raise error.inside(INTERFACE_MODES) from None
+    others = np.setdiff1d(np.arange(structure.n), interface)
+    place = np.full(structure.n, -1)
+    place[others] = np.arange(others.size)
+    return OnShapes(replace(few, basis=None), scipy.sparse.csr_array(few.basis), place)

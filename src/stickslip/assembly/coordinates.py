@@ -8,8 +8,7 @@ import scipy
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.joints.ties import Ties
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import in_coordinates, surviving_sets
 
 

@@ -20,8 +20,7 @@ from stickslip.assembly.load import Load, Output
 from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.parts.reduced import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning
-from stickslip.assembly.sides.stages import is_staged, stages_of
-from stickslip.assembly.sides.wheel import Neighbours, neighbours, with_joins
+from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, stages_of, with_joins
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, joined_displacements, static_state
 from stickslip.contact.law import held_stiffness

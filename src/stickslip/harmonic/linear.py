@@ -12,8 +12,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.sparse_stiffness import Unreduced
 from stickslip.harmonic.spectral import Blocks
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.tuned import TunedWheel
 

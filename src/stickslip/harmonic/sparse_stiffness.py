@@ -28,8 +28,7 @@ from stickslip.harmonic.factors import as_array, with_contacts
 from stickslip.harmonic.harmonic_set import Harmonics, real_rows, to_complex
 from stickslip.harmonic.matrices import SYMMETRY, asymmetry
 from stickslip.harmonic.spectral import Blocks, Interior
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 
 @dataclass(frozen=True, eq=False)

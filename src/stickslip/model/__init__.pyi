@@ -7,7 +7,6 @@ from .damping import rayleigh_damping as rayleigh_damping
 from .damping import structural_damping as structural_damping
 from .deck import CalculixRun as CalculixRun
 from .deck import write_deck as write_deck
-from .dofs import Dofs as Dofs
 from .fe.beam import Beam as Beam
 from .fe.beam import beam as beam
 from .fe.beam import rotating_beam as rotating_beam
@@ -65,6 +64,7 @@ from .rigid.damper import gap_operator as gap_operator
 from .rigid.prisms import CylinderDamper as CylinderDamper
 from .rigid.prisms import WedgeDamper as WedgeDamper
 from .rigid.sides import ContactPoints as ContactPoints
+from .structure import Dofs as Dofs
 from .structure import join as join
 from .structure_file import load_structure as load_structure
 from .structure_file import save_structure as save_structure

@@ -5,7 +5,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import InputError, input_error
-from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Dofs
 
 ROUNDED = 1e-12  # of the terms that an eigenvalue is the sum of: below, it is rounding
 NEGATIVE = 1e-9  # of the largest eigenvalue of a mass: negative ones beyond are no rounding

@@ -10,11 +10,10 @@ import scipy
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
 from stickslip.model.dense_modes import dense_modes
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.factorisation import DENSE, Factorisation, Say, Solve, factorise, negative_eigenvalues, silent
 from stickslip.model.fe.lanczos import lanczos
 from stickslip.model.rigid.motion import refuse_unheld
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.units import HZ
 
 RIGID_STRAIN = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding

@@ -12,9 +12,8 @@ import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.npz import BROKEN, Arrays, read_npz, write_npz
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 FORMAT = "stickslip structure"
 VERSION = 1

@@ -7,8 +7,7 @@ import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.dofs import Dofs, join_dofs, modal_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, join_dofs, modal_dofs
 
 BLOCK = 32  # columns solved for at a time: what is dense beside the basis stays a tenth of it
 ROWS = 8192  # rows of the basis projected at a time, for the same reason

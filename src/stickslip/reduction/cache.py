@@ -13,9 +13,8 @@ import scipy
 import stickslip
 from stickslip.arrays import Matrix
 from stickslip.errors import InputError, input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.factorisation import Say, silent
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.model.structure_file import load_structure, save_structure
 
 LAYOUT = 1  # raised when the same input no longer gives the same hash

@@ -16,8 +16,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs, join_dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, join_dofs
 from stickslip.reduction.basis import in_coordinates, surviving_sets
 from stickslip.reduction.cyclic import CyclicSector
 

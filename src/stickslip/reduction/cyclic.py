@@ -14,8 +14,7 @@ import scipy
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import even_part, ones_at, surviving_sets
 from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
 from stickslip.reduction.turning import dof_rotation, node_table

@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Dofs
 from stickslip.reduction.turning import COMPONENTS, node_table
 
 TOLERANCE = 1e-5  # of the faces' size: coordinates in text files have six digits or more

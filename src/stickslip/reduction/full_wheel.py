@@ -5,8 +5,7 @@ import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import ones_at, surviving_sets
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.turning import dof_rotation

@@ -12,8 +12,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 ROUNDING = 1e-12  # imaginary part over the largest entry: below, what waves make of real sectors is real
 

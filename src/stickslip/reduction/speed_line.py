@@ -13,8 +13,7 @@ import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.tuned import TunedWheel
 
 AtRest = Structure | TunedWheel

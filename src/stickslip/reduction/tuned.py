@@ -11,8 +11,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import InputError, input_error
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.contact_coordinates import in_relative_coordinates, nodal_coordinates
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave

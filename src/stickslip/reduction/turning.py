@@ -5,7 +5,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Dofs
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 ROUNDING = 1e-14  # entries of a rotation matrix below are sines of multiples of pi

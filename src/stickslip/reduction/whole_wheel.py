@@ -11,8 +11,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.basis import dof_indices, is_hermitian
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave

@@ -22,8 +22,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.stuck_contact_elimination import known
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.response.stability.flow_map.monodromy import compiled_kicks
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.response.time.transient import TimeStepping, integrate

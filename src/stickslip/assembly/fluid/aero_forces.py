@@ -18,9 +18,8 @@ from stickslip.assembly.parts.reduced import Store, in_memory
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
-from stickslip.model.dofs import Dofs
 from stickslip.model.modes import normal_modes, submatrix
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.aerodynamics import Feedback, InfluenceCoefficients
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.waves import wave

@@ -9,11 +9,10 @@ import scipy
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.rotation import RotatingSolid
 from stickslip.model.mesh.solid_mesh import SolidMesh, mirrored_cells
 from stickslip.model.part import BodyPoints, Part, Place, rigid_part
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.turning import dof_rotation
 
 

@@ -12,10 +12,9 @@ from stickslip.assembly.locations import node_rows
 from stickslip.assembly.parts.part_copies import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
 from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.part import Part
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.choice import Reduction

@@ -13,11 +13,10 @@ from stickslip.assembly.parts.reduced import at_speed, damped
 from stickslip.assembly.sides.mistuning import BladeMistuning, OwnSector
 from stickslip.assembly.sides.wheel import faces_of, leaders, own_and_onward
 from stickslip.errors import input_error
-from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import normal_modes
 from stickslip.model.part import Part
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import of_alike, strip
 from stickslip.units import HZ

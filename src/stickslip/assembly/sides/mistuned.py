@@ -37,8 +37,7 @@ from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import MistunedWheel, circulant, couplings, mistuned_wheel, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel

@@ -24,8 +24,15 @@ from stickslip.assembly.parts.reduced import (
     unpacked,
     with_ways_back,
 )
-from stickslip.assembly.sides.wave_damping import DampingOfParts
-from stickslip.assembly.sides.wheel import ReducedSector, leaders, modes_of_wave, reduced_wave, wave_numbers, wheel_of
+from stickslip.assembly.sides.wheel import (
+    DampingOfParts,
+    ReducedSector,
+    leaders,
+    modes_of_wave,
+    reduced_wave,
+    wave_numbers,
+    wheel_of,
+)
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part

@@ -1,18 +1,18 @@
-"""A model that is a sector of a wheel: how its parts meet their neighbours, and its waves reduced."""
+"""Wheels of a model: how a sector's parts meet their neighbours, its waves reduced and damped, and stages coupled at their flanges."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.contact import ALONE, NEXT, SPATIAL, Join
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.joints.nonmatching_cyclic_faces import unlike_faces
 from stickslip.assembly.joints.pairs import Pairs, Turn
 from stickslip.assembly.joints.ties import MEAN, Ties
 from stickslip.assembly.locations import Places, picked, stacked
-from stickslip.assembly.sides.wave_damping import DampingOfParts
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
@@ -20,12 +20,50 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.contact_coordinates import in_relative_coordinates, nodal_coordinates
+from stickslip.reduction.coupled_stages import Flange, Multistage, multistage
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 
 IN_SPACE = 2  # directions in which a node moves; fewer: coordinates that no turn changes
+JOINED = 1e-12  # of the largest entry: what leads from part to part
+
+
+@dataclass(frozen=True)
+class DampingOfParts:
+    """Modal damping of parts that are connected by contacts only.
+
+    Parameters
+    ----------
+    parts
+        Name and damping of each part; None: the part has no modal damping.
+    """
+
+    parts: tuple[tuple[str, Damping | None], ...]
+
+    def of_modes(self, moving: Structure) -> Structure:
+        """Return a wave of all parts with the modal damping of each part.
+
+        Raises
+        ------
+        InputError
+            If parts are connected by more than contacts.
+        """
+        owner = np.array(moving.dofs.part)
+        damping = _dense(moving.damping).astype(complex if moving.is_complex else float)
+        for name, own in self.parts:
+            if own is None:
+                continue
+            rows = np.flatnonzero(owner == name)
+            others = np.flatnonzero(owner != name)
+            _refuse_joined(name, moving, np.ix_(rows, others))
+            square = np.ix_(rows, rows)
+            mass, skew, stiffness = (_dense(m)[square] for m in (moving.mass, moving.damping, moving.stiffness))
+            alone = Structure(mass, skew, stiffness, moving.dofs.take(rows))
+            damping[square] = _dense(own.of_modes(alone).damping)
+        sparse = scipy.sparse.issparse(moving.stiffness)
+        return replace(moving, damping=scipy.sparse.csr_array(damping) if sparse else damping)
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,3 +427,83 @@ def wheel_of(
     wheel = TunedWheel(structures, sector.sectors, *order, nodal.multipliers)
     steady = np.real(ways[0].conj().T @ waves[0][1])
     return ReducedSector(sector, kept, ways, waves, wheel, scipy.sparse.csr_array(gaps), steady)
+
+
+def _refuse_joined(name: str, moving: Structure, across: tuple[Matrix, ...]) -> None:
+    for matrix in (moving.mass, moving.stiffness):
+        dense = _dense(matrix)
+        if np.abs(dense[across]).max(initial=0.0) > JOINED * np.abs(dense).max(initial=0.0):
+            raise input_error(
+                f"part.{name}.damping",
+                "differs from that of a part it is joined to, and modes are those of both together",
+                "Give them the same damping by modes, or another form.",
+            )
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+
+
+def is_staged(joins: Mapping[str, Join]) -> bool:
+    """Whether a join couples stages."""
+    return any(join.pairing == SPATIAL for join in joins.values())
+
+
+def stages_of(places: Places, joins: Mapping[str, Join], contacts: Collection[str], speed: float) -> Multistage | None:
+    """Return the wheels of a model whose joins couple several; None for a model of one wheel.
+
+    Parameters
+    ----------
+    places
+        Dofs and names of the parts.
+    joins, contacts
+        Joins of the model, and names of its contacts.
+    speed
+        Rotor speed, rad/s; zero for models that do not depend on it.
+
+    Raises
+    ------
+    InputError
+        If the parts have other joins or contacts, a part is no sector or has no flange, or the flanges do not fit.
+    """
+    if not is_staged(joins):
+        return None
+    for name, join in joins.items():
+        if join.pairing != SPATIAL:
+            raise input_error(f"join.{name}.pairing", f"is {join.pairing} beside joins by {SPATIAL}", ALONE)
+    if contacts:
+        raise input_error(f"contact.{next(iter(contacts))}", "is between stages or within one", ALONE)
+    if speed > 0:
+        raise input_error("rotation.speed_rpm", "gives stages a prestress that crosses their flanges", ALONE)
+    flanges = [_flange(places, f"join.{name}", join) for name, join in joins.items()]
+    used = {stage for flange in flanges for stage in flange.stages}
+    sectors = {}
+    for name, part in places.parts.items():
+        sector = faces_of(name, part) if part.sectors > 1 and name in used else None
+        if sector is None:
+            raise input_error(
+                f"part.{name}",
+                "is no sector with cyclic faces on a flange",
+                "Every part is one stage: give it its sectors, and a join by spatial harmonics.",
+            )
+        sectors[name] = sector
+    return multistage(sectors, flanges)
+
+
+def _flange(places: Places, key: str, join: Join) -> Flange:
+    names, dofs = [], []
+    for surface in join.between:
+        if surface.startswith(NEXT):
+            raise input_error(f"{key}.between", f"{surface!r} is on the next sector", "Name the stages.")
+        spot = places.spot(surface, f"{key}.between")
+        if spot.nodes is None:
+            raise input_error(f"{key}.between", f"{surface!r} holds no nodes", "Name a node set.")
+        names.append(spot.part)
+        dofs.append(_of_part(spot.nodes, places.offset(spot.part)))
+    if names[0] == names[1]:
+        raise input_error(f"{key}.between", f"names {names[0]!r} twice", "Name two stages.")
+    return Flange((names[0], names[1]), (dofs[0], dofs[1]), tuple(sorted(set(join.harmonics))))
+
+
+def _of_part(nodes: IntArray, offset: int) -> IntArray:
+    return np.unique(nodes[nodes >= 0]) - offset

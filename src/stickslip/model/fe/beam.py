@@ -16,9 +16,8 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs, join_dofs
 from stickslip.model.fe.solid import Material
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, join_dofs
 from stickslip.units import check_quantities, length, quantity
 
 End = Literal["clamped", "pinned", "sliding", "free"]

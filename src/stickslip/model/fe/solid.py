@@ -12,10 +12,9 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
-from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import EXACT, Quadrature, check_jacobians, library, library_element, shape_functions
 from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, nodal_dofs
 from stickslip.units import check_quantities, quantity
 
 CUT_FACES = ("cyclic_low", "cyclic_high")  # these sets may lose nodes to a clamp

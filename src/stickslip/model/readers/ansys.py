@@ -11,12 +11,11 @@ import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.readers.ansys_nodes import COMPONENTS, AnsysNodes, no_nodes, read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_records import HEADER, Records, long_pointer, open_records
 from stickslip.model.readers.node_table import rotation_to_global
 from stickslip.model.readers.units import Units, check_units, in_si
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 FULL = 4
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.readers.ansys_nodes import COMPONENTS, read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_records import Records, long_pointer, open_records
 from stickslip.model.readers.units import Units
+from stickslip.model.structure import Dofs
 
 RESULT = 12
 MODAL = 2

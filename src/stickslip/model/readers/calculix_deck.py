@@ -15,7 +15,6 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.solid import Material, integrate, node_dofs
 from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
@@ -23,7 +22,7 @@ from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named
 from stickslip.model.readers.keywords import Block, keyword_blocks, unique_in_order, whole_number
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Structure, nodal_dofs
 
 # corners of the faces S1, S2, …, counted from 0
 TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))

@@ -12,14 +12,13 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import InputError, input_error
-from stickslip.model.dofs import Dofs, numbered_dofs
 from stickslip.model.modes import LARGEST_ENTRY
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_range, check_symmetric, check_unique
 from stickslip.model.readers.node_table import COMPONENTS, csv_columns, csv_numbers
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, number_table, read_text, whole_numbers
 from stickslip.model.readers.units import SI, Units, check_units, in_si
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, numbered_dofs
 
 MAX_ROWS_PER_ENTRY = 10  # rows an entry above which a size is not believed
 FIELDS = {"real": 1, "integer": 1, "double": 1, "complex": 2}  # numbers of a value

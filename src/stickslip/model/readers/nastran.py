@@ -12,7 +12,6 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.readers.nastran_dofs import NastranDofs, read_nastran_dofs
 from stickslip.model.readers.nastran_library import (
     CUT_SHORT,
@@ -24,7 +23,7 @@ from stickslip.model.readers.nastran_library import (
     reading,
 )
 from stickslip.model.readers.units import Units, check_units, in_si
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.readers.nastran_cards import CUT_SHORT, Card, bulk_cards, real, whole
 from stickslip.model.readers.nastran_library import check_records, existing_file, is_binary, nastran_library, reading
 from stickslip.model.readers.node_table import rotation_to_global
+from stickslip.model.structure import Dofs
 
 COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # 0 is a scalar point
 SYSTEMS = {"CORD2R", "CORD2C", "CORD2S"}

@@ -11,10 +11,10 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.dofs import Dofs
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.keywords import Block, keyword_blocks, members, unique_in_order
 from stickslip.model.readers.text import SHOWN, read_text, whole_numbers
+from stickslip.model.structure import Dofs
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of the solvers
 

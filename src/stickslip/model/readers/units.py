@@ -7,8 +7,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import InputError, did_you_mean, input_error
-from stickslip.model.dofs import Dofs, is_numbered
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure, is_numbered
 from stickslip.units import check_quantities, quantity
 
 INCH = 0.0254  # m, exact

@@ -7,8 +7,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.units import check_quantities, quantity
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")

@@ -5,7 +5,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError
-from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Dofs
 
 ROUNDING = 1e-12  # of the coordinates, below which points lie at one place
 RIGID_ENERGY = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it

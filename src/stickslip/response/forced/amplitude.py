@@ -5,7 +5,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.selection.strategy import ErrorMeasure
-from stickslip.model.dofs import ROTATIONS
+from stickslip.model.structure import ROTATIONS
 from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System

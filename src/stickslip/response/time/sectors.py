@@ -20,8 +20,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import to_real
 from stickslip.harmonic.linear import one_structure
-from stickslip.model.dofs import Dofs
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave

@@ -10,7 +10,7 @@ from stickslip.assembly.forces import engine_order
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
-from stickslip.model.dofs import is_numbered
+from stickslip.model.structure import is_numbered
 from stickslip.study.file.model.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
 from stickslip.study.file.model.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.section import Section
@@ -19,8 +19,8 @@ from stickslip.study.file.tables import Tables, original
 from stickslip.study.models.aero import aero_refusals, knows_speeds
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
+from stickslip.study.models.mistuning import mistuning_refusals
 from stickslip.study.models.pressure import pressure_refusals
-from stickslip.study.models.spares import mistuning_refusals
 from stickslip.study.questions import ANALYSES
 
 _FLAT_CURVED = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response
-from stickslip.model.dofs import ROTATIONS
+from stickslip.model.structure import ROTATIONS
 from stickslip.response.free_motion import drift
 from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
