@@ -98,7 +98,7 @@ def run(
         typer.Option("--verbose", "-v", help="Say what jobs say on their way, points and checks, and every verdict."),
     ] = False,
 ) -> None:
-    """Answer the questions of a study; an interrupted run goes on where it stopped."""
+    """Run the analyses of a study; an interrupted run continues where it stopped."""
     with _errors_as_text():
         with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
             result = read(study).run(
@@ -247,7 +247,7 @@ def inspect(
     frequencies: Annotated[int, typer.Option(min=0, max=200, help="Natural frequencies to compute.")] = 10,
     mesh: Annotated[Path | None, typer.Option(help="Where the nodes lie, beside matrices that do not say.")] = None,
 ) -> None:
-    """Say what is in a file of a finite-element model: dofs, sets, mass, size, first frequencies."""
+    """Show the content of a finite-element model file: dofs, sets, mass, size, first frequencies."""
     with _errors_as_text():
         from stickslip.study.inspect_file import inspect_file
 
@@ -325,7 +325,7 @@ def keys(
         ),
     ] = "",
 ) -> None:
-    """Say what a table of a study file may hold: keys, defaults, meanings."""
+    """Show the keys of a table of the study file with defaults and meanings."""
     with _errors_as_text():
         from stickslip.study.file.keys import table_keys, tables_of_file
 

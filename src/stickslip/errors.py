@@ -107,7 +107,7 @@ def _line(error: InputError) -> str:
 
 
 def _cut(text: str) -> str:
-    """Return the ends of a text of which nobody reads the middle."""
+    """Return beginning and end of a long text."""
     half = LONGEST_TEXT // 2
     return text if len(text) <= LONGEST_TEXT else f"{text[:half]} ... {text[-half:]}"
 

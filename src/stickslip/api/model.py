@@ -92,7 +92,7 @@ class Model(Assembly):
         return self._answer("flutter", keys, folder)
 
     def safe(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
-        """Say which modes engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
+        """Find the modes that engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
         return self._answer("safe", keys, folder)
 
     def limit_cycle(self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any) -> Result:

@@ -143,7 +143,7 @@ def unforeseen(error: BaseException) -> str:
 
 
 def _lacks_memory(error: BaseException | None) -> bool:
-    """Say whether memory was short; libraries that cannot be loaded report it in words, or behind other errors."""
+    """Return whether memory was short; libraries that cannot be loaded report it in words, or behind other errors."""
     while error is not None:
         words = str(error).lower()
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:

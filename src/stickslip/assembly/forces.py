@@ -65,7 +65,7 @@ def force_at(places: Places, key: str, load: Load) -> Matrix:
 
 
 def _moves(spot: Spot, axis: int) -> bool:
-    """Tell whether a point of a spot can move along an axis."""
+    """Return whether a point of a spot can move along an axis."""
     assert spot.surface is not None
     return bool(abs(spot.surface.displacement[axis::3]).max() > 0)
 

@@ -61,7 +61,7 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Dofs of all parts in one numbering, and the names that stand for them.
+    """Dofs of all parts in one numbering, and their names.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class Places:
         return Spot(name, head, None, self.offset(head) + hits) if hits.size == 1 else None
 
     def _nodal(self, name: str, head: str, numbers: IntArray, points: FloatArray, facets: IntArray) -> Spot:
-        """Return nodes of a part: x, y, z where the part has them; what it has not is held."""
+        """Return nodes of a part with their dofs x, y, z; missing dofs are held."""
         table = self.parts[head].structure.dofs
         rows = node_rows(table, numbers)[:, :3]
         dofs = np.where(rows >= 0, rows + self.offset(head), -1)

@@ -139,7 +139,7 @@ class Model:
         refuse_contacts_of_dofs(self.places, self.contacts)
 
     def __repr__(self) -> str:
-        """Return what it is in a line."""
+        """Return a description in one line."""
         named = {what: getattr(self, what) for what in ("parts", "contacts", "joins", "loads")}
         words = [f"{what} {', '.join(own)}" for what, own in named.items() if own]
         if self.sectors > 1:
@@ -242,7 +242,7 @@ class Model:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know."""
+        """Return the warnings for the user."""
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
         of_units = unlike_units(self.parts)

@@ -54,7 +54,7 @@ def joined_displacements(
 
 
 def _free_solids(places: Places, here: Neighbours | None, joins: Ties) -> dict[str, Steady]:
-    """Return what the displacements of parts obey that neither a support nor a join holds."""
+    """Return the equilibrium conditions of parts without support or join."""
     cyclic = {} if here is None else here.ties
     tied = np.union1d(joins.followers, joins.weights.nonzero()[1])
     own = {

@@ -1,4 +1,4 @@
-"""Coupling of harmonics by contacts: the rows of the derivatives that couple, and what they add to the Jacobian.
+"""Coupling of harmonics by contacts: the coupling rows of the derivatives, and their contribution to the Jacobian.
 
 A contact that sticks or is open all period answers each harmonic of a gap by the same harmonic of a force, with a complex number. One that slips
 couples the harmonics of its tangential forces with those of all gaps; its normal force couples nothing as long as it stays closed.
@@ -103,7 +103,7 @@ def _followed(columns, values, real, imaginary, kept, gap):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def _add_row(derivative, gap, kept, first, line):  # type: ignore[no-untyped-def]
-    """Add to `line` (N,) what the kept unknowns make of a force, by its derivatives (m,) and the `gap` (2, H+1, most) that they make."""
+    """Add to `line` (N,) the derivatives of a force by the kept unknowns, from those by the gaps (m,) and the `gap` (2, H+1, most) of each unknown."""
     for a in range(kept[0]):
         line[a] += derivative[0] * gap[0, 0, a]
     for h in range(1, kept.size):
@@ -117,7 +117,7 @@ def _add_row(derivative, gap, kept, first, line):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _add_force(columns, values, line, place, out):  # type: ignore[no-untyped-def]
-    """Add a force, a row of what the kept unknowns make of it, to the equations of the coordinates it acts on."""
+    """Add a force, a row of its derivatives by the kept unknowns, to the equations of its coordinates."""
     for j in range(columns.size):
         if values[j] != 0.0:
             equation = out[place[columns[j]]]

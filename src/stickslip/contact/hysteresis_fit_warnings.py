@@ -79,7 +79,7 @@ def _correlation(model: LoopModel, away: FloatArray) -> float:
 
 
 def _inflation(correlation: float) -> float:
-    """Return by how much correlated residuals make standard deviations too small."""
+    """Return the factor by which correlated residuals reduce standard deviations."""
     held = min(max(correlation, 0.0), 0.999)
     return math.sqrt((1 + held) / (1 - held))
 
@@ -111,7 +111,7 @@ def _trend(model: LoopModel, away: FloatArray) -> list[str]:
 
 
 def _noisy(model: LoopModel, away: FloatArray, k_t: float) -> list[str]:
-    """Say where the displacement's noise, which least squares of the force take for none, is as large as the residual."""
+    """Return a warning where the noise of the displacement, which least squares of the force neglect, is as large as the residual."""
     if math.isnan(k_t):
         return []
     rough = [np.diff(x, 4) / _FOURTH for x, _ in model.loops]

@@ -101,7 +101,7 @@ class Interface:
         return replace(self, laws=softened(self.laws, stiffness))
 
     def coordinates(self) -> IntArray:
-        """Return the structure's dofs that take part in a gap."""
+        """Return the dofs of the structure that occur in a gap."""
         return np.unique(self.gap_operator.indices).astype(np.int64)
 
     def restricted(self, dofs: IntArray) -> "Interface":

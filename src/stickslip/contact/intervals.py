@@ -235,7 +235,7 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
 
 @njit(cache=True)
 def _merge(state, other):  # type: ignore[no-untyped-def]
-    """Merge the state of one more element into that of the contact: what is neither all stuck nor all open slips."""
+    """Merge the state of one more element into that of the contact, which slips unless all elements stick or all are open."""
     for d in range(2):
         for i in range(state.shape[1]):
             if state[d, i] != other[d, i]:

@@ -53,7 +53,7 @@ def _tangents_at(address, gap, velocity, starts, part, parameters, out):  # type
 
 @njit(cache=True)
 def _chain(jac, carried, share, line):  # type: ignore[no-untyped-def]
-    """Fill the (3 + s, 9 + s) derivatives after a part of a step by what the step begins and ends with: gap and velocity, state, gap before."""
+    """Fill the (3 + s, 9 + s) derivatives after a part of a step by gap, velocity, state and the gap before of the whole step."""
     s = carried.shape[0]
     for a in range(3 + s):
         for b in range(9 + s):

@@ -208,7 +208,7 @@ def _simplest(model: LoopModel) -> _Found:
 
 
 def _least(model: LoopModel, found: _Found) -> tuple[float, float]:
-    """Return what stiffness and limit certainly reach where they are not told."""
+    """Return lower bounds of stiffness and limit where the loop does not determine them."""
     if not found.slips.any():
         return math.nan, found.stiffness * model.stroke
     return (_least_stiffness(model, found) if math.isnan(found.stiffness) else math.nan), math.nan
@@ -279,7 +279,7 @@ def _start(model: LoopModel) -> FloatArray:
 
 
 def _covariance(jac: FloatArray) -> FloatArray:
-    """Return the (2, 2) covariance of the first two unknowns for residuals of variance one; NaN for what is not told."""
+    """Return the (2, 2) covariance of the first two unknowns for residuals of variance one; NaN for undetermined ones."""
     sizes = np.linalg.norm(jac, axis=0)
     sizes[sizes == 0.0] = 1.0
     _, values, right = np.linalg.svd(jac / sizes, full_matrices=False)
@@ -311,7 +311,7 @@ def _least_stiffness(model: LoopModel, found: _Found) -> float:
 
 
 def _without_machine(found: _Found, machine: float | None) -> tuple[float, FloatArray]:
-    """Take the stiffness in series out of what was found."""
+    """Remove the stiffness in series from the fitted one."""
     if machine is None or math.isnan(found.stiffness):
         return found.stiffness, found.covariance
     if found.stiffness >= machine:
@@ -326,7 +326,7 @@ def _without_machine(found: _Found, machine: float | None) -> tuple[float, Float
 
 
 def _of_setup(load: float | None, machine: float | None, found: _Found) -> list[str]:
-    """Say what no loop tells."""
+    """Return a sentence on quantities that no loop determines."""
     told = []
     if load is None and math.isfinite(found.limit):
         told.append("The normal load is not given: the limit force is told, the friction coefficient is not")

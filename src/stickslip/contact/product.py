@@ -145,7 +145,7 @@ def _own_less_mean(block, real, imaginary, p, q):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _any_below(block):  # type: ignore[no-untyped-def]
-    """Tell whether a force depends on harmonics below its own."""
+    """Return whether a force depends on harmonics below its own."""
     for p in range(1, block.shape[0]):
         for q in range(2 * ((p + 1) // 2) - 1):
             if block[p, q] != 0.0:
@@ -155,7 +155,7 @@ def _any_below(block):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _any_above(block, real, imaginary):  # type: ignore[no-untyped-def]
-    """Tell whether a force depends on its own harmonic, but for means (H+1,), or on higher ones."""
+    """Return whether a force depends on its own harmonic (apart from means (H+1,)) or on higher ones."""
     for p in range(block.shape[0]):
         h = (p + 1) // 2
         for q in range(max(2 * h - 1, 0), 2 * h + 1):
@@ -169,7 +169,7 @@ def _any_above(block, real, imaginary):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _filled(blocks, real, imaginary, below, above):  # type: ignore[no-untyped-def]
-    """Tell (n_contacts, P) which blocks have entries below the harmonics on their diagonal, and which have others that no mean stands for."""
+    """Return which blocks (n_contacts, P) have entries below the diagonal harmonics, and which have other entries that no mean represents."""
     for c in range(blocks.shape[0]):
         for b in range(blocks.shape[1]):
             row, col = _PAIRS[b, 0], _PAIRS[b, 1]
@@ -206,7 +206,7 @@ def _laid_out(blocks, real, imaginary, below, lower, above, upper):  # type: ign
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """What contact forces of each harmonic owe to lower harmonics, and what to their own and higher ones, as a Krylov method reads it many times.
+    """Lower and upper triangle of the contact Jacobian by harmonics, in the layout for repeated products of a Krylov method.
 
     Attributes
     ----------

@@ -186,7 +186,7 @@ def _settle(z, anchor, by_normal, nodes, kinds, count, starts_open, slip_by_norm
 
 @njit(cache=True)
 def _append(segments, count, start, state, sign, z, anchor, by_normal):  # type: ignore[no-untyped-def]
-    """Append a segment unless it goes on in the state of the last; one without length is replaced."""
+    """Append a segment unless its state equals the last one; a last segment of zero length is replaced."""
     if count > 0:
         last = count - 1
         if segments[last, STATE] == state and segments[last, SIGN] == sign:

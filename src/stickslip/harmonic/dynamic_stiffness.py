@@ -44,7 +44,7 @@ class Condensed:
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """The spectral decomposition and what a load is to it, as many harmonics as the load has; see `summed`."""
+    """The spectral decomposition and the modal load in each harmonic; see `summed`."""
 
     terms: Terms
     load: ComplexArray  # statically condensed

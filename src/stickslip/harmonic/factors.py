@@ -186,7 +186,7 @@ def solved(matrix: Matrix, right: FloatArray | ComplexArray) -> FloatArray | Com
 
 
 def as_array(matrix: Matrix) -> Matrix:
-    """Return a sparse matrix as an array in Fortran order, and an array as it is.
+    """Return a sparse matrix as an array in Fortran order, and an array unchanged.
 
     Raises
     ------

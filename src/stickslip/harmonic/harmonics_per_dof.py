@@ -73,12 +73,12 @@ class LocalBalance:
 
     @property
     def displacement_scale(self) -> float:
-        """Displacement that a scaled unknown of one stands for, m."""
+        """Displacement of a scaled unknown of one, m."""
         return self.balance.displacement_scale
 
     @property
     def force_scale(self) -> float:
-        """Force that a scaled residual of one stands for, N."""
+        """Force of a scaled residual of one, N."""
         return self.balance.force_scale
 
     def whole(self, x: FloatArray) -> FloatArray:

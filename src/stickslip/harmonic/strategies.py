@@ -23,5 +23,5 @@ OPTIONS = {  # option → strategies that have it
 
 
 def options_of(name: str) -> tuple[str, ...]:
-    """Return which of the options ``per_dof`` and ``repeats`` a strategy has."""
+    """Return the options of a strategy: ``per_dof``, ``repeats``, or both."""
     return tuple(option for option, having in OPTIONS.items() if name in having)

@@ -144,7 +144,7 @@ class StructuredJacobian:
 
     @cached_property
     def costs(self) -> Costs:
-        """What its linear systems cost."""
+        """Estimated cost of its linear systems."""
         n, harmonics = self.linear.n, len(self.linear.harmonics)
         if isinstance(self.linear, SparseProduct):
             return linear_costs(n, harmonics, self.blocks.size, self.linear.entries)
@@ -154,12 +154,12 @@ class StructuredJacobian:
 
     @cached_property
     def _reduced_cost(self) -> float:
-        """What one costs that is solved by an array without what rests."""
+        """Estimated cost of a solution by an array without the resting contacts."""
         rested = known(self.linear, self.rows).knows(self.coupling, self.scale)
         return reduced_cost(self.linear.n, self.coupling.counts, known=rested)
 
     def eliminated(self) -> Resting | None:
-        """Return the elimination of the unknowns that stuck or open contacts do not couple; None if it costs as much as the whole array."""
+        """Return the elimination of unknowns that stuck and open contacts leave uncoupled; None if it is no cheaper than the whole array."""
         if isinstance(self.linear, SparseProduct) or self.costs.array < self._reduced_cost:
             return None
         return known(self.linear, self.rows).without_resting(self.coupling, self.rows, self.scale)
@@ -343,7 +343,7 @@ class Transposed:
 
     @property
     def costs(self) -> Costs:
-        """What its linear systems cost."""
+        """Estimated cost of its linear systems."""
         return self.transposed.costs
 
     def eliminated(self) -> TransposedElimination | None:

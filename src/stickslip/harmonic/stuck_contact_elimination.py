@@ -88,7 +88,7 @@ def coupling(blocks: FloatArray, rows: SparseRows, n: int) -> Coupling:
 
 @dataclass(frozen=True, eq=False)
 class _Harmonic:
-    """One harmonic: its coordinates that are eliminated and those that are kept, and what the first make of the second."""
+    """One harmonic: eliminated and kept coordinates, and the Schur complement of the first."""
 
     rest: IntArray  # (r,)
     kept: IntArray  # (k,)
@@ -189,7 +189,7 @@ class Resting:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of what was eliminated."""
+        """Sign of the determinant of the eliminated block."""
         return self.harmonics[0].sign
 
     def array(self) -> FloatArray:
@@ -336,7 +336,7 @@ class TransposedElimination:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of what was eliminated."""
+        """Sign of the determinant of the eliminated block."""
         return self.inside.sign
 
     def array(self) -> FloatArray:

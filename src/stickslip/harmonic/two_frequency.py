@@ -441,7 +441,7 @@ def _analysed(force: FloatArray, basis: FloatArray) -> FloatArray:
 def _stiffness(
     side: TorusSide, indices: Indices, omegas: tuple[float, float], rate: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return what `TorusSide.stiffness` does; kept, because a Newton iteration at fixed frequencies asks for it at every step."""
+    """Return `TorusSide.stiffness`, cached, since a Newton iteration at fixed frequencies needs it at every step."""
     values = np.zeros((len(indices), side.n, side.n), dtype=complex)
     slopes = np.zeros_like(values)
     values[0] = side.first.condensed(omegas[0], 0).stiffness[0]

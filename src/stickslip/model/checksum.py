@@ -59,7 +59,7 @@ def check_file(path: Path) -> None:
 
 
 def _checked(stream: IO[bytes], size: int, *, required: bool) -> int:
-    """Return how many bytes stand before the checksum, once they have been compared with it."""
+    """Return the number of bytes before the checksum after a comparison with it."""
     stream.seek(max(size - LENGTH, 0))
     end = stream.read(LENGTH)
     at = end.rfind(MARK)

@@ -113,7 +113,7 @@ def _size(part: Part) -> float:
 
 
 def _of_material(name: str) -> Callable[[Part], float]:
-    """Return what tells a number of a part's first material; 0 where it has none."""
+    """Return the function that reads a number of the first material of a part; 0 without a material."""
 
     def number(part: Part) -> float:
         if part.solid is None:

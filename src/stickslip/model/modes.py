@@ -148,7 +148,7 @@ def _with_missed(
 
 
 def _factorised(matrix: Matrix, dofs: Dofs, say: Say, *, below: bool = True) -> Factorisation:
-    """Factorise ``K − shift M`` of a body; where it is singular, say how the body can move, or, with a shift below zero, what it lacks."""
+    """Factorise ``K − shift M`` of a body; the error of a singular matrix names the free motion or, with a negative shift, the missing mass."""
     try:
         return factorise(matrix, say=say)
     except SingularError as error:

@@ -115,7 +115,7 @@ def dof_indices(place: str, structure: Structure, keep: IntArray) -> IntArray:
 
 
 def _no_indices(structure: Structure, given: Matrix) -> tuple[str, str]:
-    """Return what is wrong with something that is no array of indices, and the remedy."""
+    """Return the fault of an invalid array of indices, and the remedy."""
     if given.dtype.kind == "U":
         name = str(given.reshape(-1)[0])
         if name in structure.sets:

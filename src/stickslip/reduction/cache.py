@@ -123,7 +123,7 @@ def _add(digest: "hashlib._Hash", name: str, value: object) -> None:
 
 
 def _parts(value: object) -> list[tuple[str, object]] | None:
-    """Return what a value consists of, by name; None for one that is whole."""
+    """Return the named parts of a value; None for a value without parts."""
     if isinstance(value, Dofs):
         words = "\0".join([*value.component, "", *value.part])
         return [("node", value.node), ("position", value.position), ("words", words)]

@@ -356,7 +356,7 @@ class _Problem:
         return factorise(scipy.sparse.csr_array(self.stiffness - self.shift * self.mass))
 
     def free(self, rows: ComplexArray) -> int:
-        """Return how many motions with mass constraints leave, or a few more."""
+        """Return an upper bound of the number of motions with mass under constraints."""
         return int(np.count_nonzero(self.mass.diagonal())) - len(rows)
 
     def modes(self, rows: ComplexArray, n: int, say: Say) -> tuple[FloatArray, ComplexArray]:

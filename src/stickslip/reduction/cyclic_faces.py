@@ -162,7 +162,7 @@ def _nearest(points: FloatArray, among: FloatArray) -> tuple[FloatArray, IntArra
 
 
 def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) -> InputError:
-    """Say which nodes have no partner, or why none has."""
+    """Return the nodes without a partner, or why no node has one."""
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
     shares = [_share(low, high, sign * 2 * math.pi / sectors, axis, reach) for sign in (1.0, -1.0)]

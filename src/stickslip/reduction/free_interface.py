@@ -95,7 +95,7 @@ def _free_modes(bodies: Sequence[Body], n_modes: int | ModesBelow, say: Say) -> 
 def _residual_flexibility(
     structure: Structure, keep: IntArray, bodies: Sequence[Body], modes: BodyModes, say: Say
 ) -> Matrix:
-    """Return (n, k) what the modes leave out of the static answers to unit forces on `keep` (eq. 59)."""
+    """Return the (n, k) residual flexibility: static displacements under unit forces on `keep` without the part of the modes (eq. 59)."""
     kind = np.result_type(structure.stiffness.dtype, float, *(s.dtype for s in modes.shapes))
     R = np.zeros((structure.n, keep.size), dtype=kind)
     say(f"{keep.size} residual attachment modes")
@@ -116,7 +116,7 @@ def _residual_flexibility(
 
 
 def _static_solve(body: Body, rigid: Matrix, say: Say) -> Solve:
-    """Return what answers loads in equilibrium: of a free body, with as many dofs held as it has rigid motions."""
+    """Return the static solver for loads in equilibrium; of a free body as many dofs are held as it has rigid motions."""
     if body.shift == 0:
         return body.solve
     order = scipy.linalg.qr(rigid.conj().T, mode="r", pivoting=True)[1]

@@ -205,7 +205,7 @@ class WaveFamily:
 
     @cached_property
     def _shared(self) -> tuple[float, SharedInterior] | None:
-        """What the waves share, at the shift of wave 0."""
+        """The common factor of all waves, at the shift of wave 0."""
         number = max(round(self.sectors / 4), 1)
         if 2 * number >= self.sectors:
             return None

@@ -25,7 +25,7 @@ class Node:
     key: str = ""
 
     def has(self, *names: str) -> bool:
-        """Say whether all the variables exist and none is empty."""
+        """Return whether all the variables exist and none is empty."""
         return all(name in self.data and self.data[name].size > 0 for name in names)
 
     def values(self, name: str, *dimensions: str) -> FloatArray:

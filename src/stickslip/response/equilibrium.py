@@ -243,7 +243,7 @@ def opening(laws: Sequence[ContactLaw]) -> BoolArray:
 
 
 def _opens(law: ContactLaw) -> bool:
-    """Tell whether a law lets go of a point that is far away."""
+    """Return whether a law opens at a large gap."""
     state = law.initial_state()
     jac = np.zeros((3 + state.size, 6 + state.size))
     status = np.empty(2, dtype=np.int64)

@@ -34,7 +34,7 @@ SAMPLES = 16
 
 
 def _exact_events() -> None:
-    """Evaluate contacts at exact events, and what is put together from them."""
+    """Evaluate contacts at exact events, and the matrices assembled from them."""
     _over_threads(SPRING)
     _balanced("dense")
     _balanced("structured")

@@ -131,7 +131,7 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _predicted(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Predict by Newton steps what the harmonics of its judging set would change in a solution, a fraction; see `own_error`."""
+    """Predict by Newton steps the relative change of a solution by the harmonics of its judging set; see `own_error`."""
     own = with_stiffness(problem.balance(point.support))
     x = own.unknowns(point.coefficients)
     wide = with_waves(problem, own, judging_set_of(own)[-1])
@@ -144,7 +144,7 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _led_on(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float) -> Alert:
-    """Return what two Newton steps from a solution towards more harmonics say; where the second says another thing than the first, Newton's method goes on."""
+    """Return the error predicted by two Newton steps with more harmonics; where they disagree, Newton's method continues."""
     first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
     second = asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
     if abs(second.error - first.error) <= SAME_RTOL * second.error or high.size > MAX_ROWS:
@@ -170,7 +170,7 @@ def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> Harmon
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `factor` times the reference order and, as far as a wheel has waves, its judging set, with samples enough."""
+    """Return the problem with all harmonics up to `factor` times the reference order and its judging set (limited by the waves of a wheel), with enough samples."""
     high = with_stiffness(problem.high)
     wanted, fed = harmonics_of(factor * high.order), judging_set_of(high)
     most = with_waves(problem, high, max(wanted[-1], fed[-1])).linear.most

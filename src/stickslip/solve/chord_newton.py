@@ -81,7 +81,7 @@ class KeptFactors:
         return Status.STALLED if self._gives_up else self.advance(work, now)
 
     def _corrected(self, work: Work, solve: Inverse, step: FloatArray, here: Iterate) -> Iterate:
-        """Go on from the end of a full Newton step by its factors; return the iterate with the smallest residual."""
+        """Continue from the end of a full Newton step with its factors; return the iterate with the smallest residual."""
         steps, best = [step], here
         while len(steps) <= MAX_CHORD_STEPS and np.isfinite(here.norm) and here.norm > self._tolerance:
             next_one = work.timed(partial(solve, -here.at.residual))

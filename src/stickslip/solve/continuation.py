@@ -1,4 +1,4 @@
-"""Branches of ``F(x, p) = 0`` followed by continuation, as a generator of points; by arc length (Keller 1977) unless told otherwise."""
+"""Continuation of branches of ``F(x, p) = 0`` as a generator of points; by arc length (Keller 1977) by default."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

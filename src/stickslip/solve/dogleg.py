@@ -118,7 +118,7 @@ def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
 
 
 def _shorter(change: float, slope: float) -> float:
-    """Return by how much to shorten a step: to the minimum of the parabola through what was found, within bounds."""
+    """Return the factor on a step: to the minimum of the parabola through the known values, within bounds."""
     curved = 2.0 * (change - slope)
     if not np.isfinite(curved):
         return 0.1

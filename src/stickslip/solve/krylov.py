@@ -95,7 +95,7 @@ class _Kept:
     worn: bool = False
 
     def took(self, products: int, tolerance: float) -> None:
-        """Take down what a system took: the first one says what is usual."""
+        """Record the cost of a system; the first one is the reference."""
         digits = -np.log10(tolerance)
         self.rate = self.rate or products / digits
         self.worn = products > max(MAX_ITERATION_GROWTH * self.rate * digits, MIN_WORN_ITERATIONS)
@@ -226,7 +226,7 @@ class Krylov:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """What a Krylov method needs: the solve with the preconditioner, and the product with the matrix after it."""
+    """The operations of a Krylov method: solution with the preconditioner, and product with the matrix after it."""
 
     precondition: Callable[[FloatArray], FloatArray]
     product: Callable[[FloatArray], FloatArray]
@@ -258,7 +258,7 @@ def _system(jac: Jacobian, kept: object) -> _System:
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:
-    """Return the inverse; where a singular value is zero any number will do, for what is inverted belongs to an approximation."""
+    """Return the inverse; for a zero singular value any number will do, since the matrix is an approximation."""
     if matrix.shape == (1, 1):
         return 1.0 / np.where(matrix == 0.0, 1.0, matrix)
     left, sizes, right = np.linalg.svd(matrix)
@@ -294,7 +294,7 @@ class _Account:
     pause: int = PAUSES[0]
 
     def took(self, spent: float, array: float, *, failed: bool) -> None:
-        """Take down what a system took by products, and what it would have taken as an array."""
+        """Record the cost of a system by products, and its cost as an array."""
         self.debt = max(self.debt + spent - array, -CREDIT * array)
         if failed or self.debt > array:
             self.arrays, self.debt = self.pause, 0.0

@@ -150,7 +150,7 @@ class Assembled:
 def _last_known(
     jac: FloatArray, column: FloatArray, corner: float, right: FloatArray
 ) -> tuple[FloatArray | None, float]:
-    """Solve a bordered system whose last row prescribes the last unknown alone: what is inside needs no border."""
+    """Solve a bordered system whose last row prescribes the last unknown alone, by the inner system without a border."""
     last = right[-1] / corner
     inside, sign = solve_signed(np.array(jac, order="F"), right[:-1] - last * column)
     if inside is None or not np.isfinite(inside).all():
@@ -295,7 +295,7 @@ class Eliminating(JacobianOperator, Protocol):
     """A Jacobian from which cheap unknowns can be eliminated."""
 
     def eliminated(self) -> Elimination | None:
-        """Return the elimination of cheap unknowns; None where it costs as much as the whole array."""
+        """Return the elimination of cheap unknowns; None if it is no cheaper than the whole array."""
         ...
 
 

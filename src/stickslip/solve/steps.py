@@ -135,7 +135,7 @@ def _by_factors(
 
 
 def _bend(y: FloatArray, before: FloatArray, tangent: FloatArray, following: Following) -> FloatArray | None:
-    """Return what a parabola through two points, with the tangent of the first of them, has beside that tangent."""
+    """Return the deviation from its tangent of the parabola through two points with the tangent at the first."""
     if following.predictor != "parabola":
         return None
     measure = measure_at(y[:-1], following)
@@ -169,7 +169,7 @@ def _prediction(
 def _direction(
     latest: Latest, before: Point, y: FloatArray, unit: FloatArray, following: Following
 ) -> tuple[FloatArray, float]:
-    """Return the direction in which to go on from `y`, where the corrector ended, and its orientation."""
+    """Return the direction of continuation from the corrected point `y`, and its orientation."""
     measure = measure_at(y[:-1], following)
     if following.predictor == "secant":
         chord = y - before.y

@@ -116,11 +116,11 @@ class Notes(Protocol):
         ...
 
     def get(self, name: str) -> dict[str, Any] | None:
-        """Return what was stored under `name`; None for an unknown name."""
+        """Return the note stored under `name`; None for an unknown name."""
         ...
 
     def forget(self, name: str) -> None:
-        """Remove what was stored under `name`."""
+        """Remove the note stored under `name`."""
         ...
 
 

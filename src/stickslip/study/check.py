@@ -16,7 +16,7 @@ WARNING = "WARNING: "
 
 
 def check_study(study: Study) -> tuple[str, ...]:
-    """Build every model, refuse whatever a run would refuse, log what is known before a run, and return warnings.
+    """Build every model, refuse all that a run would refuse, log static state and frequencies, and return warnings.
 
     Raises
     ------

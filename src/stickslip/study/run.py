@@ -40,7 +40,7 @@ SHARE = 0.1  # of the time that a run may write what is not complete
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a run executes its jobs.
+    """Place at which a run executes its jobs.
 
     Parameters
     ----------

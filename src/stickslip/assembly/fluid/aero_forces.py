@@ -146,7 +146,7 @@ class Flow:
         return np.asarray(given.largest_displacement / largest)
 
     def _remembered(self, what: str, make: Callable[[], Matrix]) -> Matrix:
-        """Return patterns from memory or store, by the content of what they are made of."""
+        """Return patterns from memory or store, by the content of their inputs."""
         content = f"{self._content} {what}"
         memo: dict[Any, Any] = next(iter(self.model.parts.values())).memo
         if content not in memo:
@@ -200,7 +200,7 @@ def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
 
 
 def about_static_state(system: System, load: HarmonicLoad, fluid: Matrix | None) -> HarmonicLoad:
-    """Return the load with a static force that keeps the static state as it is without the fluid: coefficients describe motion about it.
+    """Return the load with a static force that keeps the static state of the model without fluid, since coefficients describe motion about it.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ def _integrated(
 
 
 def _bare(share: float, source: str, name: str) -> tuple[str, ...]:
-    """Say or refuse that a field covers only part of a surface."""
+    """Warn of a field that covers only part of a surface, or refuse it."""
     told, refused = BARE
     if share <= told:
         return ()

@@ -1,1 +1,1 @@
-"""Contacts and joins of a model: pairs of points, their frames and laws, ties, and what they leave free."""
+"""Contacts and joins of a model: pairs of points, their frames and laws, ties, and unconstrained bodies."""

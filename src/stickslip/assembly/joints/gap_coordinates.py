@@ -102,7 +102,7 @@ def refuse_mixed_gaps(model: Model, gaps: Matrix) -> None:
 
 
 def held_gaps(model: Model, gaps: Matrix) -> int:
-    """Return how many of the gaps (3 p, n) sticking rigid contacts constrain."""
+    """Return the number of gaps (3 p, n) that sticking rigid contacts constrain."""
     entries = np.diff(scipy.sparse.csr_array(gaps).indptr)
     return int(np.count_nonzero(entries[np.repeat(_rigid(model.pairs), 3)]))
 

@@ -240,7 +240,7 @@ def refuse_itself(place: str, first: Spot, second: Spot) -> None:
 def _paired(
     places: Places, key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
 ) -> tuple[Pairing, tuple[str, ...]]:
-    """Pair two surfaces, and say what is doubtful; the dofs of the next sector follow those of this one where there is a turn."""
+    """Pair two surfaces, and return warnings; with a rotation the dofs of the next sector follow those of this one."""
     assert first.surface is not None
     a, b = widened(first.surface, second, turn)
     facing = with_normals(key, contact, first, a, second, b)
@@ -334,7 +334,7 @@ def _single_dofs(
 
 
 def _refuse_unused(key: str, contact: Contact) -> None:
-    """Refuse what is said of surfaces in a contact of single dofs."""
+    """Refuse keys of surfaces in a contact of single dofs."""
     pairing = None if contact.pairing == "node_to_node" else contact.pairing
     said = {"pairing": pairing, "normal": contact.normal, "tangent": contact.tangent}
     for word, given in said.items():

@@ -55,7 +55,7 @@ def _at_rest_alike(
     why: str,
     remedy: str = "Choose a law that is pressed and lifts off, such as elastic_coulomb, or leave it out.",
 ) -> InputError:
-    """Refuse a preload, gap or interference that makes no difference, by its key and by what it is in Python."""
+    """Refuse a preload, gap or interference without effect, by its key and its name in Python."""
     preload = "preload_pa" if contact.share == "area" else "preload_n"
     word = preload if contact.preload else "gap_m" if contact.gap > 0.0 else "interference_m"
     given = f"preload={contact.preload:g}" if contact.preload else f"gap={contact.gap:g}"

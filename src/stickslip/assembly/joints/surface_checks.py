@@ -92,7 +92,7 @@ def tilt_warning(key: str, contact: Contact, part: str, mine: Normals, theirs: N
 
 
 def _from_opposite(mine: Normals, theirs: Normals) -> FloatArray:
-    """Return by how many degrees the normals of points differ from the opposite of those nearest on the other side."""
+    """Return the angle in degrees between the normals of points and the reversed nearest normals of the other side."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(theirs[0]).query(mine[0])[1]
@@ -127,7 +127,7 @@ def overlap_warning(key: str, contact: Contact, pairing: Pairing, sides: Sequenc
 
 
 def _apart(key: str, contact: Contact, gap: float) -> str:
-    """Say that surfaces nowhere touch as they are placed."""
+    """Return the error of surfaces that do not touch."""
     one, two = contact.between
     how = "lie apart" if gap > 0 else "overlap"
     word = "gap_m" if gap > 0 else "interference_m"

@@ -191,7 +191,7 @@ def _refuse_twice(places: Places, key: str, found: Mapping[int, Matrix], rows: M
 
 
 def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int) -> Matrix:
-    """Replace followers among those followed by what they follow."""
+    """Replace masters that are themselves followers by their own masters."""
     for _ in range(rounds + 1):
         chained = weights[:, followers]
         if not chained.nnz:

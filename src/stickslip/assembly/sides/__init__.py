@@ -1,1 +1,1 @@
-"""What vibrates: a sector wave by wave, a wheel whose sectors differ, a range of speeds, an unreduced model."""
+"""Linear sides of a model: a sector wave by wave, a mistuned wheel, a range of speeds, an unreduced model."""

@@ -207,7 +207,7 @@ def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) 
 
 
 def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
-    """Return what another part in one sector changes, seen by the motions of the tuned wheel."""
+    """Return the change by another part in one sector, in the coordinates of the tuned wheel."""
     key = f"mistuning.{name}"
     old = model.places.part_of(one.part, f"{key}.part")
     _refuse_unlike(key, old, one.by)

@@ -166,7 +166,7 @@ def _at_rest(assembled: Assembled) -> AtRest:
 
 
 def _difference(line: SpeedLine, speed: float, true: Assembled) -> float:
-    """Return how far a line is from a model at a speed."""
+    """Return the difference of a speed line from the model at a speed."""
     mine, theirs = line.at(speed), _at_rest(true)
     orders = range(1 + (line.harmonics or 0))
     pairs = {id(theirs.of_harmonic(h)): (mine.of_harmonic(h), theirs.of_harmonic(h)) for h in orders}

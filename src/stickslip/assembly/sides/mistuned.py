@@ -261,7 +261,7 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
 
 
 def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | float) -> Matrix:
-    """Return the shares of deviations of a sector in a wave, with what the motion of the sector before, times `back`, adds."""
+    """Return the shares of deviations of a sector in a wave, including the motion of the sector before times `back`."""
     first = np.cumsum([0, *(c.rows.shape[0] for c in changes)])
     found, next_one = shares[: first[-1]], int(first[-1])
     if next_one == shares.shape[0]:

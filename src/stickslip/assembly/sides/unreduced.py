@@ -34,7 +34,7 @@ def kept_whole(model: Model) -> int:
 
 
 def _dofs(model: Model) -> tuple[int, int]:
-    """Return how many dofs the parts that are kept whole have, and how many of these touch no contact."""
+    """Return the number of dofs of unreduced parts, and how many of these touch no contact."""
     if model.neighbours is not None:
         return 0, 0
     whole = [

@@ -257,7 +257,7 @@ def _dense(matrix: Matrix) -> Matrix:
 
 
 def _content_of(model: Model, like: Sequence[Spin], wheel: Sequence[Any], kept: IntArray) -> str:
-    """Return what the modes at other speeds depend on, as text; empty where none are asked for."""
+    """Return the inputs of the modes at other speeds as text; empty without such modes."""
     if not like:
         return ""
     parts = [part.structure for part in model.parts.values()]

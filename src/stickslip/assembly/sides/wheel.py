@@ -161,7 +161,7 @@ def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
 def _one_after_the_other(
     tied: Sequence[tuple[IntArray, IntArray, Matrix | None]],
 ) -> tuple[IntArray, IntArray, Matrix | None]:
-    """Put what is tied together; with weights, each dof of the low faces is there once."""
+    """Join tied dofs; with weights each dof of the low faces occurs once."""
     low, high = stacked(one[0] for one in tied), stacked(one[1] for one in tied)
     if all(one[2] is None for one in tied):
         return low, high, None

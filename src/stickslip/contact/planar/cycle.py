@@ -136,7 +136,7 @@ def _newton(memory, dx, dy):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _slips(course):  # type: ignore[no-untyped-def]
-    """Return how often the contact slipped over the period."""
+    """Return the number of slips of the contact in the period."""
     count = 0
     for i in range(course.counts[0]):
         if course.segments[i, STATE] == SLIP and course.segments[i, COUNT] > 0:
@@ -146,7 +146,7 @@ def _slips(course):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
-    """Fill what the rows at the end of a period lack of those of the place that Newton's method goes on from."""
+    """Fill the difference of the rows at the end of a period from those at the start of the next Newton iteration."""
     for p in range(before.shape[1]):
         dx, dy = after[0, p] - before[0, p], after[1, p] - before[1, p]
         leap[0, p] = inverse[0, 0] * dx + inverse[0, 1] * dy - dx
@@ -155,7 +155,7 @@ def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows):  # type: ignore[no-untyped-def]
-    """Go on from the safe state and a share of the step that was made from it."""
+    """Continue from the safe state plus a share of the last step from it."""
     course.state[:] = safe
     _step(course, x, y, limit, share * leap[0], share * leap[1])
     for s in range(2):

@@ -144,7 +144,7 @@ def _closed_for_ever(run, follow_rows, course, k, slope, rows, correction, start
 
 @njit(**PART)
 def _assemble(motion, k, rows, correction, start_rows, work, coefficients, blocks):  # type: ignore[no-untyped-def]
-    """Fill coefficients and blocks from the integrals, and what the start of the period adds."""
+    """Fill coefficients and blocks from the integrals, and the contribution of the start of the period."""
     m = motion.waves.shape[1]
     q = rows.angle.size
     product_matrix(rows.stick, work.matrix)

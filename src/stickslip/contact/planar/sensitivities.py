@@ -270,7 +270,7 @@ def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def
 
 @njit(**PART)
 def _turn_forces(count, rows):  # type: ignore[no-untyped-def]
-    """Add what the turning of the force changes at the stages of a piece."""
+    """Add the effect of the rotation of the force at the stages of a piece."""
     q = rows.angle.size
     for j in range(STAGES):
         own, force = rows.stages[j], rows.force[count + j]
@@ -282,7 +282,7 @@ def _turn_forces(count, rows):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _stuck(segment, rows):  # type: ignore[no-untyped-def]
-    """Add what the resting slider takes off the force ``X`` over a segment."""
+    """Subtract the contribution of the resting slider from the force ``X`` over a segment."""
     left, right = segment[START], segment[END]
     harmonics_at(left, rows.harmonics[0])
     harmonics_at(right, rows.harmonics[1])

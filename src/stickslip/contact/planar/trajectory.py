@@ -219,7 +219,7 @@ def _cut(course, tau, width, kind, share):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _constant(piece):  # type: ignore[no-untyped-def]
-    """Leave the direction as it is on a piece that is too short to matter."""
+    """Keep the direction on a piece of negligible length."""
     for j in range(1, STAGES + 1):
         piece.angle[j] = piece.angle[0]
     linearise(piece.at, piece.angle, piece.matrix, piece.right)

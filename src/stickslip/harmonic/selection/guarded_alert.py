@@ -92,7 +92,7 @@ class GuardedAlert:
     def _doubted(
         self, step: Step, factors: Factored, residual: float, predicted: float, start: FloatArray
     ) -> tuple[float, ComplexArray]:
-        """Return a bound of the error and the best start of a repeat, from the prediction, ``q + Δq``, and what was at q."""
+        """Return an error bound and the best start of a repeat, from the prediction ``q + Δq`` and the solution q."""
         high, omega = step.reference, step.omega
         beyond = doubled(high)
         at = high.linearise(start, omega)
@@ -109,7 +109,7 @@ class GuardedAlert:
     def _followed(
         self, step: Step, beyond: HarmonicBalance, x: FloatArray, period: ContactPeriod, residual: float
     ) -> tuple[float, ComplexArray]:
-        """Go on by Newton's method until the answer is clear; see `_doubted`."""
+        """Continue Newton's method until the decision is clear; see `_doubted`."""
         begin = beyond.unknowns(step.balance.coefficients(step.x))
         first = float(np.hypot(residual, _unbalanced(step, beyond, begin)))
         before, whole, best = np.nan, np.inf, (np.inf, x)
@@ -146,7 +146,7 @@ def _unbalanced(step: Step, beyond: HarmonicBalance, begin: FloatArray) -> float
 
 
 def _left(size: float, before: float) -> float:
-    """Return how far a sequence still goes after a step: a geometric series, or for the first one the doubt in it."""
+    """Return the estimated remaining change of a sequence after a step: a geometric series, for the first step its uncertainty."""
     if np.isnan(before):
         return DOUBT * size
     if size >= before:
@@ -165,7 +165,7 @@ def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
 
 @lru_cache(maxsize=8)
 def doubled(reference: HarmonicBalance) -> HarmonicBalance:
-    """Return the same problem with harmonics up to twice the highest, or as many as a tuned wheel has waves: multiples of the common divisor of the kept ones."""
+    """Return the same problem with harmonics up to twice the highest (limited by the waves of a tuned wheel), multiples of the common divisor of the kept ones."""
     order = 2 * reference.order
     most = reference.linear.most
     order = order if most is None else min(order, most)

@@ -211,7 +211,7 @@ def _symbolic(
     group: IntArray,
     kept: IntArray,
 ) -> Dissection:
-    """Return the fronts, which know what they touch."""
+    """Return the fronts with their boundaries."""
     n = group.size
     place = np.full(len(members), len(pieces))
     for i, (nodes, _) in enumerate(pieces):

@@ -293,7 +293,7 @@ def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
 
 @contextmanager
 def _failures_of(feral: Matrix) -> Iterator[None]:
-    """Turn what the package raises into distrust; a panic of Rust is no `Exception`."""
+    """Convert errors of the package into a failed factorisation; a panic of Rust is no `Exception`."""
     try:
         yield
     except BaseException as error:

@@ -61,7 +61,7 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
 
 
 def _held(stiffness: Matrix) -> Solve:
-    """Factorise the stiffness of a solid whose rigid motions are held; say what it lacks where it can move nevertheless."""
+    """Factorise the stiffness of a solid with held rigid motions; an error names the missing support."""
     try:
         return factorise(stiffness)
     except SingularError as error:

@@ -136,7 +136,7 @@ def multifrontal(matrix: Matrix, kept: IntArray | None = None, dissection: Disse
 def _assembled(
     own: Matrix, front: Front, fronts: tuple[Front, ...], waiting: dict[int, Matrix]
 ) -> tuple[Matrix, Matrix]:
-    """Return the columns of the pivots, and the lower triangle of what is to be updated."""
+    """Return the columns of the pivots, and the lower triangle of the update matrix."""
     p, u = front.pivots, front.update.size
     kind = own.dtype
     pivots = np.zeros((p + u, p), dtype=kind, order="F")

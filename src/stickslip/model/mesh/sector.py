@@ -399,7 +399,7 @@ def _turned_y(radius: float, y: FloatArray, angle: float) -> FloatArray:
 
 
 def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
-    """Tell which `points` (n, 2) lie inside the `polygon` (p, 2), by counting crossings."""
+    """Return which `points` (n, 2) lie inside the `polygon` (p, 2), by counting crossings."""
     x, y = points[:, :1], points[:, 1:]
     (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
     spans = (y0 > y) != (y1 > y)

@@ -211,7 +211,7 @@ def _radius(gmsh: Any, face: int) -> float:
 
 
 def _lies_in(gmsh: Any, face: int, normal: FloatArray) -> bool:
-    """Tell whether all corners of a face and its centre lie in the plane through the origin with this normal."""
+    """Return whether all corners of a face and its centre lie in the plane through the origin with this normal."""
     corners = gmsh.model.getBoundary([(2, face)], recursive=True)
     at = [gmsh.model.getValue(0, tag, []) for _, tag in corners]
     at.append(gmsh.model.occ.getCenterOfMass(2, face))

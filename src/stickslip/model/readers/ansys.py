@@ -79,7 +79,7 @@ def read_ansys_full(
 
 
 def _supported(file: Records, header: IntArray) -> int:
-    """Return the number of equations; refuse what is not read."""
+    """Return the number of equations; refuse unsupported content."""
     refused = {
         "was written by the frontal solver": header[0] >= 0,
         "holds a lumped mass matrix": header[10] != 0,

@@ -303,7 +303,7 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
 
 
 def _found_instead(model: DeckModel, name: str) -> str:
-    """Say what may have been meant where a material lacks a keyword: another material, or the keyword below it."""
+    """Return the probable cause of a missing keyword of a material: another material, or the keyword below it."""
     known = sorted({*model.elastic, *model.density})
     if name not in known:
         return f"Add it. {did_you_mean(name, known)}" if known else "Add it."

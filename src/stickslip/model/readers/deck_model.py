@@ -24,7 +24,7 @@ NODES_OF = {"C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10, "C3D8": 8, "C3D2
 
 @dataclass
 class DeckModel:
-    """Content of a deck in its own numbers and units, as far as it is read.
+    """Supported content of a deck, in its own numbers and units.
 
     Cells are rows ``number, nodes…``; sections are pairs of material and element set; ``fixed`` holds nodes by
     component ``x``, ``y``, ``z``; speeds are squares of circular frequencies.
@@ -103,7 +103,7 @@ def unread(block: Block, problem: str) -> InputError:
 
 
 def _refused(block: Block) -> InputError:
-    """Say why a keyword is not passed over."""
+    """Return why a keyword cannot be ignored."""
     word = block.keyword
     if word in DAMPING:
         return input_error(

@@ -102,7 +102,7 @@ def _bad_counts(path: Path, line: str, number: int, count: int) -> InputError:
 
 
 def _stored(n: int, symmetry: str) -> int:
-    """Return how many values the layout ``array`` has: one triangle of a symmetric matrix."""
+    """Return the number of values in the layout ``array``; a symmetric matrix stores one triangle."""
     triangle = n * (n + 1) // 2
     return {"general": n * n, "skew-symmetric": triangle - n}.get(symmetry, triangle)
 

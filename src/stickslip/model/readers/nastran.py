@@ -198,7 +198,7 @@ def op4_matrices(path: Path, names: list[str], check: Callable[[str, tuple[int, 
 
 
 def _pick(path: Path, name: str, count: int) -> int:
-    """Return which of `count` matrices of the same name is meant by ``name`` or ``name[index]``."""
+    """Return the index of ``name`` or ``name[index]`` among `count` matrices of that name."""
     plain = name.split("[", maxsplit=1)[0]
     index = re.fullmatch(r"[^\[]+(?:\[(-?\d{1,6})\])?", name)
     if index is None or (index[1] is None and count > 1):

@@ -30,7 +30,7 @@ READS = ".inp, .sti, .mas, .dof, .frd, .full, .rst, .cdb, .op2, .mtx, .npz, .h5"
 
 @dataclass(frozen=True)
 class _Files:
-    """What a reader may need."""
+    """Files and settings of a reader."""
 
     path: Path
     units: Units
@@ -177,7 +177,7 @@ def _npz(files: _Files) -> Structure:
 
 
 def _mtx(files: _Files) -> Structure:
-    """Tell Matrix Market from the text of Abaqus, which has the same suffix."""
+    """Distinguish Matrix Market from the text of Abaqus, which has the same suffix."""
     if read_text(files.path).startswith("%%MatrixMarket"):
         return _neutral(files)
     partner = re.sub("STIF", "MASS", files.path.name)

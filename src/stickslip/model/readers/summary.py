@@ -198,7 +198,7 @@ def structure_summary(structure: Structure, *, n_modes: int = 10, units: Units =
 
 
 def _rank_of_mass(structure: Structure) -> tuple[int, list[str]]:
-    """Return how many modes there are, of a large model at most, and a remark where motions have no mass."""
+    """Return the number of modes (an upper bound for a large model), and a remark on motions without mass."""
     heavy = int(np.count_nonzero(structure.mass.diagonal()))
     said = [f"{structure.n - heavy} dofs have no mass."] if heavy < structure.n else []
     if not 0 < structure.n <= DENSE:

@@ -59,7 +59,7 @@ def _decoded(path: Path, content: bytes) -> str:
 
 
 def _neighbours(path: Path) -> str:
-    """Say which file beside `path` may be meant."""
+    """Return the file beside `path` that was probably meant."""
     try:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:

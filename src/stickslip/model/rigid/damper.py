@@ -133,7 +133,7 @@ class FlatCurvedDamper:
         self.body()  # checks mass, inertia and centre
 
     def _check_extents(self) -> None:
-        """Refuse points beyond the stretches that are told to touch."""
+        """Refuse points beyond the contact stretches."""
         if self.length is not None and not grow_within(self.sections, -self.length / 2, self.length / 2):
             raise input_error(
                 "FlatCurvedDamper.length",

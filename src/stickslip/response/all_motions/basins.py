@@ -39,7 +39,7 @@ class Basins:
     ends: tuple[int, ...]
 
     def count(self, motion: int) -> int:
-        """Return how many starts end on a motion."""
+        """Return the number of starts that end on a motion."""
         return self.ends.count(motion)
 
     def share(self, motion: int) -> float:

@@ -273,7 +273,7 @@ class _Search:
     # --- time ---------------------------------------------------------------------------------
 
     def _started(self, place: int, omega: float) -> Iterator[Stage]:
-        """Integrate from random states, follow what they end on and is new, and count where they end."""
+        """Integrate from random states, follow each new motion that they reach, and count the starts of each motion."""
         search = self.search
         why = not_marched(self.problem.system)
         solutions = [x for _, x in self._at(omega)]
@@ -309,7 +309,7 @@ class _Search:
         yield self._kept(replace(made, branch=np.array(numbers, dtype=np.int64), tries=len(ends)))
 
     def _apart(self, rows: ComplexArray, x: FloatArray) -> float:
-        """Return how far a motion in time is from a solution, relative to the vibration."""
+        """Return the distance of a motion in time from a solution, relative to the vibration."""
         every = [self.balance.coefficients(y)[1:] for y in self._shifted([x])]
         size = max(float(np.linalg.norm(every[0])), np.finfo(float).tiny)
         return min(float(np.linalg.norm(rows[1:] - known)) for known in every) / size
@@ -339,7 +339,7 @@ class _Search:
         )
 
     def _change(self, point: ForcedPoint) -> float:
-        """Return what more harmonics would change in a motion, relative to its vibration; NaN for a wheel, whose waves end with its harmonics."""
+        """Return the change of a motion by more harmonics, relative to its vibration; NaN for a wheel, whose waves limit the harmonics."""
         side = self.problem.system.structure
         if side.wheel is not None or side.speed_follows_frequency:
             return np.nan

@@ -148,7 +148,7 @@ class Spectrum:
 
 
 def neutral_of(found: Stability) -> int:
-    """Return how many multipliers are 1."""
+    """Return the number of multipliers that are 1."""
     return found.floquet.neutral
 
 

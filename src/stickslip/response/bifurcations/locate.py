@@ -125,7 +125,7 @@ class _Crossing:
 
 @dataclass(eq=False)
 class _Walk:
-    """Goes along a branch and collects what it finds."""
+    """Search along a branch for bifurcations."""
 
     problem: ForcedProblem
     examine: Examine | None
@@ -180,7 +180,7 @@ class _Walk:
         self.unseen.append((first, last, why))
 
     def _look(self, point: ForcedPoint) -> Stability | None:
-        """Return what the multipliers of a point are; None where they are not known, or no more may be asked for."""
+        """Return the multipliers of a point; None where they are unknown or the budget is spent."""
         known = self.seen.get(id(point))
         if known is None:
             if self.examine is None or self.examined >= self.most:
@@ -254,7 +254,7 @@ class _Walk:
             self._locate(step, a, beside_fold=another)
 
     def _locate(self, step: Stretch, place: int, *, beside_fold: bool) -> None:
-        """Locate all that crosses within a step: one after the other, in what is left on both sides; or on both sides of a fold."""
+        """Locate all crossings within a step: one after the other in the remaining parts on both sides, or on both sides of a fold."""
         at = [step.before, step.after]
         if beside_fold:
             at[1:1] = self._around(step)
@@ -338,7 +338,7 @@ class _Walk:
     def _described(
         self, step: Stretch, place: int, k: int, ends: tuple[Spectrum, Spectrum], sides: tuple[_Seen, _Seen], at: Point
     ) -> Bifurcation:
-        """Return what crosses between two neighbours of a located point."""
+        """Return the crossing between two neighbours of a located point."""
         (low, before), (high, after) = sides
         larger, smaller = (before, after) if before.excess(k) > after.excess(k) else (after, before)
         value, error = larger.of_place(k)

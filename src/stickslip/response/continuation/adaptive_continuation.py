@@ -70,7 +70,7 @@ def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterato
 
 @dataclass(slots=True, eq=False)
 class _Stop:
-    """A point of the branch, from what it goes on, and whether more harmonics have confirmed it."""
+    """A point of the branch, the start of its continuation, and whether more harmonics have confirmed it."""
 
     point: Followed
     ahead: Followed
@@ -134,7 +134,7 @@ class _Walk:
     # --- one step -----------------------------------------------------------------------------
 
     def _take(self, make: Callable[[], Followed]) -> Taken:
-        """Return what an interrupted run has stored, else compute and yield it."""
+        """Return the stored result of an interrupted run, or compute and yield it."""
         self.taken += 1
         known = next(self.stored, None)
         if known is None:
@@ -173,7 +173,7 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        """Return how many levels may be used: a stretch has its own work, so that a hard one leaves enough for what comes after it, and all have `STRETCHES` times as much."""
+        """Return the number of allowed levels: each stretch has its own budget, so a hard one leaves enough for later ones, and all together have `STRETCHES` times as much."""
         points = len(self.branch) + self.forgotten + 1
         own = levels_left(self.curve, self.route, max(points - self.before, 1), self.spent - self.spent_before)
         return min(own, levels_left(self.curve, self.route, points, self.spent / STRETCHES))
@@ -182,7 +182,7 @@ class _Walk:
         return self._levels() <= MIN_LEVELS < self.curve.levels
 
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
-        """Go on with fewer harmonics where no more are left."""
+        """Continue with fewer harmonics where the budget of higher ones is spent."""
         level, index = self._levels() - 1, len(self.branch) - 1
         if here.ahead.level > level and index >= self.hold:
             known = here.ahead
@@ -195,7 +195,7 @@ class _Walk:
     # --- harmonics ----------------------------------------------------------------------------
 
     def _raised(self, made: Followed) -> Generator[Followed, None, bool]:
-        """Do what a point needs that is not quiet or was not found; return whether the branch goes on."""
+        """Raise the harmonics of a point that needs more or was not found; return whether the branch continues."""
         level, index = made.level + 1, len(self.branch)
         if level >= self._levels():
             return False
@@ -219,7 +219,7 @@ class _Walk:
         return True
 
     def _compared(self, index: int, level: int) -> Generator[Followed, None, bool]:
-        """Audit a point with the harmonics of a level; return whether it held, and go on from the audit then."""
+        """Audit a point with the harmonics of a level; return whether it passed, and continue from the audit in that case."""
         stop = self.branch[index]
         if stop.ahead.level >= level:
             return True
@@ -364,7 +364,7 @@ class _Walk:
         return (yield from self._anew(made))
 
     def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
-        """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
+        """Solve a point without a solution with more harmonics by all methods; in a row of such points only now and then."""
         index, level = len(self.branch), made.level + 1
         if level >= self._levels() or index < self.anew_from or self._spent_up():
             return None
@@ -380,7 +380,7 @@ class _Walk:
         return (yield from self._take(make))
 
     def _left(self, p: float, level: int, reserved: float = 0.0) -> float:
-        """Return the share of the effort that is left at a value, but for what is `reserved`."""
+        """Return the remaining share of the effort at a value, without the `reserved` part."""
         return max(1.0 - reserved - self.tried.get((p, level), 0.0), 0.0)
 
     def _last(self) -> list[Followed]:
@@ -388,7 +388,7 @@ class _Walk:
         return [stop.ahead for stop in self.branch if stop.ahead.converged][-1:]
 
     def _looked_for(self) -> Iterator[Followed]:
-        """Look once more for what was not found, from the neighbours on both sides, the last ones first."""
+        """Search again for missing points from their neighbours on both sides, the last ones first."""
         for index in reversed(range(len(self.branch))):
             if self.branch[index].point.converged:
                 continue

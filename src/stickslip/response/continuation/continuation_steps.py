@@ -155,7 +155,7 @@ def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -
 
 
 def _beside(curve: Curve, before: Sequence[Followed], one: Followed) -> bool:
-    """Whether a point tells what an earlier part of the branch tells at its value of the parameter."""
+    """Whether a point repeats an earlier part of the branch at its value of the parameter."""
     for a, b in pairwise(before):
         if a.p != b.p and (one.p - a.p) * (one.p - b.p) <= 0.0:
             level = max(a.level, b.level, one.level)

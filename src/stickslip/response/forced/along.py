@@ -121,7 +121,7 @@ class ForcedCurve:
         return Judged(bound, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step, point: Point) -> Judged:
-        """Predict the error by a Newton step with the harmonics of the next level, and doubt it by what the step after it would change."""
+        """Predict the error by a Newton step with the harmonics of the next level; the change by a second step is its uncertainty."""
         more, following = self._reference(level, point), self.supports[level + 1]
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
         kept: list[tuple[_Inverse | None, float]] = []
@@ -156,7 +156,7 @@ class ForcedCurve:
     def _doubt(
         self, step: Step, more: HarmonicBalance, x: FloatArray, inverse: _Inverse | None, residual: float
     ) -> float:
-        """Return how far a prediction may be off: contacts that change their states on the way make the next step as large, or larger."""
+        """Return the uncertainty of a prediction: contacts that change their states can make the next step as large or larger."""
         rest = more.linearise(x, step.omega).residual
         chord = None if inverse is None else inverse(-rest)
         if chord is None or not float(np.linalg.norm(rest)) <= residual:
@@ -266,7 +266,7 @@ def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -
 
 @lru_cache(maxsize=2)
 def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint:
-    """Return the same; kept, because the follower goes on from what is written down."""
+    """Return the argument unchanged; kept since the continuation restarts from stored points."""
     point, judged = found.point, found.judged
     return forced_point(
         curve.problem(found.level), point.solution, stage, found.index, point.p, found.seconds, point, judged

@@ -158,14 +158,14 @@ def _told(seen: Repetition) -> Marched:
 
 
 def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
-    """Return the highest harmonics that are tried: those asked for, then more, as the balance may have lost at a fold what a few more give back."""
+    """Return the orders to try: the requested ones, then more, since a few more harmonics may restore a solution that was lost at a fold."""
     most = problem.sweep.cap if problem.sweep.auto else lost.order + MORE[-1]
     more = [lost.order + m for m in MORE if lost.order + m <= most]
     return [lost.order, *more] if is_full(lost.support) else [lost.order]
 
 
 def _solved(problem: ForcedProblem, lost: ForcedPoint, seen: Repetition) -> list[tuple[Balance, Solution]]:
-    """Return attempts from the motion in time, the last of which counts: as near as it begins, the natural level goes on where the residual stalls.
+    """Return attempts from the motion in time, of which the last counts; so close to the solution the natural-level Newton method continues where the residual stalls.
 
     What settles too slowly to be told begins there, too, with the harmonics asked for.
     """

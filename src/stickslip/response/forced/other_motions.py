@@ -190,7 +190,7 @@ def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> fl
 
 
 def _affordable(problem: ForcedProblem, allowed: float) -> int:
-    """Return how many periods may be marched."""
+    """Return the number of affordable periods."""
     return min(PERIODS, int(allowed / _period_work(problem)))
 
 

@@ -97,13 +97,13 @@ class _Second:
                     yield from self._again(run, way, branch)
 
     def _left(self, run: Sequence[ForcedPoint]) -> list[ForcedPoint]:
-        """Return what of a run has not been found."""
+        """Return the missing points of a run."""
         return [p for p in run if p.index not in self.high or not self.high[p.index].converged]
 
     def _again(
         self, run: Sequence[ForcedPoint], way: Callable[[], FloatArray] | None, branch: Sequence[ForcedPoint]
     ) -> Iterator[ForcedPoint]:
-        """Repeat what of a run has not been found."""
+        """Repeat the missing points of a run."""
         for point in self._left(run):
             made = next(self.stored, None)
             if made is None:
@@ -424,7 +424,7 @@ def _from_behind(
 def _solution(
     problem: ForcedProblem, balance: AnyBalance, tried: Sequence[ForcedPoint], omega: float, start: ComplexArray | None
 ) -> Solution:
-    """Solve from a given start, or what was found so far; then along the branch from there; then as without one."""
+    """Solve from a given start or the solutions so far; then along the branch from there; then without a start."""
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
     near = _nearest(tried, balance.harmonics, omega)
     guesses = [] if start is None else [balance.unknowns(start)]
@@ -463,7 +463,7 @@ def _nearest(tried: Sequence[ForcedPoint], harmonics: Harmonics, omega: float) -
 def _judged(
     problem: ForcedProblem, point: ForcedPoint, following: float, before: Step | None
 ) -> tuple[Step | None, Verdict]:
-    """Return the solution as the strategy saw it, and what it said."""
+    """Return the solution as given to the strategy, and the verdict of the strategy."""
     reference = problem.high.harmonics
     if not point.converged:
         # one that is not found may be so because its harmonics are too few

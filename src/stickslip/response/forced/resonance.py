@@ -218,7 +218,7 @@ class _Search:
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
-        """Solve with more harmonics, from what the strategy foretells and from the padded solution."""
+        """Solve with more harmonics, from the prediction of the strategy and from the padded solution."""
         balance, options = curve.problem(level), self.problem.sweep.newton
         solution = first_converged(
             newton(lambda x: balance.linearise(x, now.p), start, options) for start in curve.starts(now, level)
@@ -246,7 +246,7 @@ def _on_seam(known: Sequence[ForcedPoint], top: int) -> bool:
 
 
 def _vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
-    """Where to look next for the peak; None when it is resolved, at the ends of the branch, or where it folds."""
+    """Return the next frequency in the search for the peak; None when it is resolved, at the ends of the branch, or beside a fold."""
     top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):
         return None

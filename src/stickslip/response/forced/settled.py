@@ -198,7 +198,7 @@ class _Settling:
     def _nearest(
         self, place: int, support: Harmonics
     ) -> Generator[ForcedPoint, None, tuple[ForcedPoint | None, float]]:
-        """Solve a point with the harmonics of a level, and return what is nearest to it with the change to that; None where nothing is found."""
+        """Solve a point with the harmonics of a level, and return the nearest solution with its change; None without a solution."""
         here, balance = self.known[place], _balance(self.problem, support)
         more: ForcedPoint | None = None
         change = np.inf
@@ -230,7 +230,7 @@ class _Settling:
         return forced_point(balance, found, self.stages[1], here.index, here.omega, 0.0)
 
     def _raised(self, more: ForcedPoint, bound: float) -> ForcedPoint:
-        """Return a solution that was to compare as one that stands for its frequency; with the most harmonics the change from fewer bounds its error."""
+        """Return an audit solution as the accepted one of its frequency; with the most harmonics the change from fewer bounds its error."""
         return replace(
             more, stage=self.stages[0], predicted_error=bound, iterations=0, seconds_contact=0.0, seconds_linear=0.0
         )

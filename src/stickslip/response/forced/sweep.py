@@ -188,7 +188,7 @@ class Sweep:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Where the response begins and ends, rad/s, in the direction in which it is gone through."""
+        """Return first and last frequency of the response in the direction of the sweep, rad/s."""
         first, last = self.omega_range
         return (first, last) if self.direction == "up" else (last, first)
 

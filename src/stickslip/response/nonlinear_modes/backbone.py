@@ -188,7 +188,7 @@ class ModeWay:
         yield from Closer(self.curve, branch_of(every)).run(max(self.route.points, CLOSER), between)
 
     def _followed(self, done: Sequence[Followed]) -> Iterator[Followed]:
-        """Yield what is found on the way and is not in `done`."""
+        """Yield the new points that are not in `done`."""
         branch: list[Followed] = []
         for i, one in enumerate(chain(done, follow(self.curve, self.route, done))):
             if i >= len(done):
@@ -213,7 +213,7 @@ class ModeWay:
         return Backbone(own.system, own.load, own.mode, own.dof, made, end)
 
     def _resonances(self, found: Sequence[Followed], made: Sequence[ModePoint]) -> str:
-        """Say where harmonics of the mode meet other modes that take part, or may; empty where none does."""
+        """Return where harmonics of the mode meet other modes that respond or may respond; empty without any."""
         said = []
         for one in Closer(self.curve, list(found)).crossings():
             ends = (made[one.first].amplitude, made[one.last].amplitude)
@@ -323,7 +323,7 @@ def _product(system: System, harmonic: int, moving: ComplexArray) -> float:
 
 
 def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:
-    """Return how many points no branch led to: they lie a known share of the longest step ahead of all others, and go on with the first step."""
+    """Return the number of points that no branch reached: they lie a known share of the longest step ahead of all others, and continue with the first step."""
     count, farthest = 0, found[0].p
     for f in found[1:]:
         ahead = (f.p - farthest) / route.gap
@@ -334,7 +334,7 @@ def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:
 
 
 def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bool) -> str:
-    """Say how a curve ended, whose last point was `found`."""
+    """Return how a curve with the last point `found` ended."""
     solved = [p for p in points if p.converged]
     if not solved:
         return "no motion found at the first amplitude"

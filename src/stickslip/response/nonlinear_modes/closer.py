@@ -58,7 +58,7 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """What the tests see of a point: ln a, frequency and damping ratio, the motion (H + 1, n) over a, and of each harmonic from 2 on the number of modes below it."""
+    """Quantities of a point that the tests use: ln a, frequency and damping ratio, the motion (H + 1, n) over a, and for each harmonic from 2 on the number of modes below it."""
 
     p: float
     numbers: FloatArray

@@ -59,7 +59,7 @@ class Oscillation:
 
     @property
     def eigenvalue(self) -> ComplexArray:
-        """(p,) λ near ``-ζω + iω``, 1/s, at which a free motion goes on: ``D(Ω) = (iΩ - λ) (iΩ + ψᴴ C ψ + λ)``."""
+        """(p,) eigenvalue λ near ``-ζω + iω`` of the free motion, 1/s: ``D(Ω) = (iΩ - λ) (iΩ + ψᴴ C ψ + λ)``."""
         half = 0.5 * self.viscous
         rest = self.omega**2 + 1j * (2.0 * self.ratio * self.omega**2 - self.omega * self.viscous)
         return np.asarray(1j * np.sqrt(rest - half**2) - half)

@@ -245,7 +245,7 @@ def _share(one: ComplexArray, other: ComplexArray) -> float:
 
 
 def _basis(free: Structure, force: ComplexArray) -> Matrix:
-    """Return what spans the motions that count."""
+    """Return a basis of the relevant motions."""
     if free.n <= WHOLE:
         return np.eye(free.n)
     still = replace(free, stiffness=_hermitian(free.stiffness), mass=_hermitian(free.mass))

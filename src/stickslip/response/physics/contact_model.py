@@ -201,7 +201,7 @@ def halved(system: System, groups: Sequence[str], position: FloatArray, area: Fl
 
 
 def _pairs(position: FloatArray) -> IntArray:
-    """Return for each point that which stands for it: itself, or the nearest of the points before it that stands for itself alone."""
+    """Return the representative of each point: itself, or the nearest earlier point that represents itself alone."""
     takes = np.arange(len(position))
     open_to = np.ones(len(position), dtype=bool)
     for i in range(len(position)):

@@ -404,7 +404,7 @@ def with_enough(
 
 
 def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]) -> float:
-    """Return by how much a Newton step with more combined frequencies changes a motion: root mean square over that of the motion, of the coordinate that it changes most.
+    """Return the change of a motion by a Newton step with more combined frequencies: ratio of root mean squares at the coordinate of the largest change.
 
     Parameters
     ----------
@@ -440,5 +440,5 @@ def _with_free_tone(balance: TorusBalance, x: FloatArray, at: TorusLinearisation
 
 
 def room(problem: TwoTones) -> int:
-    """Return how many combined frequencies may be added."""
+    """Return the number of combined frequencies that may be added."""
     return MAX_DENSE_UNKNOWNS // (2 * problem.balance.side.n) - len(problem.balance.indices)

@@ -307,7 +307,7 @@ def _told(beginning: Beginning, amplitude: float, solution: Solution) -> ToneOfA
 
 
 def _guess(before: tuple[float, FloatArray] | None, last: tuple[float, FloatArray], amplitude: float) -> FloatArray:
-    """Continue the line through two points; through one the second tone alone grows by as much as the amplitude does."""
+    """Extrapolate linearly from two points; from one point the second tone alone grows in proportion to the amplitude."""
     if before is None:
         return last[1]
     share = (amplitude - last[0]) / (last[0] - before[0])
@@ -315,7 +315,7 @@ def _guess(before: tuple[float, FloatArray] | None, last: tuple[float, FloatArra
 
 
 def _of_second(problem: TwoTones) -> BoolArray:
-    """Return which unknowns belong to combined frequencies in which the second takes part."""
+    """Return which unknowns belong to combined frequencies that contain the second one."""
     rows = [k != 0 for _, k in problem.balance.indices[1:] for _ in range(2)]
     return np.repeat([False, *rows], problem.balance.side.n)
 

@@ -38,7 +38,7 @@ CLOSER = 2  # times that the best ray is looked at with rays a hundredth as far 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """Where the sliders of a motion may rest without being moved.
+    """The positions at which the sliders of a motion may rest without being moved.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class TractionState:
 
     @cached_property
     def room(self) -> Room:
-        """Where the sliders rest and might rest."""
+        """Return the actual and the possible rest positions of the sliders."""
         balance = self.problem.at(self.sliders)
         return room_of(self.problem.starts, balance.contacts(self.x, self.omega))
 

@@ -103,7 +103,7 @@ def _same(one: TractionState, other: TractionState) -> bool:
 
 
 def _starts(reference: TractionState, search: TractionSearch) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield sliders and the shares of the limits at t = 0 that they stand for in the reference: all limits, corners, and random ones."""
+    """Yield slider positions and their shares of the limits at t = 0 in the reference: all limits, corners, and random ones."""
     problem = reference.problem
     springs = problem.starts.stiffness > 0.0
     count = int(np.count_nonzero(springs))

@@ -62,7 +62,7 @@ class Tracker:
         return replace(point, omega=self.periods * point.omega)
 
     def take(self, point: PeakPoint) -> None:
-        """Go on from a peak that was found before."""
+        """Continue from a known peak."""
         balance = self.problem.family(point.value)
         motion = balance.unknowns(point.coefficients[:, balance.linear.retained])
         y = np.append(motion, np.log(point.omega / self.periods / self.problem.omega_scale))
@@ -106,7 +106,7 @@ class Tracker:
         self.problem = replace(self.problem, phase=phase)
 
     def _predicted(self, value: float) -> FloatArray:
-        """Go on through the last two peaks, or along the tangent at the only one; the last one, where that would go far."""
+        """Extrapolate through the last two peaks, or along the tangent at the only one; use the last one if the extrapolation is far."""
         (before, earlier), (p, y) = self.known[0], self.known[-1]
         if p != before:
             share = (value - p) / (p - before)
@@ -219,7 +219,7 @@ def _is_another(one: Tracker, made: list[Tracker]) -> bool:
 
 
 def represented_as(search: PeakSearch, point: PeakPoint, how: Discretisation) -> PeakPoint:
-    """Return a peak as it is with other harmonics, from the known one, by horizontal tangent."""
+    """Return a peak with other harmonics, solved from the known one by horizontal tangent."""
     more = replace(search, how=how, by="horizontal_tangent")
     problem = more.problem(point.value)
     problem = replace(problem, omega_scale=point.omega / search.periods)
@@ -353,7 +353,7 @@ def _is_one(one: PeakPoint, other: PeakPoint) -> bool:
 
 
 def _way(before: PeakPoint | None, point: PeakPoint) -> float:
-    """Return how far the frequency of a peak has gone since its last value, relatively."""
+    """Return the relative change of the frequency of a peak since its last value."""
     return 0.0 if before is None else abs(point.omega / before.omega - 1.0)
 
 

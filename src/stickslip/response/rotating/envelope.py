@@ -157,7 +157,7 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
 
 
 def _longer(error: float) -> float:
-    """Return the factor on the length of a step that had an error, as a share of what it may be; infinite where it was not solved."""
+    """Return the factor on the step length after a step with an error, given as a share of the allowed one; infinite if it was not solved."""
     if np.isinf(error):
         return SHRINK
     share = SAFE * max(error, 1e-12) ** (-1 / 3)
@@ -304,7 +304,7 @@ def _derivative(points: list[_Step], step: float) -> tuple[float, ComplexArray]:
 
 
 def _ahead(points: list[_Step], step: float) -> ComplexArray:
-    """Return the polynomial through the last three points, or as many as there are, a step ahead."""
+    """Return the polynomial through up to three last points, a step ahead."""
     time = points[-1].time + step
     found = np.zeros_like(points[-1].q)
     for one in points:

@@ -220,7 +220,7 @@ def at_amplitude(problem: SelfExcited, amplitude: float, near: Sequence[FloatArr
 
 
 def _of_point(problem: SelfExcited, followed: Followed) -> AmplitudePoint:
-    """Return what a point of a curve over the amplitude tells, its level as a damping ratio."""
+    """Return the record of a point of a curve over the amplitude, with its level as a damping ratio."""
     return _point(problem, float(np.exp(followed.p)), followed.point.solution)
 
 

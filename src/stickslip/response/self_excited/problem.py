@@ -353,7 +353,7 @@ def leaving(interface: Interface) -> BoolArray:
 
 
 def _leaves(law: ContactLaw) -> bool:
-    """Tell whether a law leaves the state of sticking far along its tangents or far away."""
+    """Return whether a law stops sticking at a large tangential displacement or a large gap."""
     return any(_state(law, gap) for gap in FAR * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]))
 
 

@@ -30,7 +30,7 @@ class _Rung:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """The stability of a point, and the motion that has it where the point as it was solved has another.
+    """Stability of a point, and the motion with it if the point as solved has another stability.
 
     Parameters
     ----------

@@ -239,7 +239,7 @@ def period_map(
 
 
 def _shift(marcher: Marcher, symmetry: WaveMotion) -> FloatArray:
-    """Return the matrix by which a state (q, w, z) becomes that of the sectors that they stand for."""
+    """Return the matrix that shifts a state (q, w, z) to the represented sectors."""
     modes, n, n_states = marcher.modes, marcher.n, marcher.contacts.start.size
     moved = modes.inverse @ symmetry.shifted(modes.basis)
     turned = moved * modes.speed / modes.speed[:, None]

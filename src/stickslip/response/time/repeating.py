@@ -224,7 +224,7 @@ def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: Flo
 
 
 def _repeats(gaps: Sequence[ComplexArray]) -> int:
-    """Return after how many periods a motion repeats itself, 0: after none; after several only what settles to that while it goes on to change in each.
+    """Return the number of periods after which a motion repeats, 0 for none; several only if the motion keeps changing within them.
 
     A motion that dies at a half of the frequency changes less from two periods to the next two than from one to the next, too, but both alike.
     """

@@ -45,7 +45,7 @@ class WaveMotion:
     ahead: int
 
     def shifted(self, rows: Matrix) -> Matrix:
-        """Return (sectors · p, ...) rows, sector by sector, as the sectors that they stand for have them."""
+        """Return (sectors · p, ...) rows, sector by sector, shifted to the represented sectors."""
         parts = np.asarray(rows).reshape(self.sectors, -1, *np.shape(rows)[1:])
         return np.roll(parts, self.ahead, axis=0).reshape(np.shape(rows))
 
@@ -89,7 +89,7 @@ class SectorsInTime:
 
     @property
     def count(self) -> int:
-        """Number of integrated sectors; without `every` only those that stand for the others."""
+        """Number of integrated sectors; without `every` only the representatives."""
         return self.structure.n // _kept(self.wheel)
 
 
@@ -178,7 +178,7 @@ class InTime:
     ahead: int = 0
 
     def shifted(self, rows: Matrix) -> Matrix:
-        """Return (sectors · p, ...) rows, sector by sector, as those of the sectors that they stand for after a share of the period."""
+        """Return (sectors · p, ...) rows, sector by sector, shifted to the represented sectors after a share of the period."""
         return WaveMotion(self.sectors, self.ahead).shifted(rows)
 
 

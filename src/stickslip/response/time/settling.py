@@ -14,7 +14,7 @@ OVERFLOW = 1e100  # far above every motion, and its square is still a number
 
 
 def overflowed(*arrays: FloatArray) -> bool:
-    """Return whether a number is NaN or so large that what is computed from it may overflow."""
+    """Return whether a number is NaN or so large that later computations may overflow."""
     return any(not np.max(np.abs(array), initial=0.0) < OVERFLOW for array in arrays)
 
 
@@ -24,7 +24,7 @@ def last_third(n: int) -> int:
 
 
 def remaining_change(changes: Sequence[float]) -> float:
-    """Estimate what is left of a decaying sequence of changes per period: the sum of those still to come.
+    """Estimate the sum of the remaining changes of a sequence that decays per period.
 
     The largest changes of two successive stretches, each a third of the record and at least four periods, give the
     ratio ρ of the decay per period; the rest is ``d ρ / (1 - ρ)``. The stretches grow with the record so that slow
@@ -120,7 +120,7 @@ class Progress:
         return (self.means[-1] - self.means[-1 - stretch]) / stretch
 
     def _relative(self, difference: ComplexArray, size: ComplexArray) -> float:
-        """Return the largest entry of the judged harmonics of a difference over that of what it is relative to."""
+        """Return the largest entry of the judged harmonics of a difference over that of the reference."""
         own = list(self.judged)
         largest = float(np.max(np.abs(size[own])))
         return float(np.max(np.abs(difference[own]))) / largest if largest > 0.0 else 0.0

@@ -112,7 +112,7 @@ class ShootingResult:
 
 @dataclass(slots=True)
 class _Search:
-    """Where the search for a fixed point stands."""
+    """State of the search for a fixed point."""
 
     state: FloatArray
     status: ShootingStatus = "not converged"
@@ -276,7 +276,7 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
 
 
 def _approach(mapping: PeriodMap, search: _Search, inverse: FloatArray, correction: FloatArray, close: float) -> bool:
-    """Correct the state, and go on with the same derivative for as long as that pays; return whether it came nearer.
+    """Correct the state, with the same derivative for as long as that pays; return whether the residual fell.
 
     Distances are taken in the measure of the correction itself, in which weakly damped directions count as much as others.
     """

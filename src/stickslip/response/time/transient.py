@@ -203,7 +203,7 @@ def integrate(  # noqa: PLR0913
 def _settle(
     marcher: Marcher, state: StepState, outputs: IntArray, stepping: TimeStepping, judged: tuple[int, ...]
 ) -> TransientResult:
-    """March period by period until what is left of the change of the judged harmonics is below the tolerance."""
+    """March period by period until the remaining change of the judged harmonics is below the tolerance."""
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
     now = Progress(unknown, np.full(n, np.nan), judged=judged)

@@ -104,7 +104,7 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
 
 
 def _means(table: MistuningTable, mean: FloatArray, alone: FloatArray) -> str:
-    """Say how far the mean of the measured blades differs from the model, and whether the difference is used."""
+    """Return a sentence on the difference of the measured mean frequency from the model, and whether it is used."""
     pairs = zip(mean, alone, strict=False)
     told = "; ".join(
         f"mode {m}: measured blades have a mean of {f:.6g} Hz, the model's blade {own:.6g} Hz"

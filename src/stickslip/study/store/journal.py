@@ -100,7 +100,7 @@ class JobJournal:
             self._db.execute("delete from note where name = ?", (name,))
 
     def get(self, name: str) -> dict[str, Any] | None:
-        """Return what was stored under `name`; None for an unknown name."""
+        """Return the note stored under `name`; None for an unknown name."""
         with _named(self._path):
             return _note(self._db, name)
 

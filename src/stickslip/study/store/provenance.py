@@ -15,7 +15,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pydantic", "xarra
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from.
+    """Origin of a result.
 
     Parameters
     ----------

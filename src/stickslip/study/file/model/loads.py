@@ -197,7 +197,7 @@ class Retention(Section):
 
 
 class Limits(Section):
-    """What a run may cost; a study that is estimated above is refused before it starts."""
+    """Limits on the cost of a run; a study with a higher estimate is refused before it starts."""
 
     memory_gb: Positive = Field(4.0, description="memory in GB that a run may take, greater than zero")
     work_s: Positive = Field(

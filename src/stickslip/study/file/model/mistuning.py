@@ -27,7 +27,7 @@ BESIDE = {
 
 
 class MistuningTable(Section):
-    """What differs from sector to sector: blades (`of`), a contact (`contact`), or the part of one sector (`part`)."""
+    """Mistuning: differences between sectors of blades (`of`), of a contact (`contact`), or of the part of one sector (`part`)."""
 
     of: Name | None = Field(
         None, description='blades that differ: a part, or a node set of one such as "blade.airfoil"'

@@ -56,7 +56,7 @@ class SetTable(Section):
 
 
 class PartTable(Section):
-    """What every part that vibrates by itself may say."""
+    """Keys of every part with modes of its own."""
 
     material: MaterialTable | None = Field(
         None, description="the table of its material; left out: the table [material]"
