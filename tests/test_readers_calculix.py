@@ -24,6 +24,7 @@ from stickslip.model import (
     rotating_solid,
 )
 from stickslip.model.readers.node_table import mesh_nodes
+from stickslip.model.readers.open_model import read_structure
 from stickslip.model.readers.positions import doubt_about_positions
 from stickslip.reduction import CyclicSector, cyclic_sector, travelling_wave
 
@@ -520,3 +521,9 @@ def test_preload_is_no_doubt_about_positions():
     assert doubt_about_positions(structure) is None
     turned = replace(structure, dofs=replace(structure.dofs, position=structure.dofs.position[:, [1, 2, 0]]))
     assert doubt_about_positions(turned) is not None
+
+
+def test_results_are_no_structure() -> None:
+    path = DATA / "brick_static.frd"
+    with pytest.raises(InputError, match=r"part\.blade\.file: brick_static\.frd holds results, .*Give a deck"):
+        read_structure("part.blade.file", path)

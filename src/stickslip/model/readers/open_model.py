@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from stickslip.errors import InputError, input_error
 from stickslip.model.fe.factorisation import Say, silent
@@ -92,6 +93,22 @@ def read_model(
     if not path.is_file():
         read_text(path)  # its message names the file that may be meant
     return _READERS[suffix](files)
+
+
+def read_structure(place: str, path: Path, **settings: Any) -> Structure:
+    """Read matrices, by the suffix of their file; arguments beside `place`, the key that an error names, as in `read_model`.
+
+    Raises
+    ------
+    InputError
+        If the file holds results or a deck, and as in `read_model`.
+    """
+    found = read_model(path, **settings)
+    if isinstance(found, Structure):
+        return found
+    raise input_error(
+        place, f"{path.name} holds results, not a model", "Give a deck (.inp), an archive (.cdb), or matrices."
+    )
 
 
 def _path(name: Path | str | None) -> Path | None:

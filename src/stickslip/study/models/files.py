@@ -24,7 +24,7 @@ from stickslip.model.readers.ansys_archive import (
     read_ansys_materials,
 )
 from stickslip.model.readers.calculix_deck import Deck, read_deck
-from stickslip.model.readers.open_model import read_model
+from stickslip.model.readers.open_model import read_structure
 from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
@@ -322,12 +322,7 @@ def _matrices(key: str, table: FileModel, files: Mapping[str, Path]) -> Structur
     """Read matrices by the suffix of their file."""
     names = {"mesh": "mesh", "mass": "mass", "damping_matrix": "damping", "nodes": "nodes"}
     beside = {names[name]: path for name, path in files.items() if name != "file"}
-    found = read_model(files["file"], units=_units(table), plausible=table.plausible, **beside)
-    if isinstance(found, Structure):
-        return found
-    raise input_error(
-        f"{key}.file", f"{table.file} holds results, not a model", "Give a deck (.inp), an archive (.cdb), or matrices."
-    )
+    return read_structure(f"{key}.file", files["file"], units=_units(table), plausible=table.plausible, **beside)
 
 
 def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
