@@ -113,11 +113,13 @@ def test_a_frequency_is_found_from_the_motion_in_time() -> None:
 
 def test_a_verdict_tells_what_the_motion_in_time_did() -> None:
     lost = SimpleNamespace(
-        status=np.array([0, Status.NOT_PERIODIC, Status.STALLED]),
+        points=SimpleNamespace(
+            status=np.array([0, Status.NOT_PERIODIC, Status.STALLED]),
+            marched_sentence=np.array(["periodic in time", "in time it wanders", ""]),
+        ),
         converged=np.array([True, False, False]),
         hz=np.zeros(3),
         nearer="more points",
-        texts=lambda name: {"marched_sentence": ["periodic in time", "in time it wanders", ""]}[name],
     )
     of_points = [finding for finding in unsolved(lost) if finding.points]  # type: ignore[arg-type]
     assert [f.points for f in of_points] == [(1,), (2,)]

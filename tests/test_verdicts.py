@@ -677,7 +677,7 @@ def test_points_that_share_a_frequency_keep_their_own_stability() -> None:
         stability_sentence=said,
     )
     own = Curve(data, 0)
-    found = {point: str(row["stability_verdict"]) for point, row in own.examined("stability_verdict")}
+    found = {point: str(row.stability_verdict) for point, row in own.examined}
     assert found == {2: "neutral", 3: "stable", 4: "unstable"}
     assert own.peak == TOP == 3
     assert own.peak_stability == "stable"

@@ -158,14 +158,14 @@ def _as(kind: type[Any], name: str, value: Any) -> Any:
     return None if empty and kind.__dataclass_fields__[name].default is None else told
 
 
-def _missing(kind: type[Any], name: str, shape: Sequence[int] = ()) -> Any:
+def _missing(kind: type[Any], name: str, shape: Sequence[int] | None = None) -> Any:
     """Return what stands for a value that a result does not hold; None: the default of the field."""
     own = _plain_type(kind, name)
     if kind.__dataclass_fields__[name].default is None:
         return None
-    if not shape:
-        return MISSING.get(own, np.zeros(0))
-    return np.full(shape, MISSING[own] if own in MISSING else _entry(own))
+    if own in MISSING:
+        return np.full(shape, MISSING[own]) if shape else MISSING[own]
+    return np.zeros(0) if shape is None else np.full(shape, _entry(own))
 
 
 def _entry(array: Any) -> Any:

@@ -1,20 +1,37 @@
 """Terminal tables of a forced response: cases, frequencies that needed more harmonics, checks."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.records.bounds import BOUND
+from stickslip.analyses.forced_response.records.columns import (
+    BifurcationRows,
+    BifurcationSearch,
+    Blades,
+    CaseNumbers,
+    MoreHarmonics,
+    MotionsInTime,
+    PointFields,
+    SideBranches,
+    TextArray,
+    TimeChecks,
+    Verdicts,
+    holds,
+    of_cases,
+    read,
+)
 from stickslip.analyses.forced_response.stability.stable_words import all_lines, said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.working_range import TITLE, range_lines
+from stickslip.arrays import IntArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import LEVELS, said
 
 FIRST = "first harmonic"  # what amplitudes are as a rule
 HEAD = ("peak mm", "at Hz")
-COUNTS = ("points", "points_low", "points_high", "points_failed", "newton_steps", "unknowns_solved")
-SECONDS = ("seconds_contact", "seconds_linear", "seconds_rest")
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
@@ -42,6 +59,8 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         "seconds",
     )
     name = amplitude_name(data)
+    harmonics = (own.reference_sentence for own in of_cases(MoreHarmonics, data))
+    in_time, checks = read(MotionsInTime, data), read(TimeChecks, data)
     rows = tuple(_row(data, i, label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
@@ -49,11 +68,14 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _of_blades(data, labels),
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data), detail=True),
-        _lines("Against more harmonics", _sentences(data, "reference_sentence", labels)),
+        _lines("Against more harmonics", _sentences(labels, harmonics)),
         _lines("Is it stable?", all_lines(data, labels), detail=True),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
-        _lines("In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)),
-        _lines("Against time integration", _along(data, "verify", labels)),
+        _lines(
+            "In time, where no periodic motion stands for it",
+            _along(labels, in_time.not_periodic_case, in_time.not_periodic_sentence),
+        ),
+        _lines("Against time integration", _along(labels, checks.verify_case, checks.verify_sentence)),
     ]
     return tuple(table for table in found if table.rows or table.lines)
 
@@ -91,12 +113,12 @@ def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
     head = ("case", "engine order", *HEAD, "its own Hz")
     rows = []
     for i, label in enumerate(labels):
-        own = data.isel(point=np.flatnonzero(data["point_case"].values == i), output=0)
+        own = Curve(data, i)
         for k, m in enumerate(several_orders(data)):
-            size = own["driven_amplitude"].values[:, k]
+            size = own.fields.driven_amplitude[:, k, 0]
             if np.isfinite(size).any():
                 at = int(np.nanargmax(size))
-                hertz = float(own["frequency_hz"][at])
+                hertz = float(own.hz[at])
                 times = m / int(data.attrs["engine_order"])
                 rows.append((label, str(m), f"{1e3 * size[at]:.5g}", f"{hertz:.3f}", f"{times * hertz:.3f}"))
     lines = (orders_sentence(data),) if rows else ()
@@ -106,21 +128,22 @@ def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
 def _of_blades(data: xr.Dataset, labels: list[str]) -> TextTable:
     """Return amplification and largest blade of a mistuned wheel."""
     title = "Blades of the wheel"
-    if "amplification" not in data:
+    if not holds(Blades, data):
         return TextTable(title, (), ())
+    each = of_cases(Blades, data)
     head = ("case", "largest blade", "amplification", "tuned mm", "at Hz", "localisation")
     rows = tuple(
         (
             label,
-            str(int(case["largest_blade"])),
-            f"{float(case['amplification']):.4f}",
-            f"{1e3 * float(case['tuned_peak_amplitude']):.5g}",
-            f"{float(case['tuned_peak_hz']):.3f}",
-            f"{float(case['localisation']):.3f}",
+            str(case.largest_blade),
+            f"{case.amplification:.4f}",
+            f"{1e3 * case.tuned_peak_amplitude:.5g}",
+            f"{case.tuned_peak_hz:.3f}",
+            f"{case.localisation:.3f}",
         )
-        for label, case in zip(labels, (data.isel(case=i) for i in range(len(labels))), strict=True)
+        for label, case in zip(labels, each, strict=True)
     )
-    bound = f"{BOUND} is {float(data['whitehead'][0]):.3g}."
+    bound = f"{BOUND} is {each[0].whitehead:.3g}."
     return TextTable(title, head, rows, (bound,))
 
 
@@ -134,14 +157,14 @@ def _choice_title(data: xr.Dataset) -> str:
 def choices(data: xr.Dataset) -> tuple[str, ...]:
     """List, for each case, the frequencies with more harmonics, and the work of the selection; empty without a choice."""
     labels = [str(x) for x in data["case_label"].values]
-    told = _sentences(data, "choice_sentence", labels)
+    told = _sentences(labels, (own.choice_sentence for own in of_cases(CaseNumbers, data)))
     return (*told, cost_sentence(data)) if told and data.sizes["point"] else told
 
 
 def cost_sentence(data: xr.Dataset) -> str:
     """Compare the work of the selection with the reference harmonics at every frequency."""
     high = np.atleast_1d(data.attrs["high_harmonics"])
-    solved, points = int(data["unknowns_solved"].sum()), data.sizes["point"]
+    solved, points = sum(own.unknowns_solved for own in of_cases(CaseNumbers, data)), data.sizes["point"]
     each = data.sizes["retained"] * (2 * high.size - 1)
     everywhere = points * each
     return (
@@ -152,7 +175,7 @@ def cost_sentence(data: xr.Dataset) -> str:
 
 def more_name(data: xr.Dataset) -> str:
     """Return the name of points with other harmonics than those of the first passage."""
-    kept = {tuple(np.flatnonzero(row)) for row in data["harmonic_kept"].values}
+    kept = {tuple(np.flatnonzero(row)) for row in read(PointFields, data).harmonic_kept}
     supports = [tuple(np.atleast_1d(data.attrs[f"{w}_harmonics"])) for w in ("low", "high")]
     alike = kept <= set(supports) and np.isfinite(data.attrs["selection_threshold"])
     return f"H = {named(supports[1])}" if alike else "other H"
@@ -163,15 +186,17 @@ def _always_high(data: xr.Dataset) -> bool:
 
 
 def _row(data: xr.Dataset, i: int, label: str) -> tuple[str, ...]:
-    case = data.isel(case=i)
+    case = Curve(data, i)
+    own = case.numbers
+    counts = (own.points, own.points_low, own.points_high, own.points_failed, own.newton_steps, own.unknowns_solved)
     return (
         label,
-        _millimetres(1e3 * float(case["peak_amplitude"])),
-        f"{float(case['peak_frequency_hz']):.3f}",
-        LEVELS[int(case["case_verdict"])],
-        said_of(Curve(data, i).peak_stability),
-        *(str(int(case[name])) for name in COUNTS),
-        f"{sum(float(case[name]) for name in SECONDS):.2f}",
+        _millimetres(1e3 * own.peak_amplitude),
+        f"{own.peak_frequency_hz:.3f}",
+        LEVELS[int(case.read(Verdicts).case_verdict)],
+        said_of(case.peak_stability),
+        *map(str, counts),
+        f"{own.seconds_contact + own.seconds_linear + own.seconds_rest:.2f}",
     )
 
 
@@ -182,31 +207,27 @@ def _millimetres(size: float) -> str:
 
 def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
     """Return the bifurcations and side branches found, and the limits of the search; empty if not asked for."""
-    if "bifurcations_limits" not in data:
+    if not holds(BifurcationSearch, data):
         return ()
-    return (*_along(data, "bifurcation", labels), *beside_bifurcations(data, labels))
+    own = read(BifurcationRows, data)
+    return (*_along(labels, own.bifurcation_case, own.bifurcation_sentence), *beside_bifurcations(data, labels))
 
 
 def beside_bifurcations(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
     """Return the outcome of the side branches, and the limits of the search."""
-    limits = _sentences(data, "bifurcations_limits", labels)
-    return (*_along(data, "side_branch", labels), *limits)
+    limits = (own.bifurcations_limits for own in of_cases(BifurcationSearch, data))
+    own = read(SideBranches, data)
+    return (*_along(labels, own.side_branch_case, own.side_branch_sentence), *_sentences(labels, limits))
 
 
 def _lines(title: str, lines: tuple[str, ...], *, detail: bool = False) -> TextTable:
     return TextTable(title, (), (), lines, detail)
 
 
-def _sentences(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
-    if name not in data:
-        return ()
-    told = zip(labels, map(str, data[name].values), strict=True)
-    return tuple(said(label, text) for label, text in told if text)
+def _sentences(labels: Sequence[str], texts: Iterable[str]) -> tuple[str, ...]:
+    return tuple(said(label, text) for label, text in zip(labels, texts, strict=True) if text)
 
 
-def _along(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
+def _along(labels: Sequence[str], case: IntArray | None, sentences: TextArray) -> tuple[str, ...]:
     """Return the sentences of single points, with the labels of their cases."""
-    if f"{name}_sentence" not in data:
-        return ()
-    told = zip(data[f"{name}_case"].values, data[f"{name}_sentence"].values, strict=True)
-    return tuple(said(labels[i], str(text)) for i, text in told)
+    return () if case is None else _sentences([labels[i] for i in case], map(str, sentences))

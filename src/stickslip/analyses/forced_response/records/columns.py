@@ -97,10 +97,11 @@ class Points:
         "error that is predicted of the accepted solution itself: 0 where no force acts on the harmonics left out, NaN where it was not judged",
         along="point",
     )
-    audit_error_percent: FloatArray = column(
+    audit_error_percent: FloatArray | None = column(
         "percent",
         "difference of the accepted solution from one with more harmonics (an audit), NaN where none was made: not needed, or judged by prediction alone",
         along="point",
+        default=None,
     )
     audit_error_of: TextArray = column(
         "1", "the output or dof that differs so much, empty where no audit was made", along="point"
@@ -583,6 +584,16 @@ def rows_of_case(owner: IntArray, case: int) -> slice | IntArray:
     """Return where `owner` is a case: a slice of neighbours, which copies no values."""
     at = np.flatnonzero(owner == case)
     return slice(int(at[0]), int(at[-1]) + 1) if at.size and np.ptp(at) < at.size else at
+
+
+def of_cases(kind: type[Kind], data: xr.Dataset) -> list[Kind]:
+    """Return the record of a kind of each case."""
+    return [read(kind, data, i) for i in range(data.sizes["case"])]
+
+
+def holds(kind: type[Any], data: xr.Dataset) -> bool:
+    """Whether a result has any variable of a kind."""
+    return any(name in data for name in columns_of(kind))
 
 
 def each(record: Kind) -> Iterator[Kind]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.forced_response.records.columns import COLUMNS, flags
+from stickslip.analyses.forced_response.records.columns import COLUMNS, OWNERS, flags
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.analyses.forced_response.verdicts.cases import with_levels
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
@@ -15,30 +15,7 @@ from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import said
 
 LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
-# dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
-ROWS = {
-    "point": ("point_case", "frequency_hz"),
-    "attempt": ("attempt_case", "attempt_frequency_hz"),
-    "alert_point": ("alert_case", "alert_frequency_hz"),
-    "check": ("verify_case", "verify_frequency_hz"),
-    "examined": ("stability_case", "stability_frequency_hz"),
-    "another": ("another_case", "another_frequency_hz"),
-    "not_periodic": ("not_periodic_case", "not_periodic_frequency_hz"),
-    "tuned_point": ("tuned_case", "tuned_frequency_hz"),
-    "bifurcation": ("bifurcation_case", "bifurcation_frequency_hz"),
-    "side_branch": ("side_branch_case", "side_branch_frequency_hz"),
-    "side_point": ("side_point_case", "side_point_frequency_hz"),
-}
-SOME = (
-    "check",
-    "examined",
-    "another",
-    "not_periodic",
-    "tuned_point",
-    "bifurcation",
-    "side_branch",
-    "side_point",
-)  # dimensions of what some cases may lack
+SOME = OWNERS.keys() - {"point", "attempt", "alert_point"}  # dimensions of what some cases may lack
 COUNTED = ("harmonic", "sample", "mode")  # dimensions that may be longer in one case than in another
 AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
 
@@ -85,7 +62,7 @@ def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any
 
 def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
     """Return the variable of all cases, concatenated; a variable common to all cases comes from the first."""
-    if along not in ("case", *ROWS):
+    if along not in ("case", *OWNERS):
         return each[0]
     joined: xr.Variable = xr.Variable.concat(each, along)  # type: ignore[no-untyped-call]
     return joined.astype(str) if joined.dtype.kind == "O" else joined
@@ -101,7 +78,8 @@ def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
     """Return the variables of a case with their dimensions, and the number of the case in its rows."""
     peak = int(values["peak_point"])
     values = values | {"peak_point": peak + before if peak >= 0 else peak}
-    for own, like in ROWS.values():
+    for own in OWNERS.values():
+        like = own.removeprefix("point_").replace("case", "frequency_hz")  # there is one for each row
         if like in values:
             values[own] = np.full(len(values[like]), index)
     data = {

@@ -7,6 +7,7 @@ from itertools import groupby
 import numpy as np
 import xarray as xr
 
+from stickslip.analyses.forced_response.records.columns import CaseNumbers, ExaminedRows, PointStability, each, read
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.response.stability.found import modulus_text
@@ -94,24 +95,23 @@ def runs_line(points: Sequence[Point]) -> str:
 
 def of_case(data: xr.Dataset, case: int) -> list[Point]:
     """Return the examined points of a case."""
-    if "stability_sentence" not in data:
-        return []
-    names = ("frequency_hz", "verdict", "multiplier", "multiplier_error", "sentence")
-    at = np.flatnonzero(data["stability_case"].values == case)
-    columns = [data[f"stability_{name}"].values[at] for name in names]
     return [
-        Point(float(hz), str(word), float(size), float(error), str(text))
-        for hz, word, size, error, text in zip(*columns, strict=True)
+        Point(
+            float(own.stability_frequency_hz),
+            str(own.stability_verdict),
+            float(own.stability_multiplier),
+            float(own.stability_multiplier_error),
+            str(own.stability_sentence),
+        )
+        for own in each(read(ExaminedRows, data, case))
     ]
 
 
 def counts_line(data: xr.Dataset, case: int) -> str:
     """State the number of points with known stability and its basis; empty if unknown, or if every point was examined."""
-    if "motion_stability_basis" not in data:
-        return ""
-    own = data["motion_stability_basis"].values[data["point_case"].values == case]
+    own = read(PointStability, data, case).motion_stability_basis
     counts = {word: int(np.sum(own == k)) for k, word in enumerate(BASES)}
-    if counts["examined"] == own.size or not own.size:
+    if counts["examined"] == own.size or not np.any(own >= 0):
         return ""
     told = ", ".join(f"{n} {word}" for word, n in counts.items() if n and word != "not examined")
     none = counts["not examined"]
@@ -125,7 +125,7 @@ def all_lines(data: xr.Dataset, labels: Sequence[str]) -> tuple[str, ...]:
         for i, label in enumerate(labels)
         for line in (
             *filter(None, [counts_line(data, i)]),
-            *stability_lines(of_case(data, i), float(data["peak_frequency_hz"].values[i])),
+            *stability_lines(of_case(data, i), read(CaseNumbers, data, i).peak_frequency_hz),
         )
     )
 

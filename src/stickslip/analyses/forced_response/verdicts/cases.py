@@ -105,9 +105,9 @@ def _examined(case: Curve) -> str:
         return "nothing to judge"
     peak = case.peak
     because = [
-        f" ({without_place(str(row['stability_sentence'])).removeprefix('not examined: ')})"
-        for point, row in case.examined("stability_verdict")
-        if point == peak and row["stability_verdict"] == "not examined"
+        f" ({without_place(str(row.stability_sentence)).removeprefix('not examined: ')})"
+        for point, row in case.examined
+        if point == peak and row.stability_verdict == "not examined"
     ]
     said = [f"peak with H = {case.kept[peak]}, {said_of(case.peak_stability)}{''.join(because)}"]
     said += ["exact, as no force acts on the harmonics left out"] * bool(case.exact[peak])
@@ -148,9 +148,9 @@ def with_levels(data: xr.Dataset, labels: Sequence[str]) -> dict[str, tuple[str,
     """Return level of each case and point, and reasons, as variables: dimension and values."""
     every = judged(data, labels)
     of_cases = np.array([LEVELS.index(own.level) for own in every])
-    if "point_case" not in data:
+    levels = np.zeros(sum(own.case.at.size for own in every), dtype=np.int64)
+    if not levels.size:
         return _with_dimensions(Verdicts(case_verdict=of_cases))
-    levels = np.zeros(data.sizes["point"], dtype=np.int64)
     reasons = np.full(levels.size, "", dtype=object)
     for own in every:
         levels[own.case.at], reasons[own.case.at] = own.of_points

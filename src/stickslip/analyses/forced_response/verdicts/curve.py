@@ -1,19 +1,33 @@
 """One case of a finished dataset, as the rules of its verdicts see it; missing variables are NaN or empty. Also jumps of its branch."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.problem import RIGID
-from stickslip.analyses.forced_response.records.columns import MOTION
+from stickslip.analyses.forced_response.records.columns import (
+    MOTION,
+    Blades,
+    CaseNumbers,
+    ExaminedRows,
+    Kind,
+    ModelFacts,
+    MoreHarmonics,
+    PointFields,
+    Points,
+    PointStability,
+    TimeChecks,
+    each,
+    read,
+)
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.response.forced.amplitude import amplitudes
+from stickslip.solve.status import Status
 
 JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
 LOSS_JUMP = 10.0  # ratio of neighbouring dissipations ...
@@ -102,18 +116,16 @@ DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
 ATTAINED = 1.0  # percent between a settled time integration and the balance
 HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
 UNSTABLE = MOTION["unstable"]
-CHECKS = ("verify", "stability")  # whose rows speak of single points
 CARRIED = 2  # the number of motion_stability_basis
 FREQUENCY_RTOL = 1e-9  # relative difference of frequencies that are one
 
 
-def motion_of(said: Mapping[str, Any]) -> str:
+def motion_of(said: TimeChecks) -> str:
     """Return the outcome of an integration from a row of a check; older files hold only whether it settled."""
-    settled = "attained" if int(said["verify_settled"]) else "not settled"
-    return str(said.get("verify_motion", "")) or settled
+    return str(said.verify_motion) or ("attained" if said.verify_settled else "not settled")
 
 
-def branch_length(refinement: FloatArray) -> int:
+def branch_length(refinement: FloatArray | IntArray) -> int:
     """Return the number of points along the branch; points added to resolve the peak are stored behind them.
 
     Parameters
@@ -121,7 +133,7 @@ def branch_length(refinement: FloatArray) -> int:
     refinement
         (n,) 1 for points added at the peak; one that replaces a point of the branch keeps its place.
     """
-    along = np.flatnonzero(np.nan_to_num(refinement) == 0)
+    along = np.flatnonzero(~(refinement > 0))
     return int(along[-1]) + 1 if along.size else 0
 
 
@@ -130,19 +142,19 @@ def peak_output(data: xr.Dataset, case: int) -> int:
     labels = [str(x) for x in data["output"].values] if "output" in data.coords else []
     wanted = str(data.attrs.get("report_output", ""))
     named = labels.index(wanted) if wanted in labels else 0
-    top = float(data["peak_point"].values[case]) if "largest_blade" in data else -1.0
-    if not 0 <= top < data.sizes["point"]:
+    own = read(CaseNumbers, data, case)
+    if read(Blades, data, case).largest_blade < 0 or own.peak_point < 0:
         return named
-    off = np.abs(data["amplitude"].values[int(top)] - data["peak_amplitude"].values[case])
+    off = np.abs(read(PointFields, data).amplitude[own.peak_point] - own.peak_amplitude)
     return named if off[named] <= off.min() else int(np.argmin(off))
 
 
 def of_largest_blade(data: xr.Dataset, case: int) -> bool:
     """Return whether the peak of a case is that of the largest blade of a mistuned wheel."""
-    if "blade_peak_amplitude" not in data or "largest_blade" not in data:
+    own = read(Blades, data, case)
+    if own.largest_blade < 0 or not own.blade_peak_amplitude.size:
         return False
-    each = data.sizes["output"] // data.sizes["blade"]
-    return bool(peak_output(data, case) // each == int(data["largest_blade"].values[case]))
+    return peak_output(data, case) // (data.sizes["output"] // own.blade_peak_amplitude.size) == own.largest_blade
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,56 +172,50 @@ class Curve:
     data: xr.Dataset
     case: int
 
-    def has(self, name: str) -> bool:
-        """Whether the dataset holds a variable."""
-        return name in self.data
+    def read(self, kind: type[Kind]) -> Kind:
+        """Return the record of a kind of this case."""
+        return read(kind, self.data, self.case)
+
+    @cached_property
+    def numbers(self) -> CaseNumbers:
+        """Peak and work."""
+        return self.read(CaseNumbers)
+
+    @cached_property
+    def points(self) -> Points:
+        """The (n) points of the case."""
+        return self.read(Points)
+
+    @cached_property
+    def fields(self) -> PointFields:
+        """Amplitudes and harmonics of the points."""
+        return self.read(PointFields)
+
+    @cached_property
+    def stability(self) -> PointStability:
+        """Stability of the points."""
+        return self.read(PointStability)
 
     @cached_property
     def at(self) -> IntArray:
         """(n,) indices of the case's points along ``point``."""
-        if "point_case" not in self.data:
-            return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(self.data["point_case"].values == self.case)
+        owner = read(Points, self.data).point_case
+        return np.zeros(0, dtype=np.int64) if owner is None else np.flatnonzero(owner == self.case)
 
-    def floats(self, name: str) -> FloatArray:
-        """Return (n,) values of a variable along ``point``; NaN if it is missing."""
-        if not self.has(name):
-            return np.full(self.at.size, np.nan)
-        return np.asarray(self.data[name].values[self.at], dtype=float)
-
-    def number(self, name: str) -> float:
-        """Return the value of a variable along ``case``; NaN if it is missing."""
-        return float(self.data[name].values[self.case]) if self.has(name) else float("nan")
-
-    def text(self, name: str) -> str:
-        """Return the text of a variable along ``case``; empty if it is missing."""
-        return str(self.data[name].values[self.case]) if self.has(name) else ""
-
-    def texts(self, name: str) -> list[str]:
-        """Return the texts of a variable along ``point``; empty if it is missing."""
-        if not self.has(name):
-            return [""] * self.at.size
-        return [str(text) for text in self.data[name].values[self.at]]
-
-    @cached_property
+    @property
     def hz(self) -> FloatArray:
         """(n,) frequencies."""
-        return self.floats("frequency_hz")
-
-    @cached_property
-    def status(self) -> IntArray:
-        """(n,) status of the solver."""
-        return np.nan_to_num(self.floats("status")).astype(np.int64)
+        return self.points.frequency_hz
 
     @cached_property
     def converged(self) -> BoolArray:
         """(n,) whether there is a solution."""
-        return np.asarray(self.status == 0)
+        return np.asarray(self.points.status <= Status.CONVERGED)  # below: not told
 
     @cached_property
     def branch(self) -> IntArray:
         """Indices of the points in the order of the branch, without the peak refinements behind its end."""
-        return np.arange(branch_length(self.floats("refinement")))
+        return np.arange(branch_length(self.points.refinement))
 
     @cached_property
     def output(self) -> str:
@@ -219,7 +225,7 @@ class Curve:
     @cached_property
     def amplitude(self) -> FloatArray:
         """(n,) amplitude of that output, m; on a mistuned wheel of the largest blade at each point."""
-        column, size = peak_output(self.data, self.case), self.data["amplitude"].values[self.at]
+        column, size = peak_output(self.data, self.case), self.fields.amplitude
         if not of_largest_blade(self.data, self.case):
             return np.asarray(size[:, column])
         each = self.data.sizes["output"] // self.data.sizes["blade"]
@@ -228,23 +234,18 @@ class Curve:
     @cached_property
     def dissipation(self) -> FloatArray:
         """(n,) energy dissipated by all contacts in a cycle, J; zero if the dataset has none."""
-        if not self.has("dissipated_energy"):
-            return np.zeros(self.at.size)
-        return np.asarray(np.nansum(self.data["dissipated_energy"].values[self.at], axis=1))
+        return np.asarray(np.nansum(self.fields.dissipated_energy, axis=1))
 
     @cached_property
     def elastic(self) -> float:
         """Largest energy stored by the contacts, J: a scale for the rounding of `dissipation`."""
-        if not self.has("gap") or not self.has("contact_force"):
-            return 0.0
-        gap, force = (self.data[name].values[self.at, 1:] for name in ("gap", "contact_force"))
-        return stored_energy(gap, force)
+        gap, force = self.fields.gap[:, 1:], self.fields.contact_force[:, 1:]
+        return stored_energy(gap, force) if gap.size and force.size else 0.0
 
     @cached_property
     def peak(self) -> int:
         """Index of the peak; -1 for none."""
-        top = self.number("peak_point")
-        found = np.flatnonzero(self.at == top)
+        found = np.flatnonzero(self.at == self.numbers.peak_point)
         return int(found[0]) if found.size else -1
 
     @cached_property
@@ -268,8 +269,7 @@ class Curve:
     @cached_property
     def supports(self) -> list[tuple[int, ...]]:
         """Harmonics that each point keeps."""
-        rows = self.data["harmonic_kept"].values[self.at]
-        return [tuple(int(h) for h in np.flatnonzero(row)) for row in rows]
+        return [tuple(int(h) for h in np.flatnonzero(row)) for row in self.fields.harmonic_kept]
 
     @cached_property
     def kept(self) -> list[str]:
@@ -300,7 +300,7 @@ class Curve:
     @cached_property
     def own_error(self) -> FloatArray:
         """(n,) predicted error of each point's own solution, a fraction; NaN if not evaluated."""
-        return self.floats("own_error_percent") / 100
+        return self.points.own_error_percent / 100
 
     @property
     def exact(self) -> BoolArray:
@@ -310,19 +310,20 @@ class Curve:
     @cached_property
     def audit(self) -> FloatArray:
         """(n,) relative difference from a solution with more harmonics; NaN without an audit."""
-        return self.floats("audit_error_percent") / 100
+        percent = self.points.audit_error_percent
+        return np.full(self.at.size, np.nan) if percent is None else percent / 100
 
     @cached_property
     def reference(self) -> FloatArray:
         """(n,) predicted relative change by the largest judging set; NaN if not asked for."""
-        return self.floats("reference_error_percent") / 100
+        return self.read(MoreHarmonics).reference_error_percent / 100
 
     @cached_property
     def unstable(self) -> IntArray:
         """Indices of points known to be unstable."""
-        off = self.floats("motion_stability") == UNSTABLE
-        for point, row in self.examined("stability_verdict"):
-            off[point] |= str(row["stability_verdict"]) == "unstable"
+        off = self.stability.motion_stability == UNSTABLE
+        for point, row in self.examined:
+            off[point] |= str(row.stability_verdict) == "unstable"
         return np.flatnonzero(off)
 
     @cached_property
@@ -330,28 +331,26 @@ class Curve:
         """(n,) whether a point is known to be stable with enough harmonics, by an audit, a prediction or a time integration."""
         error = np.where(np.isnan(self.audit), self.own_error, self.audit)
         return np.asarray(
-            (self.floats("motion_stability") == MOTION["stable"]) & (self.attained | (error <= self.limit))
+            (self.stability.motion_stability == MOTION["stable"]) & (self.attained | (error <= self.limit))
         )
 
     @cached_property
     def known(self) -> frozenset[int]:
         """Indices of points whose stability is inferred from others, even if their own multipliers leave it open."""
-        carried = self.floats("motion_stability_basis") == CARRIED
+        carried = self.stability.motion_stability_basis == CARRIED
         return frozenset(np.flatnonzero(carried).tolist())
 
     @property
     def peak_stability(self) -> str:
         """Stability of the peak in one word; in older files from the row of the examined point."""
-        rows = [row for point, row in self.examined("stability_verdict") if point == self.peak]
-        known = [str(row["stability_verdict"]) for row in rows]
-        word = self.floats("motion_stability")[self.peak] if self.peak >= 0 else np.nan
+        known = [str(row.stability_verdict) for point, row in self.examined if point == self.peak]
+        word = self.stability.motion_stability[self.peak] if self.peak >= 0 else -1
         return next(iter(known), next((name for name, k in MOTION.items() if k == word), ""))
 
     @property
     def rigid(self) -> bool:
         """Whether a contact is rigid."""
-        laws = self.data["contact_law"].values if self.has("contact_law") else ()
-        return RIGID in [str(law) for law in laws]
+        return RIGID in list(self.read(ModelFacts).contact_law)
 
     @property
     def forward(self) -> float:
@@ -376,19 +375,19 @@ class Curve:
     @property
     def outside(self) -> bool:
         """Whether the peak lies outside the requested frequencies, where a branch turns round a fold."""
-        low, high = self.number("lowest_hz"), self.number("highest_hz")
+        low, high = self.numbers.lowest_hz, self.numbers.highest_hz
         return bool(self.peak_hz < low * (1 - FREQUENCY_RTOL) or self.peak_hz > high * (1 + FREQUENCY_RTOL))
 
     @property
     def at_the_end(self) -> bool:
         """Whether the peak is at the end of the sweep, or at the last point found."""
-        ends = [self.hz.min(), self.hz.max(), self.number("lowest_hz"), self.number("highest_hz")]
+        ends = [self.hz.min(), self.hz.max(), self.numbers.lowest_hz, self.numbers.highest_hz]
         return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= FREQUENCY_RTOL * self.peak_hz))
 
     @property
     def range_key(self) -> str:
         """Key of the study for the range of the response."""
-        known = "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
+        known = "speed_rpm" if np.isfinite(self.points.speed_rpm).any() else "frequency_hz"
         return str(self.data.attrs.get("range_key", known))
 
     @property
@@ -397,40 +396,28 @@ class Curve:
         listed = self.range_key == "frequencies_hz"
         return "nearer forced_response.frequencies_hz" if listed else "more forced_response.points"
 
-    def examined(self, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield the points of a check, each with its row.
-
-        Parameters
-        ----------
-        name
-            A variable of the check, such as ``verify_settled``; all its variables begin with the same word.
-        """
-        yield from self._looked_at.get(name.partition("_")[0], ()) if self.has(name) else ()
+    @cached_property
+    def examined(self) -> tuple[tuple[int, ExaminedRows], ...]:
+        """Points whose stability was examined, each with its row."""
+        own = self.read(ExaminedRows)
+        words = [MOTION.get(str(word), -1) for word in own.stability_verdict]
+        return tuple(self._with_points(own, own.stability_frequency_hz, words))
 
     @cached_property
-    def _looked_at(self) -> dict[str, list[tuple[int, dict[str, Any]]]]:
-        """Points and rows of `examined` by the first word of a check; cached, because rules ask often and the dataset makes an array each time."""
-        words = [w for w in CHECKS if self.at.size and self.has(f"{w}_case")]
-        return {word: list(self._points_of(word)) for word in words}
+    def checks(self) -> tuple[tuple[int, TimeChecks], ...]:
+        """Points that were integrated in time, each with its row."""
+        own = self.read(TimeChecks)
+        return tuple(self._with_points(own, own.verify_frequency_hz, [-1] * own.verify_frequency_hz.size))
 
-    def _points_of(self, word: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        for said in self.rows(word):
-            off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
+    def _with_points(self, rows: Kind, hz: FloatArray, words: Sequence[int]) -> Iterator[tuple[int, Kind]]:
+        """Yield the rows that have a point, with its index; a row says its frequency, and a word on the stability if it is not -1."""
+        for row, own, word in zip(each(rows), hz, words, strict=True):
+            off = np.abs(self.hz - own) / self.hz
             near = np.flatnonzero(self.converged & (off <= FREQUENCY_RTOL))
             # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
-            told = MOTION.get(str(said.get("stability_verdict")), -1)
-            other = self.floats("motion_stability") != told
+            other = self.stability.motion_stability != word
             for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[:1]:
-                yield point, said
-
-    def rows(self, word: str) -> Iterator[dict[str, Any]]:
-        """Yield the rows of the case along the dimension `word`, from the variables whose names begin with it."""
-        if f"{word}_case" not in self.data:
-            return
-        own = self.data[f"{word}_case"].dims
-        columns = {str(n): v.values for n, v in self.data.data_vars.items() if v.dims == own}
-        for k in np.flatnonzero(columns[f"{word}_case"] == self.case):
-            yield {name: column[k] for name, column in columns.items()}
+                yield point, row
 
     @cached_property
     def attained(self) -> BoolArray:
@@ -445,9 +432,9 @@ class Curve:
     @cached_property
     def left_out(self) -> tuple[int, float, float] | None:
         """The largest harmonic at the peak outside its amplitude (mean excluded), its ratio to half of peak to peak, and that value, m; None for none."""
-        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.has("output_displacement"):
+        if self.data.attrs.get("amplitude_of", "first") != "first" or not self.fields.output_displacement.size:
             return None
-        parts = self.data["output_displacement"].values[self.at[self.peak]]
+        parts = self.fields.output_displacement[self.peak]
         column = peak_output(self.data, self.case)
         motion = parts[:, column, 0] + 1j * parts[:, column, 1]
         driven = [int(h) for h in np.atleast_1d(self.data.attrs.get("driven_harmonics", [1]))]
@@ -462,16 +449,16 @@ class Curve:
     def outputs_off(self) -> FloatArray:
         """(n,) largest relative difference of an output, phase included, from a time integration that attains the motion; NaN without one."""
         found = np.full(self.at.size, np.nan)
-        for point, said in self.examined("verify_difference_percent"):
+        for point, said in self.checks:
             if motion_of(said) == "attained":
-                found[point] = float(said.get("verify_outputs_percent", np.nan)) / 100
+                found[point] = said.verify_outputs_percent / 100
         return found
 
     @cached_property
     def integrated(self) -> FloatArray:
         """(n,) difference from a time integration that attains the motion, percent; NaN without one."""
         found = np.full(self.at.size, np.nan)
-        for point, said in self.examined("verify_difference_percent"):
+        for point, said in self.checks:
             if motion_of(said) == "attained":
-                found[point] = float(said["verify_difference_percent"])
+                found[point] = said.verify_difference_percent
         return found

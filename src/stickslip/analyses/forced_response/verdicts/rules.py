@@ -8,7 +8,21 @@ import numpy as np
 
 from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.problem import ALONE, MORE_THAN_LOW, MOST_IN_TIME, TOO_MANY
-from stickslip.analyses.forced_response.records.columns import MOTION
+from stickslip.analyses.forced_response.records.columns import (
+    MOTION,
+    BifurcationRows,
+    BifurcationSearch,
+    KnownVerdicts,
+    ModelChanges,
+    MotionAtPeak,
+    MotionsInTime,
+    OtherMotions,
+    PhysicsVerdicts,
+    SideBranches,
+    StiffnessChange,
+    each,
+    holds,
+)
 from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
@@ -72,8 +86,8 @@ IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdi
 
 def stability(case: Curve) -> Iterator[Finding]:
     """Doubt a peak with undecided multipliers, and reject an unstable motion as peak; an unstable range elsewhere is an answer."""
-    for point, said in case.examined("stability_verdict"):
-        word, why = said["stability_verdict"], without_place(said["stability_sentence"])
+    for point, said in case.examined:
+        word, why = str(said.stability_verdict), without_place(str(said.stability_sentence))
         why = why.removesuffix(IN_TIME_TELLS)
         if word == "unstable" and point == case.peak:
             why = f"a machine does not stay there: {why}"
@@ -84,7 +98,7 @@ def stability(case: Curve) -> Iterator[Finding]:
             yield Finding("trusted", f"the peak is {why}", remedy, (point,))
         elif word == "undecided" and not case.attained[point] and point not in case.known:
             why = f"whether it is stable: {why}"
-            told = [why, *(str(s["not_periodic_sentence"]) for s in case.rows("not_periodic"))]
+            told = [why, *map(str, case.read(MotionsInTime).not_periodic_sentence)]
             known = next(filter(None, map(fewer, told)), "")
             remedy = known or f"{in_time_there(case, point)}, and sees whether the motion stays."
             yield Finding("doubtful", why, remedy, (point,))
@@ -93,12 +107,12 @@ def stability(case: Curve) -> Iterator[Finding]:
 def unstable_stretches(case: Curve) -> Iterator[Finding]:
     """Report unstable ranges of the branch and larger unstable motions; neither affects the level of the case."""
     off = case.unstable
-    larger, hz = case.number("unstable_peak_amplitude"), case.number("unstable_peak_frequency_hz")
+    larger, hz = case.numbers.unstable_peak_amplitude, case.numbers.unstable_peak_frequency_hz
     if np.isfinite(larger):
         there = [
-            without_place(str(said["not_periodic_sentence"]))
-            for said in case.rows("not_periodic")
-            if abs(float(said["not_periodic_frequency_hz"]) / hz - 1.0) < ATTAINED / 100
+            without_place(str(said.not_periodic_sentence))
+            for said in each(case.read(MotionsInTime))
+            if abs(said.not_periodic_frequency_hz / hz - 1.0) < ATTAINED / 100
         ]
         why = f"the largest motion, {millimetres(larger)} at {hz:.4g} Hz, is unstable; the peak is the largest motion that a machine keeps"
         yield Finding("trusted", "; ".join([why, *there[:1]]), "See the stability of the points.")
@@ -110,9 +124,9 @@ def unstable_stretches(case: Curve) -> Iterator[Finding]:
 
 def bifurcated(case: Curve) -> Iterator[Finding]:
     """Report the loss of stability at bifurcations of the branch."""
-    unjudged = case.floats("motion_stability") == UNDECIDED
-    if unjudged.any() and case.has("bifurcations_limits"):
-        judged = np.isin(case.floats("motion_stability"), (0, 1, UNDECIDED))
+    unjudged = case.stability.motion_stability == UNDECIDED
+    if unjudged.any() and holds(BifurcationSearch, case.data):
+        judged = np.isin(case.stability.motion_stability, (0, 1, UNDECIDED))
         hz = case.hz[unjudged]
         why = (
             f"bifurcations may be missed: {hz.size} of {judged.sum()} motions along the branch could not be judged, between "
@@ -120,14 +134,14 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
         )
         remedy = "More harmonics make the errors of multipliers smaller; --verify integrates in time at the peak."
         yield Finding("trusted", why, remedy)
-    left = {float(said["side_branch_frequency_hz"]) for said in case.rows("side_branch")}
-    for said in case.rows("bifurcation"):
-        if said["bifurcation_kind"] == "fold":  # the rule of folds tells of these
+    left = case.read(SideBranches).side_branch_frequency_hz
+    for said in each(case.read(BifurcationRows)):
+        if said.bifurcation_kind == "fold":  # the rule of folds tells of these
             continue
-        remedy = LEAVING.get(str(said["bifurcation_kind"]), "")
-        if float(said["bifurcation_frequency_hz"]) in left:
+        remedy = LEAVING.get(str(said.bifurcation_kind), "")
+        if said.bifurcation_frequency_hz in left:
             remedy = "The branch that leaves there is drawn with the response."
-        yield Finding("trusted", str(said["bifurcation_sentence"]), remedy)
+        yield Finding("trusted", str(said.bifurcation_sentence), remedy)
 
 
 def fewer(sentence: str) -> str:
@@ -148,13 +162,14 @@ LARGEST_SLIP_FACETS = 0.5  # of a facet: contact points stay opposite each other
 
 def physics(case: Curve) -> Iterator[Finding]:
     """Return the findings of the job about modes and loads."""
-    for v in from_json(case.text("physics_verdicts") or "[]"):
+    for v in from_json(case.read(PhysicsVerdicts).physics_verdicts or "[]"):
         yield Finding(v.level, v.why, v.remedy)
 
 
 def small_motions(case: Curve) -> Iterator[Finding]:
     """Doubt motions too large for linear kinematics."""
-    rotation, strain, slip = (case.number(f"peak_{name}") for name in ("rotation_rad", "strain_rms", "slip_facets"))
+    own = case.read(MotionAtPeak)
+    rotation, strain, slip = own.peak_rotation_rad, own.peak_strain_rms, own.peak_slip_facets
     told = [f"a part turns by {rotation:.2g} rad, more than {LARGEST_ROTATION_RAD:g}"] * bool(
         rotation > LARGEST_ROTATION_RAD
     )
@@ -174,15 +189,21 @@ def small_motions(case: Curve) -> Iterator[Finding]:
 
 def model_itself(case: Curve) -> Iterator[Finding]:
     """Doubt a peak that changes by more than the threshold with more modes or fewer contact points."""
-    for name, what, remedy in (
-        ("modes", "with half again as many modes in the reduction", "Keep more modes ([reduction] modes)."),
+    own = case.read(ModelChanges)
+    for change, hertz, what, remedy in (
         (
-            "points",
-            f"with half the points of its contacts ({case.number('points_left_out'):.0f} left out)",
+            own.modes_peak_change,
+            own.modes_frequency_change_hz,
+            "with half again as many modes in the reduction",
+            "Keep more modes ([reduction] modes).",
+        ),
+        (
+            own.points_peak_change,
+            own.points_frequency_change_hz,
+            f"with half the points of its contacts ({own.points_left_out} left out)",
             "Mesh the contacts more finely, and compare.",
         ),
     ):
-        change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))
         if abs(change) > case.limit:
             why = f"the peak changes by {100 * change:+.2g} % and {hertz:+.3g} Hz {what}"
             yield Finding("doubtful", why, remedy)
@@ -190,18 +211,18 @@ def model_itself(case: Curve) -> Iterator[Finding]:
 
 def other_motions(case: Curve) -> Iterator[Finding]:
     """Report other motions at the peak; doubt the peak if one of them is larger."""
-    for said in case.rows("another"):
-        size, hz = float(said["another_amplitude"]), float(said["another_frequency_hz"])
-        larger = size > (1.0 + LARGER) * float(np.nan_to_num(case.number("peak_amplitude")))
-        word = str(said["another_stability"])
+    for said in each(case.read(OtherMotions)):
+        size, hz = float(said.another_amplitude), float(said.another_frequency_hz)
+        larger = size > (1.0 + LARGER) * float(np.nan_to_num(case.numbers.peak_amplitude))
+        word = str(said.another_stability)
         state = {
             "stable": ", which is stable",
             "undecided": ", of which nobody knows whether it is stable",
             "neutral": ", which is neutral",
         }.get(word, ", whose stability was not examined")
         why = (
-            f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said['another_known']))}: "
-            f"found from {said['another_start']}{state}"
+            f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said.another_known))}: "
+            f"found from {said.another_start}{state}"
         )
         remedy = "Which one a machine takes depends on its history: [all_motions] looks for all of them."
         yield Finding("doubtful" if larger else "trusted", why, remedy, size=size)
@@ -209,7 +230,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
 
 def contact_stiffness(case: Curve) -> Iterator[Finding]:
     """Note a peak that changes by more than `DECIDED` with contacts 10 % softer; it is only as accurate as the contact stiffness."""
-    if abs(SOFTER * case.number("stiffness_peak_slope")) > DECIDED:
+    if abs(SOFTER * case.read(StiffnessChange).stiffness_peak_slope) > DECIDED:
         yield Finding(
             "trusted",
             f"the contact stiffness decides the peak: {_softer(case)}",
@@ -219,7 +240,8 @@ def contact_stiffness(case: Curve) -> Iterator[Finding]:
 
 def _softer(case: Curve) -> str:
     """Return the effect of softer contacts on a peak, to first order; empty if unknown."""
-    slope, hertz = (case.number(f"stiffness_{own}") for own in ("peak_slope", "frequency_slope_hz"))
+    own = case.read(StiffnessChange)
+    slope, hertz = own.stiffness_peak_slope, own.stiffness_frequency_slope_hz
     if not np.isfinite(slope):
         return ""
     percent = -100 * SOFTER * slope
@@ -230,9 +252,11 @@ def _softer(case: Curve) -> str:
 
 def told_of_model(case: Curve) -> list[str]:
     """Return the changes of a trusted peak by modes, contact points and contact stiffness."""
-    told = []
-    for name, what in (("modes", "half again as many modes"), ("points", "half the contact points")):
-        change, hertz = (case.number(f"{name}_{own}") for own in ("peak_change", "frequency_change_hz"))
+    told, own = [], case.read(ModelChanges)
+    for change, hertz, what in (
+        (own.modes_peak_change, own.modes_frequency_change_hz, "half again as many modes"),
+        (own.points_peak_change, own.points_frequency_change_hz, "half the contact points"),
+    ):
         if np.isfinite(change):
             told.append(f"{what} change it by {100 * change:+.2g} % and {hertz:+.2g} Hz")
     return told + [said for said in (_softer(case),) if said]
@@ -252,12 +276,12 @@ def unsolved(case: Curve) -> Iterator[Finding]:
         remedy = "See run.log for what stopped them, and the size of the loads."
         yield Finding("wrong", "no point converged: there is no peak", remedy)
         return
-    marched = case.texts("marched_sentence")
     for i in lost:
-        advice = [Status(int(case.status[i])).advice, *filter(None, [marched[i]])]
+        status, marched = Status(int(case.points.status[i])), str(case.points.marched_sentence[i])
+        advice = [status.advice, *filter(None, [marched])]
         why = f"did not converge ({'; '.join(advice)})"
         remedy = f"A smaller step ({case.nearer}) finds most such points."
-        if int(case.status[i]) == Status.NOT_PERIODIC:
+        if status == Status.NOT_PERIODIC:
             why = f"attains no periodic motion ({'; '.join(advice)})"
             remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points says at how many such points."
         yield Finding("wrong", why, remedy, (int(i),))
@@ -319,10 +343,9 @@ def _examination(case: Curve) -> str:
 
 def audited(case: Curve) -> Iterator[Finding]:
     """Doubt an accepted solution that changed with more harmonics."""
-    of = case.texts("audit_error_of")
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
-            told = " in ".join(filter(None, (error_text(case.audit[i]), of[i])))
+            told = " in ".join(filter(None, (error_text(case.audit[i]), str(case.points.audit_error_of[i]))))
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {told}"
             remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]), told)
@@ -331,7 +354,7 @@ def audited(case: Curve) -> Iterator[Finding]:
 def not_audited(case: Curve) -> Iterator[Finding]:
     """Doubt a peak with few harmonics that rests on predictions alone; note such points elsewhere."""
     few = case.converged & case.few & ~case.exact
-    none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
+    none = case.points.audit_error_percent is not None and bool(np.isnan(case.audit).all())
     if not none or not case.decides or not few.any() or case.attained[case.peak]:
         return
     if np.isnan(case.reference[few]).any():
@@ -399,9 +422,8 @@ def folds(case: Curve) -> Iterator[Finding]:
 
 def in_time(case: Curve) -> Iterator[Finding]:
     """Judge points by time integration."""
-    for point, said in case.examined("verify_difference_percent"):
-        motion, off = motion_of(said), float(said["verify_difference_percent"])
-        wanders = 100 * float(said.get("verify_scatter", np.inf))
+    for point, said in case.checks:
+        motion, off, wanders = motion_of(said), float(said.verify_difference_percent), float(100 * said.verify_scatter)
         if motion == "not periodic" and max(wanders, abs(off)) <= ATTAINED:
             why = (
                 f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
@@ -411,7 +433,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             continue  # an answer: `unstable_stretches` tells of it
         elif motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
-            why = f"the motion in time, started from it, {what}: {without_place(said['verify_sentence'])}"
+            why = f"the motion in time, started from it, {what}: {without_place(str(said.verify_sentence))}"
             remedy = "Believe the time integration; sweep the other way for the motion it goes to."
             yield Finding("wrong", why, remedy, (point,))
         elif motion == "not settled":
@@ -451,12 +473,12 @@ def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
 
 def not_periodic(case: Curve) -> Iterator[Finding]:
     """Report the motion in time at points without a valid balance solution: a doubt of the point, and at the peak of the case."""
-    for said in case.rows("not_periodic"):
-        hz, sentence = float(said["not_periodic_frequency_hz"]), str(said["not_periodic_sentence"])
-        why, off = without_place(sentence), np.abs(case.hz - hz)
+    for said in each(case.read(MotionsInTime)):
+        sentence = str(said.not_periodic_sentence)
+        why, off = without_place(sentence), np.abs(case.hz - said.not_periodic_frequency_hz)
         # where a fold passes a frequency twice the peak is meant, as by other checks
         point = case.peak if case.peak >= 0 and off[case.peak] == off.min() else int(off.argmin())
-        settled = bool(said["not_periodic_settled"])
+        settled = bool(said.not_periodic_settled)
         remedy = "Give it more time: forced_response.not_periodic_s."
         if settled:
             remedy = "That is time integration, no balance."
@@ -469,12 +491,12 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
     """Doubt a largest amplitude that is no resonance, or that is missing."""
     if case.peak < 0:
         return
-    if case.amplitude[case.peak] < STUCK * case.number("excitation_n"):
+    if case.amplitude[case.peak] < STUCK * case.numbers.excitation_n:
         why = f"the output {case.output} does not move: a rigid contact holds it at all frequencies"
         remedy = "Name an output that moves, or raise the load until it slips."
         yield Finding("doubtful", why, remedy)
     elif case.outside:
-        asked = f"{case.number('lowest_hz'):.2f} to {case.number('highest_hz'):.2f} Hz"
+        asked = f"{case.numbers.lowest_hz:.2f} to {case.numbers.highest_hz:.2f} Hz"
         why = (
             f"the largest amplitude stands at {case.peak_hz:.2f} Hz, beyond what was asked for ({asked}), where the branch goes round a "
             "fold"
@@ -494,7 +516,7 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
 
 def retention(case: Curve) -> Iterator[Finding]:
     """Doubt a peak that depends on the retention stiffness, which is not physical."""
-    shift = case.number("retention_peak_shift")
+    shift = case.numbers.retention_peak_shift
     if abs(shift) > LARGE_SHIFT:
         why = (
             f"the peak changes by {100 * shift:.3g} % when the retention stiffness of rigid bodies is ten times smaller: it "
@@ -506,7 +528,7 @@ def retention(case: Curve) -> Iterator[Finding]:
 
 def known_to_the_job(case: Curve) -> Iterator[Finding]:
     """Return the verdicts that the job stored because they need the model."""
-    for v in from_json(case.text("known_verdicts") or "[]"):
+    for v in from_json(case.read(KnownVerdicts).known_verdicts or "[]"):
         yield Finding(v.level, v.why, v.remedy)
 
 

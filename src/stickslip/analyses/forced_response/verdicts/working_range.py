@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 import xarray as xr
 
+from stickslip.analyses.forced_response.records.columns import CaseNumbers, PeakPeriod, Verdicts, holds, of_cases
 from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
@@ -247,17 +248,17 @@ def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | N
 def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
     """Return the curves of a forced response over the first varied number, one for each combination of the other values."""
     key, values = first_varied_number(data)
-    if not key or key.split(".")[0] in SETTINGS or "peak_state" not in data:
+    if not key or key.split(".")[0] in SETTINGS or not holds(PeakPeriod, data):
         return ()
-    force = data["excitation_n"].values if "excitation_n" in data else np.full(len(values), np.nan)
-    per_force = bool(np.all(force > 0))
+    force = [own.excitation_n for own in of_cases(CaseNumbers, data)]
+    per_force = all(own > 0 for own in force)
     labels = [str(x) for x in data["case_label"].values]
     families: dict[str, list[int]] = {}
     for case, others in enumerate(other_values(data, key)):
         families.setdefault(others, []).append(case)
     found = []
     for others, cases in families.items():
-        known = {c: _peak(data, c, float(values[c]), float(force[c]), per_force=per_force) for c in cases}
+        known = {c: _peak(data, c, float(values[c]), force[c], per_force=per_force) for c in cases}
         own = working_range([p for p in known.values() if p is not None], key)
         if own is not None:
             out = tuple(labels[c] for c, p in known.items() if p is None)
@@ -268,11 +269,11 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
 def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force: bool) -> CurvePeak | None:
     """Return the peak of a case; None if it is unknown, no resonance, or wrong."""
     curve = Curve(data, case)
-    wrong = curve.number("case_verdict") == LEVELS.index("wrong")
+    wrong = curve.read(Verdicts).case_verdict == LEVELS.index("wrong")
     if curve.peak < 0 or curve.at_the_end or curve.outside or wrong:
         return None
     amplitude = float(curve.amplitude[curve.peak])
-    state = data["peak_state"].isel(case=case).transpose("contact", "tangent", "sample").values
+    state = curve.read(PeakPeriod).peak_state
     if not np.isfinite(amplitude) or np.any(state < 0):
         return None
     contacts, loss = contacts_at_peak(state), _loss(curve)
