@@ -175,7 +175,7 @@ def missing_package(package: str, error: Exception, extra: str) -> StickslipErro
     Parameters
     ----------
     package
-        Its name.
+        Name of the package.
     error
         Exception of the import; an `OSError` means that a system library is missing.
     extra

@@ -38,7 +38,7 @@ class Starts:
     interface
         The interface with all springs unstretched at zero displacement, Iwan elements as Jenkins elements in parallel.
     given
-        The same interface with the initial positions of the model.
+        Interface with the initial positions of the model.
     first
         (n_contacts + 1,) contact c of the model is contacts first[c] to before first[c + 1] of `interface`.
     stiffness

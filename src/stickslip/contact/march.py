@@ -328,7 +328,7 @@ def march_period(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     address
-        Where the step of the law begins, from `law_address`.
+        Address of the compiled step of the law, from `law_address`.
     parameters, start
         (n, n_parameters) and (n, n_state) of each contact.
     gap, velocity

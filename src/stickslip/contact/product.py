@@ -271,7 +271,7 @@ def add_upper(above, upper, columns, values, scale, vector, gap, force, out):  #
     Parameters
     ----------
     above, upper
-        Of `Triangles`.
+        Fields of `Triangles`.
     columns, values, scale
         As in `subtract_lower`.
     vector
@@ -304,7 +304,7 @@ def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, forc
     real, imaginary
         Inverses of the harmonics' matrices, in the form of `harmonic.matrix_products.SmallBlocks`.
     below, lower
-        Of `Triangles`.
+        Fields of `Triangles`.
     columns, values, scale
         As in `subtract_lower`.
     rows

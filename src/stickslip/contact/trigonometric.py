@@ -148,7 +148,7 @@ def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type
     Returns
     -------
     int
-        Their number, even.
+        Number of sign changes, even.
     """
     n = grid.shape[1]
     on_grid(polynomial, grid, values)

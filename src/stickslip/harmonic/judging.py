@@ -108,7 +108,7 @@ def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
     low
         The problem of the solution.
     x
-        Its scaled unknowns.
+        Scaled unknowns of the solution.
     omega
         Frequency, rad/s.
 

@@ -126,7 +126,7 @@ def _gradient(driven: Driven, state: State, along: FloatArray, by_own: FloatArra
     Parameters
     ----------
     driven
-        Which amplitudes.
+        Harmonics of the amplitude.
     state
         Where.
     along

@@ -28,7 +28,7 @@ def dense_modes(
     shift
         Shift in rad²/s², at most the lowest square.
     dofs
-        Of the coordinates, for messages.
+        Dofs of the coordinates, for messages.
 
     Returns
     -------

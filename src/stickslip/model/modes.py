@@ -228,7 +228,7 @@ def lowest_modes(
     shift
         In rad²/s², at most the lowest square.
     dofs
-        Of the coordinates, for messages.
+        Dofs of the coordinates, for messages.
 
     Raises
     ------

@@ -132,7 +132,7 @@ def on_modes_of_others(
     keep
         (k,) dofs that stay physical.
     reduction
-        Its reduction.
+        Reduction of the structure.
     others
         Modes in other states (`modes_of`). One state: the structure's own modes are rotated to be as close to these as possible.
         Several states: a basis of most of the space that all of them span replaces the own modes; it has 1.5 times as many vectors.

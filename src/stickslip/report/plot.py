@@ -65,7 +65,7 @@ class Plot:
     key
         Name of the figure in the page and in Python, unique.
     title
-        Its heading.
+        Heading of the figure.
     caption
         Sentences on what the figure shows, with numbers from the data.
     figure

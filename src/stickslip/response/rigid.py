@@ -77,7 +77,7 @@ def rigid_response(
         Harmonics, samples, solver. As many samples as coefficients, ``2 order + 1``, let the laws hold exactly at the samples; eight
         a harmonic and more are more accurate.
     penalty
-        Of the method, N/m; see `dynamic_lagrangian`. It is no stiffness of the contacts.
+        Penalty of the method, N/m; see `dynamic_lagrangian`. It is no stiffness of the contacts.
 
     Yields
     ------

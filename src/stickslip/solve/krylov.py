@@ -286,7 +286,7 @@ class _Account:
     arrays
         Systems to be factorised before products are tried again.
     pause
-        How many it will be the next time.
+        Number of systems to be factorised the next time.
     """
 
     debt: float = 0.0

@@ -25,7 +25,7 @@ class Case:
     Parameters
     ----------
     index
-        Its position.
+        Index of the case.
     label
         Varied keys with their values; empty for a study without [vary].
     values

@@ -93,7 +93,7 @@ def run_study(
     only
         Names of the analyses to answer; all of the study if empty.
     workers, kind, shard
-        Where the jobs are executed, see `Place`.
+        Place of execution of the jobs; see `Place`.
     fresh
         Delete earlier results and start again.
     checks

@@ -141,7 +141,7 @@ class Question:
     model
         The assembled model; its peak is that of the first output.
     sweep
-        How the response is computed.
+        Sweep: how the response is computed.
     limit
         Change by more harmonics above which there is a warning, a fraction.
     facts

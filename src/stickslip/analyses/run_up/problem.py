@@ -60,7 +60,7 @@ class Along:
     model
         The assembled model, whose system covers all speeds.
     sweep
-        How the response is computed.
+        Sweep: how the response is computed.
     error
         Error of the polynomials between speeds, see `OverSpeed`.
     static_force

@@ -32,7 +32,7 @@ def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     balance
         The periodic problem.
     x
-        Its (size,) scaled unknowns.
+        (size,) scaled unknowns of the solution.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     balance
         The periodic problem.
     x
-        Its (size,) scaled unknowns.
+        (size,) scaled unknowns of the solution.
 
     Returns
     -------

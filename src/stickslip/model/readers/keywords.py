@@ -37,7 +37,7 @@ class Block:
     parameters
         Upper case names -> values as written, unquoted; empty for flags.
     path, line
-        Where the keyword stands.
+        File and line of the keyword.
     """
 
     keyword: str

@@ -75,7 +75,7 @@ class Closer:
     curve
         The motions.
     branch
-        Its points, in their order; points between them are put there.
+        Points of the branch in their order; new points are inserted between them.
     """
 
     curve: ModeCurve

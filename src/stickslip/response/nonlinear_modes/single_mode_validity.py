@@ -85,7 +85,7 @@ class Isolation:
     output, gaps
         Motion of the other modes over that of the mode: of the output, and of the gaps of the contacts.
     distance
-        Of the next frequency, relative.
+        Relative distance of the next frequency.
     overlap
         Damping ratio over that distance.
     growth
@@ -159,7 +159,7 @@ def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
     others
         The modes beside it.
     resonance
-        Of the synthesis.
+        Resonance of the synthesis.
     dof
         The output that counts.
     """

@@ -44,7 +44,7 @@ class Synthesised:
     amplitude
         Modal amplitude, kg^0.5 m.
     phase
-        Of the motion against that of the backbone, rad.
+        Phase of the motion relative to that of the backbone, rad.
     curve
         0: the curve from small amplitudes; 1 and so on: detached curves.
     stable

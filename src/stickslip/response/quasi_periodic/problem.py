@@ -151,11 +151,11 @@ class TwoTones:
     Attributes
     ----------
     system
-        What vibrates.
+        System of structure and contacts.
     balance
         The equations.
     newton
-        Their solver.
+        Settings of Newton's method.
     """
 
     system: System
@@ -271,15 +271,15 @@ def two_tones(
     Parameters
     ----------
     system
-        What vibrates and its contacts; of a tuned wheel, with every wave.
+        System of structure and contacts; a tuned wheel needs all its waves.
     first
         The static load, and that whose harmonics are those of ω1.
     second
-        That whose harmonics are those of ω2; its static part is not used.
+        Load with the harmonics of ω2; its static part is not used.
     order
         Largest sum of harmonics ``|j| + |k|``.
     waves
-        Of a tuned wheel: the wave numbers of both frequencies. Loads are given in the coordinates of their own waves.
+        Wave numbers of both frequencies on a tuned wheel. Loads are given in the coordinates of their own waves.
     more
         Dofs that are retained beside those of the contacts.
     newton_options
@@ -351,7 +351,7 @@ def with_enough(
     Parameters
     ----------
     problem, motion
-        What to begin with.
+        Initial problem and motion.
     most
         Largest sum of harmonics that is taken; what is left out is looked for up to `BEYOND` more, and in the judging set of the loads.
     tolerance
@@ -409,9 +409,9 @@ def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequen
     Parameters
     ----------
     problem, motion
-        What was found.
+        Problem and its solved motion.
     path
-        That samples the larger set finely enough.
+        Sampling path that is fine enough for the larger set.
     more
         Combined frequencies, those that matter most first; as many are taken as a step may have.
     """

@@ -97,7 +97,7 @@ class TractionBounds:
     reference
         The motion from the model's own start.
     least, most
-        Those of the smallest and the largest amplitude.
+        Solutions of the smallest and the largest amplitude.
     springs
         Names of the contacts to which the rows of sliders belong.
     solves, failures
@@ -247,7 +247,7 @@ def resonance_bounds(
     system, load, output, discretisation, search
         As of `traction_bounds`.
     known
-        Its bounds at frequencies that grow.
+        Bounds at increasing frequencies.
     end
         ``least`` or ``most``: which bound.
 

@@ -71,7 +71,7 @@ class TractionState:
     Attributes
     ----------
     problem
-        What it solves.
+        Problem that it solves.
     omega
         Frequency, rad/s.
     sliders
@@ -172,7 +172,7 @@ class TractionProblem:
     Parameters
     ----------
     balance
-        Of `starts.interface`, whose springs have no start of their own.
+        Balance of `starts.interface`, whose springs have no initial positions of their own.
     starts
         The springs.
     driven

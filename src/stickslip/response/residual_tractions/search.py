@@ -62,7 +62,7 @@ def extremes(reference: TractionState, search: TractionSearch | None, more: Iter
     reference
         The motion from the model's own start.
     search
-        How hard to look; None: from `more` alone.
+        Effort of the search; None: from `more` alone.
     more
         Further starts, sliders (n, 2) in m, such as the extremes of a neighbouring frequency.
     """

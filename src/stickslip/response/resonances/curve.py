@@ -32,7 +32,7 @@ def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, 
     Parameters
     ----------
     search
-        Of what, and by which condition; by variable phase the phase follows the maximum from point to point.
+        Quantity and condition of the peak; by variable phase the phase follows the maximum from point to point.
     span
         First and last value of the parameter; the last may be the smaller one.
     points

@@ -148,7 +148,7 @@ class Start:
     y
         (size + 1,) unknowns.
     value
-        Of the parameter.
+        Value of the parameter.
     newton
         Corrector from peak to peak.
     height
@@ -202,7 +202,7 @@ def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]
     Parameters
     ----------
     search
-        Of what; its range of frequencies is swept once.
+        Quantity of the peak; its range of frequencies is swept once.
     peaks
         All at the same value, which converged.
     """

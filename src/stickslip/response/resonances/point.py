@@ -18,7 +18,7 @@ class PeakPoint:
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     omega
         Frequency of the peak, rad/s; of a subharmonic resonance that of the load.
     amplitude
@@ -87,13 +87,13 @@ def peak_point(
     force
         Phase of the force in the first of the harmonics that peak, rad.
     value
-        Of the parameter.
+        Value of the parameter.
     solution
-        Of the equation.
+        Solution of the equation.
     evaluations
-        That were spent on it.
+        Number of evaluations.
     peak
-        Its number.
+        Number of the peak.
     """
     y, slope, curvature, below = solution.x, np.nan, np.nan, np.nan
     balance, omega = problem.family(value), problem.omega(y)

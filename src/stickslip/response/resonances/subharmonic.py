@@ -43,11 +43,11 @@ def motions_of_several_periods(
     system
         System of `balance`.
     balance
-        Of the lower frequency.
+        Balance at the lower frequency.
     omega_range
-        Of the lower frequency, rad/s.
+        Range of the lower frequency, rad/s.
     periods
-        Of the load in one of the motion.
+        Periods of the load in one period of the motion.
     points
         Steps through the range, at least.
     options

@@ -60,11 +60,11 @@ class Campbell:
     agreement
         (s, n_modes) least modal assurance (1: same shape) on the way from the speed before; ones at the first.
     engine_orders
-        Whose crossings were looked for.
+        Engine orders whose crossings were searched.
     crossings
         By engine order, then by speed.
     wave_number, sectors
-        Of the travelling wave that the structure stands for; 0 and 1 for a structure that is not cyclic.
+        Wave number of the structure and number of sectors; 0 and 1 for a structure that is not cyclic.
     """
 
     speeds: FloatArray
@@ -148,13 +148,13 @@ def campbell(
     speeds
         Ascending, in rad/s; a crossing is found where the frequency minus the engine order's changes its sign from one to the next.
     n_modes
-        How many modes, counted at the first speed.
+        Number of modes, counted at the first speed.
     engine_orders
         Positive.
     coriolis
         Whether the skew part of the structure's damping counts (`gyroscopic_modes`). Dissipation never does.
     tolerance
-        Of the speed of a crossing, relative.
+        Relative tolerance of the speed of a crossing.
     progress
         Called with each speed when it is done.
 

@@ -196,7 +196,7 @@ def least_stable_curve(
     angles
         (a,) in rad.
     waves
-        Of phase angles that the wheel has.
+        Waves of the wheel.
     phase_angles
         (w,) theirs, in rad.
     reference

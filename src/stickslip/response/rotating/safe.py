@@ -68,7 +68,7 @@ class NodalDiameterMap:
         Parameters
         ----------
         speed
-            Of the rotor, in rad/s; the one that the sector was computed at.
+            Speed of the rotor at which the sector was computed, rad/s.
         """
         turning = self.nodal_diameters[:, None] * speed / HZ
         return np.abs(self.frequencies_hz - turning), np.abs(self.forward_hz + turning)
@@ -151,7 +151,7 @@ class Interference:
     wave_number
         Engine order modulo the number of sectors: the wave that it excites in the rotating frame.
     nodal_diameter
-        Of that wave.
+        Nodal diameter of the wave.
     mode
         Column of the map, from 0.
     frequency_hz

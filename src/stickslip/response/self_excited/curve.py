@@ -47,7 +47,7 @@ class AmplitudePoint:
     order
         Highest harmonic.
     unknowns
-        Of the equation.
+        Unknowns of the equation.
     status
         How the solver ended; a point that did not converge is no motion.
     iterations

@@ -52,7 +52,7 @@ class LimitCycle:
     coefficients
         (order + 1, n_retained) complex amplitudes, m.
     unknowns
-        Of the autonomous equation.
+        Unknowns of the autonomous equation.
     """
 
     amplitude: float
@@ -146,9 +146,9 @@ def solve_cycle(
     start
         (size,) unknowns of a motion over its amplitude.
     amplitude, omega
-        Its amplitude, m, and frequency, rad/s.
+        Initial amplitude, m, and frequency, rad/s.
     level
-        Of damping that the motion is to have in place of none.
+        Prescribed damping of the motion; zero for a limit cycle.
     """
     equation = problem.limit_cycle()
     guess = np.append(start, [np.log(omega / problem.mode.omega), np.log(amplitude)])

@@ -33,7 +33,7 @@ class Marched:
     Parameters
     ----------
     omega
-        That frequency, rad/s.
+        Frequency of the motion, rad/s.
     first
         (periods, n_outputs) complex amplitudes of the first harmonic in each period, m.
     samples

@@ -49,7 +49,7 @@ class Held:
     Parameters
     ----------
     position
-        Of the coordinate among the retained ones.
+        Index of the coordinate among the retained ones.
     row
         1: the cosine part, 2: the sine part.
     target
@@ -81,13 +81,13 @@ class SelfExcited:
     Parameters
     ----------
     system, load
-        What vibrates, and its static load.
+        System of structure and contacts, and its static load.
     mode
-        Where they begin at small amplitudes.
+        Mode in which the motions begin at small amplitudes.
     how
         Harmonics, samples, solver.
     position
-        Of the coordinate whose amplitude is given, among the retained ones.
+        Index, among the retained coordinates, of the one whose amplitude is given.
     balance
         The balance at an amplitude of 1 m.
     """

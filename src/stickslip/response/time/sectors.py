@@ -57,7 +57,7 @@ class SectorsInTime:
     Parameters
     ----------
     structure, contacts, load
-        Of all sectors, one after the other. Dofs of sector 0 have the numbers that they have in the wheel.
+        Structure, contacts and load of all sectors in sequence. Dofs of sector 0 have the same numbers as in the wheel.
     motion
         Symmetry of the travelling motion.
     wheel
@@ -99,7 +99,7 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     Parameters
     ----------
     system
-        Its structure is a `TunedWheel` with waves up to half as many harmonics as there are different sectors.
+        System with a `TunedWheel` whose waves reach half the number of different sectors.
     load
         Loads on the coordinates of its harmonics.
     every
@@ -188,7 +188,7 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
     Parameters
     ----------
     system
-        Of a wheel with every wave (`TunedWheel.has_every_wave`) all sectors are marched.
+        System; of a wheel with every wave (`TunedWheel.has_every_wave`) all sectors are marched.
     gaps
         (H+1, 3 n_contacts) complex coefficients, m.
     """

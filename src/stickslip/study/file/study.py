@@ -42,9 +42,9 @@ class StudyFile:
     path
         Path of the file, as messages name it.
     text
-        Its text, kept for the provenance of results.
+        Text of the file, kept for the provenance of results.
     raw
-        Its content as parsed TOML.
+        Content of the file as parsed TOML.
     cases
         Cases of [vary]; one case without it.
     """

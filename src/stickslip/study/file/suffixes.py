@@ -108,7 +108,7 @@ def nearest_key(word: str, known: Sequence[str], value: object = None) -> str:
     known
         The known keys.
     value
-        Its value; a number or a list of numbers is converted.
+        Value of the key; a number or a list of numbers is converted.
     """
     found = _in_another_unit(word, known)
     if found is None:

@@ -27,7 +27,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     place
         The file.
     raw
-        Its content.
+        Content of the file.
     model
         Class of the whole file, which defines the known keys.
 

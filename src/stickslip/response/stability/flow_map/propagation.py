@@ -44,7 +44,7 @@ def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: Floa
     pull, sliders
         (n, m) and (m, k) operator and positions of sliders, constant over the interval.
     length
-        Of the interval, rad.
+        Length of the interval, rad.
     """
     if length * _size(a) <= SHORT:
         force = np.zeros_like(states)

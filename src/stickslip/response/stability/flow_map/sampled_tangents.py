@@ -67,7 +67,7 @@ def sampled_tangents(laws: Sequence[ContactLaw], contacts: IntArray, path: Path)
     laws, contacts
         (n,) laws and the contacts they belong to.
     path
-        Their gaps over one period.
+        Gaps of the contacts over one period.
     """
     most = max((law.initial_state().size for law in laws), default=0)
     jac = np.zeros((len(path.times), len(laws), 3 + most, 9 + most))

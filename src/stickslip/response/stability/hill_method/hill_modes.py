@@ -97,7 +97,7 @@ def hill_modes(
     Parameters
     ----------
     structure
-        Its matrices may be complex and unsymmetric; coordinates may be without mass.
+        Structure with possibly complex, unsymmetric matrices and coordinates without mass.
     gap_operator
         (3 n_contacts, n).
     springs
