@@ -27,7 +27,7 @@ import stickslip as ss
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.joints.point_laws import at_rest
+from stickslip.assembly.joints.pairs import at_rest
 from stickslip.assembly.sides.deviations import Blade, blade_alone, blade_alone_hz
 from stickslip.assembly.sides.mistuned import changed
 from stickslip.assembly.sides.wheel_modes import wheel_modes

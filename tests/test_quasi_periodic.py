@@ -13,10 +13,18 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.two_frequency_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic import in_time
-from stickslip.response.quasi_periodic.find import distinct, swept, tones_of_multipliers
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.problem import TorusMotion, TwoTones, envelope, off_by, two_tones, with_enough
-from stickslip.response.quasi_periodic.tone import beginnings, forced_motion, over_amplitude, second_tone, solve_free
+from stickslip.response.quasi_periodic.tone import (
+    beginnings,
+    distinct,
+    forced_motion,
+    over_amplitude,
+    second_tone,
+    solve_free,
+    swept,
+    tones_of_multipliers,
+)
 from stickslip.response.stability import stability
 from stickslip.response.time.start import rest, start_from_harmonics
 from stickslip.response.time.stepping.marcher import step_work

@@ -17,7 +17,7 @@ from stickslip.analyses.quasi_periodic import solve
 from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
 from stickslip.analyses.quasi_periodic.solve import at_frequency
 from stickslip.errors import InputError
-from stickslip.response.quasi_periodic import find
+from stickslip.response.quasi_periodic import tone
 from stickslip.response.self_excited.in_time import march_periods, wave_history
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import start_from_harmonics
@@ -98,7 +98,7 @@ def test_what_was_not_examined_is_doubtful(monkeypatch: pytest.MonkeyPatch) -> N
     def fails(*_: object) -> None:
         raise FloatingPointError("no multipliers today")
 
-    monkeypatch.setattr(find, "stability", fails)
+    monkeypatch.setattr(tone, "stability", fails)
     unknown = model.quasi_periodic(frequencies_hz=[21.5])
     assert any("no multipliers today" in str(v) for v in unknown.verdicts)
     assert {v.level for v in unknown.verdicts} == {"doubtful"}

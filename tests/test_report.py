@@ -32,9 +32,9 @@ from stickslip.analyses.pictures.skin import edges, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
+from stickslip.report.result import Node
 from stickslip.report.tiles import patches, triangulated
 from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.verdict import Verdict, to_json
@@ -665,8 +665,8 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     from plotly import graph_objects as go
 
     from stickslip.report.content import Words
-    from stickslip.report.node import Node
     from stickslip.report.plot import Plot
+    from stickslip.report.result import Node
     from stickslip.report.section import Block, Section
 
     def figure(node: Node) -> Plot:

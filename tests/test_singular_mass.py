@@ -7,10 +7,10 @@ import scipy
 from stickslip import InputError
 from stickslip.errors import SingularError
 from stickslip.model import assemble_deck, normal_modes, read_deck
-from stickslip.model.dense_modes import dense_modes
 from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.mesh.solid_mesh import HEX_EDGES
+from stickslip.model.modes import dense_modes
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.structure import Dofs, Structure
 

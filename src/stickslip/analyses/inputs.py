@@ -14,8 +14,8 @@ import numpy as np
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.pictures.model import of_first_case
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
+from stickslip.report.result import Node
 
 # endings of keys, the longer ones first; True: with a prefix such as µ or M
 _UNITS = (

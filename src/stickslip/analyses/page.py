@@ -16,10 +16,9 @@ from stickslip.errors import input_error
 from stickslip.report.cases import cases_of, varied
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
-from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
-from stickslip.report.result import analysis, open_result, versions
+from stickslip.report.result import Node, analysis, open_result, versions
 from stickslip.report.section import Block, Card, Content, Part, Section
 from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.store.netcdf import alike, one_case

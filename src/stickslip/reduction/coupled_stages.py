@@ -15,10 +15,9 @@ import scipy
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.dense_modes import dense_modes
 from stickslip.model.fe.factorisation import DENSE, Say, Solve, factorise, silent
 from stickslip.model.fe.lanczos import lanczos
-from stickslip.model.modes import usual_shift
+from stickslip.model.modes import dense_modes, usual_shift
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.turning import node_table
 from stickslip.reduction.waves import wave

@@ -1,10 +1,14 @@
-"""A result as the report sees it: dataset, analyses, and provenance."""
+"""A result as the report sees it: dataset, analyses with the accesses that figures and tables need, and provenance."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.npz import require_no_pipe
 from stickslip.study.store.netcdf import read_tree
@@ -44,3 +48,68 @@ def versions(stored: str) -> dict[str, str]:
     except json.JSONDecodeError:
         return {"versions": stored}
     return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A dataset of one analysis.
+
+    Parameters
+    ----------
+    data
+        Variables of the analysis. Its attributes are those of the whole result, overridden by its own.
+    key
+        Suffix of figure names where each case has figures of its own; empty for the first case.
+    """
+
+    data: xr.Dataset
+    key: str = ""
+
+    def has(self, *names: str) -> bool:
+        """Return whether all the variables exist and none is empty."""
+        return all(name in self.data and self.data[name].size > 0 for name in names)
+
+    def values(self, name: str, *dimensions: str) -> FloatArray:
+        """Return a variable as floats with its dimensions in the order named, or as they are stored."""
+        found = self.data[name]
+        return np.asarray(found.transpose(*dimensions or found.dims).values, dtype=np.float64)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the values of a variable as floats."""
+        return self.values(name)
+
+    def integers(self, name: str) -> IntArray:
+        """Return the values of a variable as integers."""
+        return np.asarray(self.data[name].values).astype(np.int64)
+
+    def labels(self, dimension: str) -> tuple[str, ...]:
+        """Return the labels of a dimension; running numbers if it has none."""
+        if dimension in self.data.coords:
+            return tuple(str(v) for v in self.data[dimension].values)
+        return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
+
+    def labels_of(self, name: str) -> tuple[str, ...]:
+        """Return the texts of a variable."""
+        return tuple(str(v) for v in self.data[name].values)
+
+    def stored(self, name: str) -> Any:
+        """Return a number, list or text stored as a variable or as an attribute; None if there is none."""
+        return self.data[name].values if name in self.data else self.data.attrs.get(name)
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return a stored value as text."""
+        value = self.stored(name)
+        return default if value is None else str(value)
+
+    def numbers(self, name: str) -> FloatArray:
+        """Return a stored value as numbers (n,); empty if it is missing or not numeric."""
+        try:
+            value = self.stored(name)
+            return np.atleast_1d(np.asarray([] if value is None else value, dtype=np.float64))
+        except (TypeError, ValueError):
+            return np.zeros(0)
+
+    def scalar(self, name: str, default: float = float("nan")) -> float:
+        """Return a stored value as a number; the default if it is missing or not numeric."""
+        found = self.numbers(name)
+        return float(found[0]) if found.size else default

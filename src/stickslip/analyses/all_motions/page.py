@@ -7,9 +7,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.report.content import Table, Words
-from stickslip.report.node import Node
 from stickslip.report.plot import MUTED, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}

@@ -14,10 +14,9 @@ from stickslip.analyses.nonlinear_mode.page import table as mode_table
 from stickslip.analyses.waves.page.flutter import margins
 from stickslip.analyses.waves.page.waves import Waves
 from stickslip.report.content import Table, Words
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, Plot, styled
 from stickslip.report.quantities import NONE, scale_for
-from stickslip.report.result import analysis
+from stickslip.report.result import Node, analysis
 from stickslip.report.section import Content
 
 View = TypeVar("View", bound=Node)

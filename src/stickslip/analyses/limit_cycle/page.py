@@ -12,9 +12,9 @@ from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycl
 from stickslip.analyses.limit_cycle.verdicts import grows
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 

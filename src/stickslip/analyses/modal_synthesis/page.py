@@ -11,9 +11,9 @@ from stickslip.analyses.modal_synthesis.percents import percent
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 

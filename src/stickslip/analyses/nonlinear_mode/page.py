@@ -13,9 +13,9 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, joined, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 NAME = "nonlinear_mode"

@@ -8,9 +8,9 @@ import xarray as xr
 from stickslip.analyses.pictures.skin import skin_picture
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, number, percent, quantity
+from stickslip.report.result import Node
 
 _CHECKED = (
     ("free", "frequency_full_hz", "frequency_reduced_hz"),

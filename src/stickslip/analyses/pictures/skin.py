@@ -10,9 +10,9 @@ from stickslip.analyses.forced_response.page.bodies import group_colours, rigid_
 from stickslip.analyses.forced_response.page.contacts import contact_lines, states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
+from stickslip.report.result import Node
 from stickslip.report.tiles import outlines, patches, triangulated
 
 _MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small

@@ -11,9 +11,9 @@ from stickslip.analyses.columns import record_of
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 

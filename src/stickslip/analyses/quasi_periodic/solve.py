@@ -12,9 +12,8 @@ from stickslip.analyses.quasi_periodic.time import compared
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath
-from stickslip.response.quasi_periodic.find import growing_tones, swept, tone_beside
 from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, with_enough
-from stickslip.response.quasi_periodic.tone import solve_free
+from stickslip.response.quasi_periodic.tone import growing_tones, solve_free, swept, tone_beside
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres_between

@@ -10,9 +10,9 @@ from stickslip.analyses.columns import record_of
 from stickslip.analyses.residual_tractions.records import ConfirmedEnd, ResidualTractions
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _NAMES = ("own start", "smallest", "largest")

@@ -11,9 +11,9 @@ from stickslip.analyses.columns import record_of
 from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _BY = {

@@ -7,9 +7,9 @@ import plotly.graph_objects as go
 
 from stickslip.arrays import BoolArray
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
+from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _DASHES = ("dash", "dot", "dashdot", "longdash")

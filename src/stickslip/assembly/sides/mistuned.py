@@ -21,8 +21,7 @@ from stickslip.assembly.build import (
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.fluid.aero_forces import about_static_state
 from stickslip.assembly.joints.gap_coordinates import refuse_mixed_gaps
-from stickslip.assembly.joints.pairs import Pairs
-from stickslip.assembly.joints.point_laws import at_rest
+from stickslip.assembly.joints.pairs import Pairs, at_rest
 from stickslip.assembly.joints.unconstrained_bodies import held_warnings
 from stickslip.assembly.locations import picked
 from stickslip.assembly.model import Model

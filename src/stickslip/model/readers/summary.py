@@ -9,10 +9,9 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import InputError, StickslipError, input_error
-from stickslip.model.dense_modes import mass_rank
 from stickslip.model.fe.factorisation import DENSE, Say, silent
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.modes import normal_modes, refuse_bad_mass
+from stickslip.model.modes import mass_rank, normal_modes, refuse_bad_mass
 from stickslip.model.readers.entries import SYMMETRY, asymmetry
 from stickslip.model.readers.positions import doubt_about_positions
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, doubt_about_units, translational_mass

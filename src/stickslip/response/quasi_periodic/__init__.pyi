@@ -1,6 +1,5 @@
 """Public names of `stickslip.response.quasi_periodic`, written once."""
 
-from .find import tone_beside as tone_beside
 from .in_time import course as course
 from .in_time import statistics as statistics
 from .problem import TorusMotion as TorusMotion
@@ -13,3 +12,4 @@ from .tone import forced_motion as forced_motion
 from .tone import over_amplitude as over_amplitude
 from .tone import second_tone as second_tone
 from .tone import solve_free as solve_free
+from .tone import tone_beside as tone_beside

@@ -19,8 +19,8 @@ from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table
-from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
+from stickslip.report.result import Node
 from stickslip.study.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.report.node import Node
 from stickslip.report.plot import colour
+from stickslip.report.result import Node
 
 NEEDED = ("wave_number", "nodal_diameter", "wave_kind", "frequency_hz")
 
