@@ -91,8 +91,8 @@ def test_the_wheel_with_all_sectors_alike_is_drawn_at_the_speeds_of_its_frequenc
     rpm[:unknown] = np.nan  # a point of which the speed is not known decides nothing
     hertz = [150.0, 160.0, 155.0]
     data["speed_rpm"], data["whitehead"] = ("point", rpm), ("case", [1.3, 1.3])
-    data["tuned_case"] = "tuned", [0, 0, 1]
-    data["tuned_frequency_hz"], data["tuned_amplitude"] = ("tuned", hertz), ("tuned", [1e-6, 2e-6, 3e-6])
+    data["tuned_case"] = "tuned_point", [0, 0, 1]
+    data["tuned_frequency_hz"], data["tuned_amplitude"] = ("tuned_point", hertz), ("tuned_point", [1e-6, 2e-6, 3e-6])
     plot = blades(Response(data))
     assert plot is not None
     alike = [t for t in plot.figure.data if t.name == "all sectors alike"]

@@ -4,6 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.columns import BifurcationRows, BifurcationSearch, SidePoints, read
 from stickslip.analyses.forced_response.summary import beside_bifurcations
 from stickslip.report.cases import ShownCase
 from stickslip.report.content import Table, Words
@@ -17,7 +18,6 @@ SYMBOLS = {
     "branch point": "cross",
     "jump of multipliers": "hourglass",
 }
-ROWS = ("frequency_hz", "frequency_error_hz", "amplitude", "multiplier_error")
 
 
 def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str:
@@ -30,56 +30,49 @@ def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str
     over
         Abscissa of a frequency of 1 Hz.
     """
-    if not response.has("bifurcation_case", "bifurcation_kind"):
+    found = read(BifurcationRows, response.data)
+    if found.bifurcation_case is None:
         return ""
-    branches = 0
-    for case in response.cases:
-        branches += _branches(figure, response, case, over)
+    branches = sum(_branches(figure, response, case, over) for case in response.cases)
     if branches:
         figure.add_trace(key_marker("branch that leaves (dotted)", "line-ew", "bifurcations"))
-    kinds = [str(kind) for kind in response.data["bifurcation_kind"].values]
+    kinds = [str(kind) for kind in found.bifurcation_kind]
     for kind, symbol in SYMBOLS.items():
         own = [i for i, k in enumerate(kinds) if k == kind]
         if own:
-            figure.add_trace(_marks(response, own, kind, symbol, over))
-    found = [counted(kinds.count(kind), kind) for kind in SYMBOLS if kind in kinds]
-    told = f" Located on the branch: {', '.join(found)}." if found else ""
+            figure.add_trace(_marks(response, found, own, symbol, over))
+    counts = [counted(kinds.count(kind), kind) for kind in SYMBOLS if kind in kinds]
+    told = f" Located on the branch: {', '.join(counts)}." if counts else ""
     if branches:
         told += f" Dotted: {branches} that leave{'s' * (branches == 1)} there."
     return told
 
 
-def _marks(response: Response, own: list[int], kind: str, symbol: str, over: float) -> go.Scatter:
-    case, hz, size = (response.values(f"bifurcation_{n}") for n in ("case", *ROWS[:3:2]))
-    told = response.labels_of("bifurcation_sentence")
-    scale = response.scale
-    by = [_divisor(response, int(case[i])) for i in own]
+def _marks(response: Response, found: BifurcationRows, own: list[int], symbol: str, over: float) -> go.Scatter:
+    assert found.bifurcation_case is not None
+    by = [_divisor(response, case) for case in found.bifurcation_case[own]]
     return go.Scatter(
-        x=hz[own] * over,
-        y=size[own] / by * scale.factor,
+        x=found.bifurcation_frequency_hz[own] * over,
+        y=found.bifurcation_amplitude[own] / by * response.scale.factor,
         mode="markers",
-        name=kind,
+        name=str(found.bifurcation_kind[own[0]]),
         legendgroup="bifurcations",
         marker={"symbol": symbol, "size": 10, "color": "white", "line": {"width": 1.8, "color": MUTED}},
-        customdata=[[told[i]] for i in own],
+        customdata=[[str(text)] for text in found.bifurcation_sentence[own]],
         hovertemplate="%{customdata[0]}<extra></extra>",
     )
 
 
 def _branches(figure: go.Figure, response: Response, case: ShownCase, over: float) -> int:
     """Draw the branches of a case; return how many."""
-    if not response.has("side_point_case"):
-        return 0
-    at = np.flatnonzero(response.integers("side_point_case") == case.index)
-    number_of = response.integers("side_point_branch")
-    hz, size = (response.values(f"side_point_{n}") for n in ("frequency_hz", "amplitude"))
-    every = np.unique(number_of[at])
+    found = read(SidePoints, response.data, case.index)
+    every = np.unique(found.side_point_branch)
     for branch in every:
-        own = at[number_of[at] == branch]
+        own = found.side_point_branch == branch
         figure.add_trace(
             go.Scatter(
-                x=hz[own] * over,
-                y=size[own] / _divisor(response, case.index) * response.scale.factor,
+                x=found.side_point_frequency_hz[own] * over,
+                y=found.side_point_amplitude[own] / _divisor(response, case.index) * response.scale.factor,
                 mode="lines",
                 name="leaves the response",
                 legendgroup="bifurcations",
@@ -97,28 +90,25 @@ def _divisor(response: Response, case: int) -> float:
 
 def bifurcations(response: Response) -> Table | Words | None:
     """Return a table with one row a bifurcation: frequency, kind, and the crossing multiplier."""
-    if not response.has("bifurcations_limits"):
+    if not any(read(BifurcationSearch, response.data, c.index).bifurcations_limits for c in response.cases):
         return None
     labels = [c.label for c in response.cases]
     title, lines = "Bifurcations", list(beside_bifurcations(response.data, labels))
     text = "Where multipliers of the motion cross the unit circle along the branch, or it turns back."
-    if not response.has("bifurcation_case"):
+    found = read(BifurcationRows, response.data)
+    if found.bifurcation_case is None:
         return Words((text,), title, lines)
-    case = response.integers("bifurcation_case")
-    hz, off, size, error = (response.values(f"bifurcation_{name}") for name in ROWS)
-    parts = response.values("bifurcation_multiplier", "bifurcation", "part")
-    kinds = response.labels_of("bifurcation_kind")
     rows = [
         [
-            response.cases[int(case[i])].short,
-            kinds[i],
-            fixed(float(hz[i]), 4),
-            _known(float(off[i])),
-            quantity(float(size[i]), response.length),
-            _complex(*parts[i]),
-            _known(float(error[i])),
+            response.cases[case].short,
+            str(found.bifurcation_kind[i]),
+            fixed(float(found.bifurcation_frequency_hz[i]), 4),
+            _known(float(found.bifurcation_frequency_error_hz[i])),
+            quantity(float(found.bifurcation_amplitude[i]), response.length),
+            _complex(*found.bifurcation_multiplier[i]),
+            _known(float(found.bifurcation_multiplier_error[i])),
         ]
-        for i in range(len(hz))
+        for i, case in enumerate(found.bifurcation_case)
     ]
     head = ["kind", "frequency (Hz)", "± (Hz)", "amplitude", "multiplier", "±"]
     return response.table(title, (text,), head, rows, items=lines)

@@ -48,8 +48,7 @@ def body_motion(response: Response, case: ShownCase, at: list[int], samples: int
     motion
         (6, samples + 1) motion about it.
     """
-    values = response.data["retained_displacement"].isel(point=response.peak(case), retained=at)
-    parts = np.asarray(values.transpose("harmonic", "retained", "part").values, dtype=np.float64)
+    parts = response.fields.retained_displacement[response.peak(case)][:, at]
     coefficients = np.nan_to_num(parts[..., 0] + 1j * parts[..., 1])
     harmonic = np.asarray(response.data["harmonic"].values, dtype=np.float64)[1:]
     wave = np.exp(2j * np.pi * harmonic[:, None] * np.arange(samples + 1) / samples)
@@ -106,7 +105,7 @@ def _body(response: Response, name: str, at: list[int]) -> Plot:
 
 def bodies(response: Response) -> list[Plot]:
     """Draw the motion of each rigid body over one period at the peak, and its orbit."""
-    if not response.peaked or not response.has("retained_displacement"):
+    if not response.peaked or not np.isfinite(response.fields.retained_displacement).any():
         return []
     return [_body(response, name, at) for name, at in rigid_bodies(response).items()]
 
@@ -118,7 +117,7 @@ def group_colours(response: Response) -> dict[str, str]:
 
 def _energy_caption(response: Response, case: ShownCase) -> str:
     names = response.labels("contact")
-    energy = response.floats("dissipated_energy")[response.peak(case)]
+    energy = response.fields.dissipated_energy[response.peak(case)]
     total = float(np.nansum(energy))
     if total <= _NOTHING:
         return "At the peak nothing is dissipated: every point sticks."
@@ -160,9 +159,9 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
 
 def energy(response: Response) -> Plot | None:
     """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency."""
-    if not response.has("dissipated_energy"):
+    values = response.fields.dissipated_energy
+    if not np.isfinite(values).any():
         return None
-    values = response.floats("dissipated_energy")
     total = np.where(response.converged, np.nansum(values, axis=1), np.nan)
     total = np.where(total < _NOTHING, 0.0, total)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")

@@ -30,6 +30,7 @@ from stickslip.analyses.forced_response.page.wheel import (
     wheel_at_peak,
     wheel_in_motion,
 )
+from stickslip.analyses.forced_response.records.columns import CaseNumbers
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.content import Table
@@ -103,7 +104,7 @@ def _shift_card(response: Response) -> Card | None:
 
 def _damping_card(response: Response) -> Card | None:
     """Return quality factor and equivalent damping ratio of the case shown first, with the range of all cases."""
-    ratios = {c: response.number_of("peak_damping", c) for c in response.peaked}
+    ratios = {c: response.numbers_of[c.index].peak_damping for c in response.peaked}
     known = {c: z for c, z in ratios.items() if z > 0 and response.resonates(c)}
     shown = next((c for c in known if c.index == response.chosen), None)
     if shown is None:
@@ -119,13 +120,11 @@ def _damping_card(response: Response) -> Card | None:
 
 def _blade_card(response: Response) -> Card | None:
     """Return the largest amplification of a mistuned wheel, and its blade."""
-    if not response.has("amplification", "largest_blade"):
-        return None
-    factors = {c: response.number_of("amplification", c) for c in response.peaked}
+    factors = {c: response.blades[c.index].amplification for c in response.peaked}
     known = sorted((c for c in factors if np.isfinite(factors[c])), key=lambda c: factors[c])
     if not known:
         return None
-    told = [f"blade {int(response.number_of('largest_blade', c))}{c.where}" for c in (known[-1], known[0])]
+    told = [f"blade {response.blades[c.index].largest_blade}{c.where}" for c in (known[-1], known[0])]
     note = f"largest: {told[0]}"
     if len(known) > 1:
         note += f"; smallest of {len(known)} cases {number(factors[known[0]])}, {told[1]}"
@@ -135,10 +134,10 @@ def _blade_card(response: Response) -> Card | None:
 
 def _loss_card(response: Response) -> Card | None:
     """Return the energy dissipated at the peak of a single case; several cases show their frequency shift instead."""
-    if len(response.peaked) != 1 or not response.has("dissipated_energy"):
+    own = response.fields.dissipated_energy
+    if len(response.peaked) != 1 or not np.isfinite(own).any():
         return None
-    own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
-    energy = float(np.nansum(own))
+    energy = float(np.nansum(own[response.peak(response.peaked[0])]))
     lost = quantity(energy if energy > 1e-12 else 0.0, "J")
     return Card(lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together")
 
@@ -167,8 +166,10 @@ def _work_cards(response: Response) -> list[Card]:
         note = f"{more} of {counted(n, 'accepted point')}, chosen by {response.selection}"
         label = f"of points keep other harmonics than H = {response.low_name}"
         found = [Card(f"{number(100 * more / n, 2)} %" if n else NONE, label, note)]
-    if response.has("unknowns_solved", "newton_steps"):
-        work, steps = (int(response.floats(w).sum()) for w in ("unknowns_solved", "newton_steps"))
+    work, steps = (
+        sum(own) for own in zip(*((n.unknowns_solved, n.newton_steps) for n in response.numbers_of), strict=True)
+    )
+    if work > 0:
         note = f"of all solutions together, in {counted(steps, 'Newton step')}"
         found.append(Card(number(work, 6), "unknowns solved", note))
     return found
@@ -216,7 +217,7 @@ def peaks(response: Response) -> Table:
     newton, forces = column(force, "N")
     length, sizes = column(value * (force if response.per_force else 1.0), response.length, millimetres=True)
     unit, ratios = column(value if response.per_force else value * np.nan, response.unit)
-    zeta = np.array([response.number_of("peak_damping", c) for c in cases])
+    zeta = np.array([own.peak_damping for own in response.numbers_of])
     head = [
         f"excitation ({newton})",
         f"peak ({length})",
@@ -235,13 +236,17 @@ def peaks(response: Response) -> Table:
         "linear (s)",
         "rest (s)",
     ]
-    counts = ["points", *(f"points_{k}" for k in ("low", "high", "failed")), "newton_steps", "unknowns_solved"]
-    clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
     dampings, qualities = aligned(100 * zeta, 3), aligned(0.5 / zeta, 3)
     rows = [
-        [case.short, *own, fixed(response.peak_hz(case), 2), damping, quality, response.level(case) or NONE]
-        + [fixed(response.number_of(name, case), 0) for name in counts]
-        + [fixed(response.number_of(name, case), 2) for name in clocks]
+        [
+            case.short,
+            *own,
+            fixed(response.peak_hz(case), 2),
+            damping,
+            quality,
+            response.level(case) or NONE,
+            *_work(response.numbers_of[case.index]),
+        ]
         for case, *own, damping, quality in zip(cases, forces, sizes, ratios, dampings, qualities, strict=True)
     ]
     told = [*_damping_sentence(zeta), *_work_sentence(response)]
@@ -258,13 +263,15 @@ def _damping_sentence(zeta: FloatArray) -> list[str]:
     return [text]
 
 
+def _work(of: CaseNumbers) -> list[str]:
+    counts = (of.points, of.points_low, of.points_high, of.points_failed, of.newton_steps, of.unknowns_solved)
+    seconds = (of.seconds_contact, of.seconds_linear, of.seconds_rest)
+    return [fixed(n, 0) if n >= 0 else NONE for n in counts] + [fixed(s, 2) for s in seconds]
+
+
 def _work_sentence(response: Response) -> list[str]:
-    words = {"contact": "the contact laws", "linear": "linear algebra", "rest": "the rest"}
-    spent = {
-        text: float(np.nansum(response.floats(f"seconds_{name}")))
-        for name, text in words.items()
-        if response.has(f"seconds_{name}")
-    }
+    each = np.array([(n.seconds_contact, n.seconds_linear, n.seconds_rest) for n in response.numbers_of])
+    spent = dict(zip(("the contact laws", "linear algebra", "the rest"), np.nansum(each, axis=0).tolist(), strict=True))
     total = sum(spent.values())
     if total <= 0:
         return []

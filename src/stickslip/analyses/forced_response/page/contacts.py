@@ -51,20 +51,12 @@ def _wrapped(rows: list[list[int]]) -> list[list[int]]:
 
 def states(response: Response, case: ShownCase) -> IntArray:
     """(contact, tangent, sample) states of a case at its peak; 0 stick, 1 slip, 2 open."""
-    return response.of_case("peak_state", case, "contact", "tangent", "sample").astype(np.int64)
+    return response.periods[case.index].peak_state
 
 
-def period(response: Response, case: ShownCase, name: str) -> FloatArray:
-    """(contact, direction, sample) of ``peak_gap`` or ``peak_force`` of a case."""
-    return response.of_case(name, case, "contact", "direction", "sample")
-
-
-def _drawn(response: Response, *names: str) -> tuple[ShownCase, ...]:
-    """Return the cases with a peak whose variables exist and are finite."""
-    if not response.has(*names):
-        return ()
-    first = response.data[names[0]]
-    return tuple(c for c in response.peaked if bool(np.isfinite(first.isel(case=c.index).values).any()))
+def _stated(response: Response) -> tuple[ShownCase, ...]:
+    """Return the cases with a peak whose states are known."""
+    return tuple(c for c in response.peaked if np.any(states(response, c) >= 0))
 
 
 def _state_keys() -> list[go.Scatter]:
@@ -108,7 +100,8 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
 
 def _area(response: Response, case: ShownCase, direction: int) -> FloatArray:
     """Return (contact,) areas of the loops: energy dissipated in a cycle, J; zero for rounding."""
-    gap, force = (period(response, case, name)[:, direction] for name in ("peak_gap", "peak_force"))
+    own = response.periods[case.index]
+    gap, force = own.peak_gap[:, direction], own.peak_force[:, direction]
     work = 0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap)
     area = np.nan_to_num(np.abs(work.sum(axis=-1)))
     return np.where(area > _ROUNDING * np.ptp(gap, axis=-1) * np.ptp(force, axis=-1), area, 0.0)
@@ -119,7 +112,8 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
     if not area.any():
         return "No loop encloses an area: nothing is dissipated in this direction."
     widest = int(np.argmax(area))
-    stroke, span = (float(np.ptp(period(response, case, n)[widest, direction])) for n in ("peak_gap", "peak_force"))
+    own = response.periods[case.index]
+    stroke, span = (float(np.ptp(of[widest, direction])) for of in (own.peak_gap, own.peak_force))
     return (
         f"The widest loop is that of {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke "
         f"of {quantity(stroke, 'm')} and a force range of {quantity(span, 'N')}; "
@@ -130,7 +124,7 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
 
 def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> list[list[int]]:
     """Return the contact points to draw, by row: those with a force; of many those with the largest dissipation in any case."""
-    spans = [np.ptp(period(response, c, "peak_force")[:, direction], axis=-1) for c in cases]
+    spans = [np.ptp(response.periods[c.index].peak_force[:, direction], axis=-1) for c in cases]
     acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
     if len(acting) > _MOST_LOOPS:
         area = np.max([_area(response, c, direction) for c in cases], axis=0)
@@ -144,7 +138,7 @@ def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) ->
 def _hysteresis(response: Response, direction: str) -> Plot | None:
     """Loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
     column = {"t": 0, "w": 1}[direction]
-    cases = _drawn(response, "peak_gap", "peak_force")
+    cases = tuple(c for c in response.peaked if np.isfinite(response.periods[c.index].peak_gap).any())
     names, rows = response.labels("contact"), _panels(response, cases, column) if cases else []
     if not rows:
         return None
@@ -152,16 +146,18 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
     space = {"horizontal_spacing": 0.21 / width, "vertical_spacing": 0.23 / len(rows)}
     figure = make_subplots(len(rows), width, subplot_titles=titles, **space)
-    at = _drawn_samples(len(cases) * sum(map(len, rows)), response.data.sizes["sample"])
+    at = _drawn_samples(len(cases) * sum(map(len, rows)), response.periods[cases[0].index].peak_gap.shape[-1])
+    stated = _stated(response)
     for case in cases:
-        gap, force = (period(response, case, f"peak_{n}")[..., at] for n in ("gap", "force"))
-        state = states(response, case)[..., at] if response.has("peak_state") else None
+        own = response.periods[case.index]
+        gap, force = own.peak_gap[..., at], own.peak_force[..., at]
+        state = own.peak_state[..., at] if case in stated else None
         for i, row in enumerate(rows):
             for j, k in enumerate(row):
                 known = state[k, column] if state is not None else None
                 loop = _loop(gap[k, column] * 1e6, force[k, column], known, names[k])
                 figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
-    for trace in _state_keys() if response.has("peak_state") else []:
+    for trace in _state_keys() if stated else []:
         figure.add_trace(trace, row=1, col=1)
     styled(figure, 130 + 215 * len(rows))
     legend_above(figure)
@@ -213,9 +209,9 @@ def _state_caption(response: Response, case: ShownCase, rows: list[int]) -> str:
 
 def _rubs(response: Response, case: ShownCase, rows: list[int]) -> BoolArray:
     """Return the rows (contact, tangent) with friction. A stop has no tangential force; its state is only closed or open."""
-    if not response.has("peak_force"):
+    force = response.periods[case.index].peak_force[:, : len(response.labels("tangent"))]
+    if not force.size:
         return np.ones(len(rows), dtype=bool)
-    force = period(response, case, "peak_force")[:, : len(response.labels("tangent"))]
     rubs: BoolArray = np.any(force, axis=-1).reshape(-1)[rows]
     return rubs
 
@@ -225,9 +221,9 @@ def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[
     names, tangents = response.labels("contact"), response.labels("tangent")
     n, rows, labels = len(tangents), [], []
     moves = np.ones((len(names), n), dtype=bool)
-    if response.has("peak_gap"):
-        spans = [np.ptp(period(response, c, "peak_gap")[:, :n], axis=-1) for c in cases]
-        moves = np.any(np.nan_to_num(spans) > 0, axis=0)
+    gaps = [response.periods[c.index].peak_gap[:, :n] for c in cases]
+    if np.isfinite(gaps).any():
+        moves = np.any(np.nan_to_num([np.ptp(own, axis=-1) for own in gaps]) > 0, axis=0)
     for k, name in enumerate(names):
         acting = np.flatnonzero(moves[k]) if moves[k].any() else [0]
         rows += [k * n + int(t) for t in acting]
@@ -237,11 +233,11 @@ def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[
 
 def state_map(response: Response) -> Plot | None:
     """Draw stick, slip and open over one period for every contact point."""
-    cases = _drawn(response, "peak_state")
+    cases = _stated(response)
     if not cases:
         return None
     rows, labels = _state_rows(response, cases)
-    at = _drawn_samples(len(cases) * len(rows), response.data.sizes["sample"])
+    at = _drawn_samples(len(cases) * len(rows), states(response, cases[0]).shape[-1])
     figure = go.Figure()
     for case in cases:
         state = states(response, case)[..., at]
@@ -278,8 +274,7 @@ _SLIP_SCALE = [[0.0, STATE_COLOURS[0]], [0.5, "#f4efe6"], [1.0, STATE_COLOURS[1]
 
 def surface_map(response: Response) -> Plot | None:
     """Draw the fraction of the cycle during which each point of a contact surface slips."""
-    needed = ("peak_state", "contact_position", "contact_frame")
-    cases = response.peaked if response.has(*needed) else ()
+    cases = _stated(response)
     surfaces = _surfaces(response) if cases else {}
     if not surfaces:
         return None
@@ -313,8 +308,10 @@ def surface_map(response: Response) -> Plot | None:
 
 def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
     """Return the contacts whose points span a surface: their points, and positions (p, 2) along t and w from the centre, mm."""
-    position, frame = (response.values(f"contact_{name}") for name in ("position", "frame"))
-    found = {}
+    position, frame = response.model.contact_position, response.model.contact_frame
+    found: dict[str, tuple[IntArray, FloatArray]] = {}
+    if not position.size or not frame.size:
+        return found
     for group, members in response.groups.items():
         points = np.array(members, dtype=np.int64)
         if points.size < MIN_MAP_POINTS or not np.isfinite(position[points]).all():
@@ -336,9 +333,7 @@ def _shares(response: Response, case: ShownCase) -> tuple[FloatArray, FloatArray
 
 def _rims(response: Response, points: IntArray) -> dict[int, FloatArray]:
     """Return the corners (k, 2) of a contact's patches in the plane of `_surfaces`, mm; none without areas."""
-    if not response.has("contact_area"):
-        return {}
-    position, frame, area = (response.values(f"contact_{n}") for n in ("position", "frame", "area"))
+    position, frame, area = response.model.contact_position, response.model.contact_frame, response.model.contact_area
     middle, plane = position[points].mean(axis=0), frame[points[0]][:, :2]
     found = patches(position, frame, area, points.tolist())
     return {k: 1e3 * (corners - middle) @ plane for k, corners in found.items()}

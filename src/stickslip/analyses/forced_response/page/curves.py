@@ -42,8 +42,9 @@ def most(response: Response, size: FloatArray) -> list[ShownCase]:
 
 def abscissa(response: Response) -> tuple[FloatArray, str, str]:
     """Return abscissa (point,), its name and its unit: frequency, or speed for a response over speed."""
-    if response.has("speed_rpm"):
-        return response.floats("speed_rpm"), "speed", "rpm"
+    speed = response.of_points.speed_rpm
+    if np.isfinite(speed).any():
+        return speed, "speed", "rpm"
     return response.hz, "frequency", "Hz"
 
 
@@ -52,10 +53,9 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     x, _, unit = abscissa(response)
     high = response.more[at]
     kept = [named(np.flatnonzero(row)) for row in response.kept[at]]
-    first = "predicted_error_percent" if response.is_error else "indicator"
-    own = "own_error_percent" if response.is_error and response.has("own_error_percent") else first
-    error = response.floats(own)[at]
-    said = [response.shown(float(e)) for e in error]
+    judged = response.is_error and response.has("own_error_percent")
+    error = response.of_points.own_error_percent if judged else response.first_error
+    said = [response.shown(float(e)) for e in error[at]]
     reasons = _reasons(response)[at]
     about = "predicted error" if response.is_error else "indicator"
     return go.Scatter(
@@ -109,9 +109,10 @@ def _symbols(response: Response) -> np.ndarray:
 
 def _reasons(response: Response) -> np.ndarray:
     """Return (point,) hover lines with the reason why a point is not trusted."""
-    if not response.has("verdict_reason"):
+    told = response.verdicts.verdict_reason
+    if told is None:
         return np.full(response.hz.size, "", dtype=object)
-    reasons = zip(response.levels, response.labels_of("verdict_reason"), strict=True)
+    reasons = zip(response.levels, map(str, told), strict=True)
     said = [f"<br>{POINT_LEVELS[k]}: {_wrapped(why)}" if why else "" for k, why in reasons]
     return np.array(said, dtype=object)
 
@@ -225,9 +226,9 @@ DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 def of_each_order(response: Response) -> Plot | None:
     """Draw the amplitude of each engine order over frequency or speed."""
     orders = several_orders(response.data)
-    if not orders or not response.has("driven_amplitude"):
+    if not orders or not response.fields.driven_amplitude.size:
         return None
-    size = response.at_outputs(response.values("driven_amplitude", "point", "driven", "output"))
+    size = response.at_outputs(response.fields.driven_amplitude)
     size = np.where(response.converged[:, None], size, np.nan)
     scale = scale_for(size, response.length)
     x, name, unit = abscissa(response)
@@ -279,9 +280,7 @@ def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) ->
 
 def low_order(response: Response) -> Plot | None:
     """Draw low-order against accepted curves for the cases with the largest difference (Gastaldi and Berruti 2017, fig. 4a)."""
-    if not response.has("amplitude_low"):
-        return None
-    low, accepted, scale = response.response("amplitude_low"), response.accepted, response.scale
+    low, accepted, scale = response.response(response.fields.amplitude_low), response.accepted, response.scale
     cases = most(response, np.abs(low / accepted - 1))
     if not cases:
         return None

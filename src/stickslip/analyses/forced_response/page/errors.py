@@ -18,7 +18,7 @@ _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
 
 def _error_traces(figure: go.Figure, response: Response) -> None:
     """Draw predicted errors of all cases (left), and predicted and real errors of some (right; in the same panel for a single case)."""
-    asked, real = response.alert, response.floats("real_error_percent")
+    asked, real = response.alert, response.of_points.real_error_percent
     both = most(response, real) if response.is_error else []
 
     def add(case: ShownCase, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
@@ -33,7 +33,7 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
         x, y = asked.hz[own], asked.error[own]
         if response.auto:
             along = response.points(case)
-            x, y = response.hz[along], response.floats("own_error_percent")[along]
+            x, y = response.hz[along], response.of_points.own_error_percent[along]
         drawn = {"mode": "lines", "name": case.short, "line": {"color": case.colour, "width": 1.6}}
         add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": response.varied})
         if case in both:
@@ -48,7 +48,7 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
 
 def _caption(response: Response) -> str:
     asked, error = response.alert, response.alert.error
-    above, real = error > response.threshold, np.isfinite(response.floats("real_error_percent"))
+    above, real = error > response.threshold, np.isfinite(response.of_points.real_error_percent)
     if response.auto:
         text = (
             f"The error that `{response.selection}` predicts of each accepted solution's own harmonics; the dashed line "
@@ -84,8 +84,8 @@ def _caption(response: Response) -> str:
 
 def _above(response: Response) -> str:
     """State the outcome of the solutions with too large a predicted error; a solution with more harmonics overrules the prediction."""
-    known, audit = (response.floats(f"{name}_error_percent") for name in ("own", "audit"))
-    above = response.converged & (known > response.threshold)
+    audit = response.of_points.audit_error_percent
+    above = response.converged & (response.of_points.own_error_percent > response.threshold)
     if not above.any():
         return "None lies above it. "
     solved, doubtful = above & np.isfinite(audit), above & (response.levels > 0)
@@ -104,13 +104,13 @@ def _floor(response: Response) -> float:
 
 def _all_rounding(response: Response) -> bool:
     """Whether all errors are below the axis, so that nothing would be drawn."""
-    every = np.concatenate([response.alert.error, response.floats("real_error_percent")])
+    every = np.concatenate([response.alert.error, response.of_points.real_error_percent])
     return response.is_error and not np.any(every >= _SMALLEST_ERROR)
 
 
 def errors(response: Response) -> Plot | None:
     """Draw predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
-    error, real = response.alert.error, response.floats("real_error_percent")
+    error, real = response.alert.error, response.of_points.real_error_percent
     if not error.size or not response.decides or _all_rounding(response):
         return None
     two = response.is_error and bool(np.isfinite(real).any())
@@ -159,7 +159,7 @@ def _scatter(response: Response, x: FloatArray, y: FloatArray, known: npt.NDArra
 
 def error_scatter(response: Response) -> Plot | None:
     """Draw real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
-    predicted, real = (response.floats(f"{which}_error_percent") for which in ("predicted", "real"))
+    predicted, real = response.of_points.predicted_error_percent, response.of_points.real_error_percent
     known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
     if not response.is_error or not known.any():
         return None

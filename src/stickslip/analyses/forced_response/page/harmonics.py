@@ -6,9 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.checks import sentences
 from stickslip.analyses.forced_response.page.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.columns import MoreHarmonics, read
 from stickslip.analyses.forced_response.summary import cost_sentence
 from stickslip.arrays import IntArray
 from stickslip.harmonic.harmonic_set import named
@@ -23,6 +23,7 @@ from stickslip.report.quantities import (
     predicted,
     runs,
 )
+from stickslip.solve.status import Status
 
 _SHOWN = 12  # cases that stay legible below one another
 _EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
@@ -120,11 +121,10 @@ def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, flo
 def _harmonic_share(response: Response, case: ShownCase) -> float:
     """Return the largest percentage of the oscillating contact forces in harmonics beyond the first passage."""
     at = np.flatnonzero((response.point_case == case.index) & response.converged & response.more)
-    if not at.size or not response.has("contact_force"):
+    force = response.fields.contact_force
+    if not np.isfinite(force[at]).any():
         return float("nan")
-    force = response.data["contact_force"].isel(point=at)
-    parts = np.asarray(force.transpose("point", "harmonic", "contact", "direction", "part").values)
-    power = np.nansum(np.square(parts, dtype=np.float64), axis=(2, 3, 4))
+    power = np.nansum(np.square(force[at], dtype=np.float64), axis=(2, 3, 4))
     moving = power[:, 1:].sum(axis=1)
     beyond = ~np.isin(np.arange(power.shape[1]), response.low_harmonics)
     share = np.sqrt(power[:, beyond].sum(axis=1) / np.where(moving > 0, moving, 1.0))
@@ -134,8 +134,8 @@ def _harmonic_share(response: Response, case: ShownCase) -> float:
 def _why(response: Response, case: ShownCase) -> str:
     """Describe the contacts at the peak of a case and the part of the higher harmonics."""
     reasons = []
-    if response.has("peak_state") and response.peak(case) >= 0:
-        state = states(response, case)
+    state = states(response, case)
+    if state.size and response.peak(case) >= 0:
         slipping, open_ = (int((state == k).any(axis=(1, 2)).sum()) for k in (1, 2))
         said = f"{slipping} of {len(state)} contacts slip, {open_} lift off"
         still = "all contacts stick: the system is linear"
@@ -164,7 +164,7 @@ def choice(response: Response) -> list[Table | Words]:
         alert, text = _alert_row, _alert_text
     rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
     told = [text(response)]
-    if response.has("unknowns_solved", "retained_displacement"):
+    if response.fields.retained_displacement.size and response.numbers_of[0].unknowns_solved >= 0:
         told.append(cost_sentence(response.data))
     found = response.table("", told, [*middle, "why"], rows, numeric=False)
     said = response.text("alert_explanation")
@@ -200,7 +200,7 @@ def _auto_text(response: Response) -> str:
 
 def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
     mine = response.converged & (response.point_case == case.index)
-    each = [response.floats(f"{name}_error_percent")[mine] for name in ("own", "audit")]
+    each = [own[mine] for own in (response.of_points.own_error_percent, response.of_points.audit_error_percent)]
     told = [predicted(float(np.nanmax(e))) if np.isfinite(e).any() else NONE for e in each]
     return _kept_where(response, case), "; ".join(told)
 
@@ -247,16 +247,14 @@ def _kept_where(response: Response, case: ShownCase | None = None) -> str:
 
 def attempts(response: Response) -> Table | None:
     """Return a table with one row a case and set of harmonics: the work, including discarded solutions."""
-    if not response.has("attempt_case", "attempt_kept"):
+    made = response.attempts
+    if made.attempt_case is None or not made.attempt_kept.size:
         return None
-    case = response.integers("attempt_case")
-    kept = response.values("attempt_kept", "attempt", "harmonic")
-    sets = np.array([named(np.flatnonzero(row)) for row in kept])
-    numbers = ("attempt_newton_iterations", "attempt_unknowns", "attempt_seconds")
-    columns = [response.floats(name) for name in numbers]
-    good, rows = response.floats("attempt_status") == 0, []
+    sets = np.array([named(np.flatnonzero(row)) for row in made.attempt_kept])
+    columns = (made.attempt_newton_iterations, made.attempt_unknowns, made.attempt_seconds)
+    good, rows = made.attempt_status == Status.CONVERGED, []
     for one in response.cases:
-        mine = case == one.index
+        mine = made.attempt_case == one.index
         for own in sorted(set(sets[mine]), key=lambda s: (int(s.rsplit(", ", maxsplit=1)[-1]), s)):
             at = mine & (sets == own)
             sums = [float(column[at].sum()) for column in columns]
@@ -274,17 +272,22 @@ def attempts(response: Response) -> Table | None:
 
 def more_harmonics(response: Response) -> Table | None:
     """Report the predicted change by twice as many harmonics."""
-    names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
-    if not response.has(*names):
+    found = [read(MoreHarmonics, response.data, c.index) for c in response.cases]
+    if all(own.reference_above < 0 for own in found):
         return None
-    rows = []
-    for case in response.cases:
-        worst, hz, above = (response.number_of(name, case) for name in names)
-        rows.append([case.short, predicted(worst), fixed(hz, 2), fixed(above, 0)])
+    rows = [
+        [
+            c.short,
+            predicted(own.reference_worst_percent),
+            fixed(own.reference_worst_hz, 2),
+            fixed(own.reference_above, 0),
+        ]
+        for c, own in zip(response.cases, found, strict=True)
+    ]
     head = ["largest predicted change", "at (Hz)", "points above the threshold"]
     text = (
         f"What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
         "points: the change of the complex amplitude, phase included, over its size."
     )
-    items = sentences(response, "reference_sentence")
+    items = response.sentences(range(len(found)), [own.reference_sentence for own in found])
     return response.table("More harmonics", (text,), head, rows, items=items)

@@ -1,14 +1,26 @@
 """The dataset of a forced response with the accesses that figures and tables need."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from stickslip.analyses.forced_response.records.columns import MOTION
+from stickslip.analyses.forced_response.records.columns import (
+    MOTION,
+    Attempts,
+    Blades,
+    CaseNumbers,
+    ModelFacts,
+    PeakPeriod,
+    PointFields,
+    Points,
+    PointStability,
+    Verdicts,
+    read,
+)
 from stickslip.analyses.forced_response.stability.stable_words import said_of
 from stickslip.analyses.forced_response.summary import MEASURED
 from stickslip.analyses.forced_response.verdicts.curve import Curve, branch_length, of_largest_blade, peak_output
@@ -21,7 +33,8 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.result import Node
-from stickslip.study.verdict import LEVELS
+from stickslip.solve.status import Status
+from stickslip.study.verdict import LEVELS, said
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
 _TURNS = (".rx", ".ry", ".rz")
@@ -51,30 +64,56 @@ class Response(Node):
         """The varied keys: heading of legends and columns."""
         return varied(self.data)
 
-    def floats(self, name: str) -> FloatArray:
-        """Return the values of a variable as floats; NaN in the shape of ``point`` if it is missing."""
-        if name not in self.data:
-            return np.full(self.data.sizes["point"], np.nan)
-        return self.values(name)
-
-    def of_case(self, name: str, case: ShownCase, *dimensions: str) -> FloatArray:
-        """Return the values of a variable for one case, with the remaining dimensions in the order named."""
-        found = self.data[name].isel(case=case.index)
-        return np.asarray(found.transpose(*dimensions).values, dtype=np.float64)
-
-    def number_of(self, name: str, case: ShownCase) -> float:
-        """Return the value of a variable along ``case`` for one case; NaN if it is missing."""
-        return float(self.values(name)[case.index]) if name in self.data else float("nan")
+    @cached_property
+    def of_points(self) -> Points:
+        """Accepted points of all cases."""
+        return read(Points, self.data)
 
     @cached_property
+    def fields(self) -> PointFields:
+        """Harmonics, amplitudes and forces of these points."""
+        return read(PointFields, self.data)
+
+    @cached_property
+    def numbers_of(self) -> tuple[CaseNumbers, ...]:
+        """Peak and work of each case."""
+        return tuple(read(CaseNumbers, self.data, c.index) for c in self.cases)
+
+    @cached_property
+    def periods(self) -> tuple[PeakPeriod, ...]:
+        """Contacts of each case over a period at its peak."""
+        return tuple(read(PeakPeriod, self.data, c.index) for c in self.cases)
+
+    @cached_property
+    def blades(self) -> tuple[Blades, ...]:
+        """The wheel of each case; NaN and empty where it is not mistuned."""
+        return tuple(read(Blades, self.data, c.index) for c in self.cases)
+
+    @cached_property
+    def model(self) -> ModelFacts:
+        """The contacts of the model."""
+        return read(ModelFacts, self.data)
+
+    @cached_property
+    def verdicts(self) -> Verdicts:
+        """Verdicts on cases and points; empty and None for results without."""
+        return read(Verdicts, self.data)
+
+    @cached_property
+    def attempts(self) -> Attempts:
+        """All solutions, and the first solutions judged by an alert."""
+        return read(Attempts, self.data)
+
+    @property
     def point_case(self) -> IntArray:
         """(point,) the case of each point."""
-        return self.integers("point_case")
+        found = self.of_points.point_case
+        return np.zeros(0, dtype=np.int64) if found is None else found
 
-    @cached_property
+    @property
     def hz(self) -> FloatArray:
         """(point,) frequency of each point."""
-        return self.floats("frequency_hz")
+        return self.of_points.frequency_hz
 
     @cached_property
     def outputs(self) -> IntArray:
@@ -128,32 +167,26 @@ class Response(Node):
 
     @cached_property
     def converged(self) -> npt.NDArray[np.bool_]:
-        """(point,) True for accepted points, whose status is ``converged``."""
-        attributes = self.data["status"].attrs
-        meanings = str(attributes.get("flag_meanings", "")).split()
-        values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
-        good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
-        return np.isin(self.integers("status"), good or [0])
+        """(point,) True for accepted points."""
+        return np.asarray(self.of_points.status == Status.CONVERGED)
 
     @property
     def of_sector(self) -> str:
         """`` of one sector`` for a tuned wheel solved by one sector; else empty."""
-        tuned = int(self.data.attrs.get("sectors", 1)) > 1 and not self.has("amplification")
+        tuned = int(self.data.attrs.get("sectors", 1)) > 1 and not self.blades[0].blade_peak_amplitude.size
         return " of one sector" if tuned else ""
 
     @cached_property
     def levels(self) -> IntArray:
         """(point,) level of the verdict on each point; results without verdicts trust converged points."""
-        if self.has("verdict"):
-            return self.integers("verdict")
-        return np.where(self.converged, 0, 2)
+        found = self.verdicts.verdict
+        return np.where(self.converged, 0, 2) if found is None else found
 
     @cached_property
     def unstable(self) -> npt.NDArray[np.bool_]:
         """(point,) True for motions known to be unstable."""
-        if not self.has("motion_stability"):
-            return np.zeros(self.hz.size, dtype=bool)
-        return np.asarray(self.integers("motion_stability") == MOTION["unstable"])
+        found = read(PointStability, self.data).motion_stability
+        return np.asarray(found == MOTION["unstable"]) if found.size else np.zeros(self.hz.size, dtype=bool)
 
     def peak_is(self, case: ShownCase) -> str:
         """Return the stability of a case's peak in a word or two."""
@@ -161,7 +194,8 @@ class Response(Node):
 
     def level(self, case: ShownCase) -> str:
         """Return the level of the verdict on a case; empty for results without verdicts."""
-        return LEVELS[int(self.number_of("case_verdict", case))] if self.has("case_verdict") else ""
+        found = np.atleast_1d(self.verdicts.case_verdict)  # of results without verdicts one missing number
+        return LEVELS[int(found[case.index])] if found[0] >= 0 else ""
 
     def trust(self, case: ShownCase) -> int:
         """Return the index of a case's verdict in `LEVELS`: 0 if it is trusted or the result has no verdicts."""
@@ -170,13 +204,18 @@ class Response(Node):
     @cached_property
     def alert(self) -> Alert:
         """Solutions judged by the strategy; with raised harmonics, or if the file does not say, the accepted points that have an indicator."""
-        if "alert_error_percent" in self.data and not self.auto:
-            found = (self.values(f"alert_{name}") for name in ("frequency_hz", "error_percent"))
-            return Alert(self.integers("alert_case"), *found)
-        first = "predicted_error_percent" if self.is_error else "indicator"
-        error = self.floats("own_error_percent" if self.auto else first)
+        asked, own = self.attempts, self.of_points
+        if asked.alert_case is not None and not self.auto:
+            return Alert(asked.alert_case, asked.alert_frequency_hz, asked.alert_error_percent)
+        error = own.own_error_percent if self.auto else self.first_error
         at = np.flatnonzero(~np.isnan(error))
         return Alert(self.point_case[at], self.hz[at], error[at])
+
+    @property
+    def first_error(self) -> FloatArray:
+        """(point,) what the strategy compared with its threshold: predicted errors of first solutions in percent, or an indicator of its own."""
+        own = self.of_points
+        return own.predicted_error_percent if self.is_error else own.indicator
 
     @property
     def selection(self) -> str:
@@ -245,7 +284,7 @@ class Response(Node):
     @cached_property
     def kept(self) -> IntArray:
         """(point, harmonic) 1 where the solution keeps the harmonic."""
-        return self.values("harmonic_kept", "point", "harmonic").astype(np.int64)
+        return self.fields.harmonic_kept.astype(np.int64)
 
     @cached_property
     def more(self) -> npt.NDArray[np.bool_]:
@@ -260,9 +299,9 @@ class Response(Node):
         own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
         return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"
 
-    def response(self, name: str = "amplitude") -> FloatArray:
-        """Return (point,) amplitude of the report output, divided by the excitation if every case has one."""
-        values = self.at_outputs(self.values(name, "point", "output"))
+    def response(self, of: FloatArray | None = None) -> FloatArray:
+        """Return (point,) amplitude of the report output, divided by the excitation if every case has one; `of` amplitudes (point, output)."""
+        values = self.at_outputs(self.fields.amplitude if of is None else of)
         force = np.array([c.excitation for c in self.cases])[self.point_case]
         return np.asarray(values / force) if self.per_force else values
 
@@ -292,6 +331,11 @@ class Response(Node):
         cells = [list(row)[first:] for row in rows]
         return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
 
+    def sentences(self, cases: Iterable[int], told: Iterable[str]) -> list[str]:
+        """Return sentences with the labels of their cases; none where nothing is told."""
+        every = [str(text) for text in told]
+        return [said(self.cases[k].label, text) for k, text in zip(cases, every, strict=True)] if any(every) else []
+
     def points(self, case: ShownCase) -> IntArray:
         """Return the points of a case in the order of the curve, unconverged ones included.
 
@@ -299,7 +343,7 @@ class Response(Node):
         unknown. Other branches are sorted by frequency.
         """
         index = np.flatnonzero(self.point_case == case.index)
-        branch = index[: branch_length(self.floats("refinement")[index])]
+        branch = index[: branch_length(self.of_points.refinement[index])]
         along = np.diff(self.hz[branch])
         if np.any(along > 0) and np.any(along < 0):
             return branch
@@ -307,9 +351,8 @@ class Response(Node):
 
     def peak(self, case: ShownCase) -> int:
         """Position of the peak along ``point``; -1 if there is none."""
-        value = self.number_of("peak_point", case)
-        inside = np.isfinite(value) and 0 <= value < self.data.sizes["point"]
-        return int(value) if inside else -1
+        value = self.numbers_of[case.index].peak_point
+        return value if value < self.hz.size else -1
 
     def peak_response(self, case: ShownCase) -> float:
         """Response at the peak; NaN without a peak."""
@@ -344,9 +387,7 @@ class Response(Node):
     @cached_property
     def groups(self) -> dict[str, list[int]]:
         """Contact points by contact of the model; by contact line in older files."""
-        names = self.labels("contact")
-        if self.has("contact_group"):
-            names = tuple(f"{v}." for v in self.data["contact_group"].values)
+        names = [f"{group}." for group in self.model.contact_group if group] or self.labels("contact")
         found: dict[str, list[int]] = {}
         for index, name in enumerate(names):
             found.setdefault(name.partition(".")[0], []).append(index)

@@ -19,16 +19,16 @@ BLADE = "rgba(0, 114, 178, 0.25)"
 
 def mistuned(response: Response) -> bool:
     """Return whether the wheel is mistuned."""
-    return response.has("blade_peak_amplitude") and bool(response.peaked)
+    return response.blades[0].blade_peak_amplitude.size > 0 and bool(response.peaked)
 
 
 def blades(response: Response) -> Plot | None:
     """Draw the amplitude of every blade over frequency, the largest amplitude, and the tuned wheel."""
     if not mistuned(response):
         return None
-    count = response.data.sizes["blade"]
-    own = response.data.sizes["output"] // count
-    size = response.values("amplitude", "point", "output")[:, response.outputs[0] % own :: own]
+    size, count = response.fields.amplitude, response.blades[0].blade_peak_amplitude.size
+    own = size.shape[1] // count
+    size = size[:, response.outputs[0] % own :: own]
     size = np.where(response.converged[:, None], size, np.nan)
     scale = scale_for(size, response.length)
     x, name, unit = abscissa(response)
@@ -57,12 +57,11 @@ def blades(response: Response) -> Plot | None:
             customdata=np.nanargmax(np.nan_to_num(size[at], nan=-1.0), axis=1),
             hovertemplate=f"%{{x:.2f}} {unit}: blade %{{customdata}}, %{{y:.4g}} {scale.unit}<extra></extra>",
         )
-        tuned = np.flatnonzero(response.integers("tuned_case") == case.index)
-        hertz, flat = (response.floats(f"tuned_{n}")[tuned] for n in ("frequency_hz", "amplitude"))
-        order = np.argsort(hertz, kind="stable")
+        tuned = response.blades[case.index]
+        order = np.argsort(tuned.tuned_frequency_hz, kind="stable")
         figure.add_scatter(
-            x=hertz[order] * _per_hz(response, x),
-            y=flat[order] * scale.factor,
+            x=tuned.tuned_frequency_hz[order] * _per_hz(response, x),
+            y=tuned.tuned_amplitude[order] * scale.factor,
             mode="lines",
             name="all sectors alike",
             line={"color": colour(1), "width": 2, "dash": "dash"},
@@ -83,12 +82,17 @@ def _per_hz(response: Response, x: FloatArray) -> float:
     return float(x[known][0] / response.hz[known][0]) if known.any() else 1.0
 
 
+def _motion(response: Response) -> ComplexArray:
+    """Return (case, blade) motion of the blades at the peak."""
+    parts = np.array([own.blade_motion for own in response.blades])
+    return np.asarray(parts[..., 0] + 1j * parts[..., 1])
+
+
 def _amplified(response: Response, case: ShownCase) -> str:
-    factor, bound = (response.number_of(n, case) for n in ("amplification", "whitehead"))
-    blade = int(response.number_of("largest_blade", case))
+    own = response.blades[case.index]
     return (
-        f"Largest: blade {blade}. Amplification {number(factor, 4)} over the wheel with all sectors alike. {BOUND} "
-        f"is {number(bound, 3)}."
+        f"Largest: blade {own.largest_blade}. Amplification {number(own.amplification, 4)} over the wheel with all sectors alike. "
+        f"{BOUND} is {number(own.whitehead, 3)}."
     )
 
 
@@ -96,23 +100,21 @@ def peaks_of_blades(response: Response) -> Plot | None:
     """Draw the peak of each blade, and its deviation."""
     if not mistuned(response):
         return None
-    size = response.values("blade_peak_amplitude", "case", "blade")
-    scale = scale_for(size, response.length)
-    names = response.labels("mistuned") if response.has("deviation") else []
+    scale = scale_for(np.array([own.blade_peak_amplitude for own in response.blades]), response.length)
+    names = response.labels("mistuned") if response.blades[0].deviation.size else ()
     rows = 1 + len(names)
     figure = make_subplots(rows, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[2.0, *[1.0] * len(names)])
-    numbers = np.arange(size.shape[1])
+    numbers = np.arange(response.blades[0].blade_peak_amplitude.size)
     for case in response.peaked:
-        own = size[case.index] * scale.factor
-        flat = response.number_of("tuned_peak_amplitude", case) * scale.factor
-        hertz = response.values("blade_peak_hz", "case", "blade")[case.index]
+        own = response.blades[case.index]
+        flat = own.tuned_peak_amplitude * scale.factor
         figure.add_bar(
             x=numbers,
-            y=own,
+            y=own.blade_peak_amplitude * scale.factor,
             name="peak of each blade",
             marker_color=colour(0),
             meta=case.index,
-            customdata=hertz,
+            customdata=own.blade_peak_hz,
             hovertemplate=f"blade %{{x}}: %{{y:.4g}} {scale.unit} at %{{customdata:.2f}} Hz<extra></extra>",
             row=1,
             col=1,
@@ -128,11 +130,10 @@ def peaks_of_blades(response: Response) -> Plot | None:
             col=1,
         )
         for k, name in enumerate(names):
-            values = response.values("deviation", "case", "blade", "mistuned")[case.index, :, k]
             factor = 1e6 if name.endswith(GAP) else 100
             figure.add_bar(
                 x=numbers,
-                y=factor * values,
+                y=factor * own.deviation[:, k],
                 name=name,
                 marker_color=colour(2 + k),
                 meta=case.index,
@@ -156,9 +157,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
     """Draw all blades at the peak as a polar plot at two instants, with the amplitudes of the travelling waves."""
     if not mistuned(response):
         return None
-    parts = response.values("blade_motion", "case", "blade", "part")
-    motion = parts[..., 0] + 1j * parts[..., 1]
-    waves = response.values("wave_amplitude", "case", "wave")
+    motion, waves = _motion(response), np.array([own.wave_amplitude for own in response.blades])
     scale = scale_for(np.abs(motion), response.length)
     figure = make_subplots(
         1, 2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.5, 0.5], horizontal_spacing=0.14
@@ -208,7 +207,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
         main = int(np.argmax(share))
         said[case.index] = (
             f"Wave {main} ({min(main, count - main)} nodal diameters) carries {percent(100 * float(share[main] / share.sum()))} of the sum of "
-            f"squares; localisation factor {number(response.number_of('localisation', case), 3)} (0: all alike, 1: one blade alone)."
+            f"squares; localisation factor {number(response.blades[case.index].localisation, 3)} (0: all alike, 1: one blade alone)."
         )
     styled(figure, 460)
     legend_above(figure)
@@ -226,8 +225,8 @@ def statistics(response: Response) -> Plot | None:
     """Draw the distribution of the amplification, if there are enough cases, such as several seeds."""
     if not mistuned(response) or len(response.peaked) < MIN_HISTOGRAM_CASES:
         return None
-    factors = np.array([response.number_of("amplification", case) for case in response.peaked])
-    bound = response.number_of("whitehead", response.peaked[0])
+    of_peaked = [response.blades[case.index] for case in response.peaked]
+    factors, bound = np.array([own.amplification for own in of_peaked]), of_peaked[0].whitehead
     figure = go.Figure()
     figure.add_histogram(x=factors, marker_color=colour(0), name="cases")
     styled(figure, 380)
@@ -262,8 +261,7 @@ def wheel_in_motion(response: Response) -> Plot | None:
     """Draw all blades at the peak over a period, inclined by their motion."""
     if not mistuned(response):
         return None
-    parts = response.values("blade_motion", "case", "blade", "part")
-    motion = parts[..., 0] + 1j * parts[..., 1]
+    motion = _motion(response)
     cases = [c for c in response.peaked if np.abs(motion[c.index]).max() > 0]
     if not cases:
         return None
