@@ -19,7 +19,7 @@ from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_points, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.physics.contact_model import stiffer, stiffness_slope
+from stickslip.response.peak_sensitivity import stiffer, stiffness_slope
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 from tests.newton_bounds import FINE, unknowns_bound

@@ -20,7 +20,7 @@ from stickslip.response.forced import other_motions
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_points, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.physics.contact_model import halved
+from stickslip.response.peak_sensitivity import halved
 from stickslip.response.system import System
 from stickslip.response.time.stepping.marcher import step_work
 from tests.solid_models import box

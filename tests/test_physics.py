@@ -15,7 +15,7 @@ from stickslip.contact.laws.dahl import Dahl
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import Iwan
 from stickslip.model.damping import Damping
-from stickslip.response.physics.damping_of_modes import (
+from stickslip.response.damping_of_modes import (
     Range,
     RangeMode,
     complex_stiffness,

@@ -12,11 +12,11 @@ from newton_bounds import unknowns_bound
 from stickslip.errors import InputError
 from stickslip.operators import Bordered, array_of, times, transpose_of, transposed_times
 from stickslip.solve.fallbacks import ByDifference, Homotopy, solve_robustly
-from stickslip.solve.levenberg_marquardt import damped_step
 from stickslip.solve.line_search import Kinks
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.status import Rung, Status
+from stickslip.solve.trust_region import damped_step
 
 CORRECTORS = sorted(GLOBALISATIONS)
 

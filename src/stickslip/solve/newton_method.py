@@ -9,13 +9,12 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
-from stickslip.solve.dogleg import Dogleg
 from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
 from stickslip.solve.krylov import Automatic
-from stickslip.solve.levenberg_marquardt import LevenbergMarquardt
 from stickslip.solve.line_search import LineSearch
 from stickslip.solve.linear import LinearSolver
 from stickslip.solve.status import Rung, Status
+from stickslip.solve.trust_region import Dogleg, LevenbergMarquardt
 
 GlobalisationName = Literal["line_search", "dogleg", "levenberg_marquardt"]
 GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {

@@ -10,9 +10,7 @@ from stickslip.analyses.forced_response.records.columns import MotionAtPeak, Phy
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.errors import InputError
-from stickslip.response.equilibrium import pressed_by
-from stickslip.response.forced.response import ForcedPoint
-from stickslip.response.physics.damping_of_modes import (
+from stickslip.response.damping_of_modes import (
     UNDAMPED_RATIO,
     DampedMode,
     Friction,
@@ -23,6 +21,8 @@ from stickslip.response.physics.damping_of_modes import (
     range_modes,
     springs_of,
 )
+from stickslip.response.equilibrium import pressed_by
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import damped_share, equivalent_damping, signals
 from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ

@@ -18,7 +18,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.response.physics.contact_model import halved, stiffness_slope
+from stickslip.response.peak_sensitivity import halved, stiffness_slope
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 from stickslip.units import HZ
