@@ -30,17 +30,18 @@ def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str
     over
         Abscissa of a frequency of 1 Hz.
     """
-    found = read(BifurcationRows, response.data)
-    if found.bifurcation_case is None:
+    found = response.rows(BifurcationRows)
+    if not found:
         return ""
     branches = sum(_branches(figure, response, case, over) for case in response.cases)
     if branches:
         figure.add_trace(key_marker("branch that leaves (dotted)", "line-ew", "bifurcations"))
-    kinds = [str(kind) for kind in found.bifurcation_kind]
-    for kind, symbol in SYMBOLS.items():
-        own = [i for i, k in enumerate(kinds) if k == kind]
-        if own:
-            figure.add_trace(_marks(response, found, own, symbol, over))
+    kinds = [str(own.bifurcation_kind) for _, own in found]
+    for kind in SYMBOLS:
+        if kind in kinds:
+            figure.add_trace(
+                _marks(response, kind, [own for own, k in zip(found, kinds, strict=True) if k == kind], over)
+            )
     counts = [counted(kinds.count(kind), kind) for kind in SYMBOLS if kind in kinds]
     told = f" Located on the branch: {', '.join(counts)}." if counts else ""
     if branches:
@@ -48,17 +49,16 @@ def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str
     return told
 
 
-def _marks(response: Response, found: BifurcationRows, own: list[int], symbol: str, over: float) -> go.Scatter:
-    assert found.bifurcation_case is not None
-    by = [_divisor(response, case) for case in found.bifurcation_case[own]]
+def _marks(response: Response, kind: str, found: list[tuple[ShownCase, BifurcationRows]], over: float) -> go.Scatter:
+    factor = response.scale.factor
     return go.Scatter(
-        x=found.bifurcation_frequency_hz[own] * over,
-        y=found.bifurcation_amplitude[own] / by * response.scale.factor,
+        x=np.array([float(own.bifurcation_frequency_hz) * over for _, own in found]),
+        y=np.array([float(own.bifurcation_amplitude) / _divisor(response, c) * factor for c, own in found]),
         mode="markers",
-        name=str(found.bifurcation_kind[own[0]]),
+        name=kind,
         legendgroup="bifurcations",
-        marker={"symbol": symbol, "size": 10, "color": "white", "line": {"width": 1.8, "color": MUTED}},
-        customdata=[[str(text)] for text in found.bifurcation_sentence[own]],
+        marker={"symbol": SYMBOLS[kind], "size": 10, "color": "white", "line": {"width": 1.8, "color": MUTED}},
+        customdata=[[str(own.bifurcation_sentence)] for _, own in found],
         hovertemplate="%{customdata[0]}<extra></extra>",
     )
 
@@ -72,7 +72,7 @@ def _branches(figure: go.Figure, response: Response, case: ShownCase, over: floa
         figure.add_trace(
             go.Scatter(
                 x=found.side_point_frequency_hz[own] * over,
-                y=found.side_point_amplitude[own] / _divisor(response, case.index) * response.scale.factor,
+                y=found.side_point_amplitude[own] / _divisor(response, case) * response.scale.factor,
                 mode="lines",
                 name="leaves the response",
                 legendgroup="bifurcations",
@@ -84,8 +84,8 @@ def _branches(figure: go.Figure, response: Response, case: ShownCase, over: floa
     return int(every.size)
 
 
-def _divisor(response: Response, case: int) -> float:
-    return response.cases[case].excitation if response.per_force else 1.0
+def _divisor(response: Response, case: ShownCase) -> float:
+    return case.excitation if response.per_force else 1.0
 
 
 def bifurcations(response: Response) -> Table | Words | None:
@@ -95,20 +95,20 @@ def bifurcations(response: Response) -> Table | Words | None:
     labels = [c.label for c in response.cases]
     title, lines = "Bifurcations", list(beside_bifurcations(response.data, labels))
     text = "Where multipliers of the motion cross the unit circle along the branch, or it turns back."
-    found = read(BifurcationRows, response.data)
-    if found.bifurcation_case is None:
+    found = response.rows(BifurcationRows)
+    if not found:
         return Words((text,), title, lines)
     rows = [
         [
-            response.cases[case].short,
-            str(found.bifurcation_kind[i]),
-            fixed(float(found.bifurcation_frequency_hz[i]), 4),
-            _known(float(found.bifurcation_frequency_error_hz[i])),
-            quantity(float(found.bifurcation_amplitude[i]), response.length),
-            _complex(*found.bifurcation_multiplier[i]),
-            _known(float(found.bifurcation_multiplier_error[i])),
+            case.short,
+            str(own.bifurcation_kind),
+            fixed(float(own.bifurcation_frequency_hz), 4),
+            _known(float(own.bifurcation_frequency_error_hz)),
+            quantity(float(own.bifurcation_amplitude), response.length),
+            _complex(*own.bifurcation_multiplier),
+            _known(float(own.bifurcation_multiplier_error)),
         ]
-        for i, case in enumerate(found.bifurcation_case)
+        for case, own in found
     ]
     head = ["kind", "frequency (Hz)", "± (Hz)", "amplitude", "multiplier", "±"]
     return response.table(title, (text,), head, rows, items=lines)

@@ -25,32 +25,37 @@ BY_MOTION = ", the motion in time being "  # in the sentence of a point whose mu
 
 def stability(response: Response) -> list[Table | Words]:
     """Return a table with one row an examined point: verdict and multiplier."""
-    found = read(ExaminedRows, response.data)
-    if found.stability_case is None:
+    found = response.rows(ExaminedRows)
+    if not found:
         return []
-    told, size = [str(text) for text in found.stability_sentence], found.stability_multiplier
-    by = ["motion in time" if BY_MOTION in text else "multiplier" for text in told]
     rows = [
         [
-            response.cases[case].short,
-            fixed(float(found.stability_frequency_hz[i]), 3),
-            verdict,
-            by[i] if verdict in ("stable", "unstable") else NONE,
-            modulus_text(float(size[i])) if np.isfinite(size[i]) else NONE,
-            _error(float(found.stability_multiplier_error[i])),
+            case.short,
+            fixed(float(own.stability_frequency_hz), 3),
+            str(own.stability_verdict),
+            _decided(own),
+            modulus_text(float(own.stability_multiplier)) if np.isfinite(own.stability_multiplier) else NONE,
+            _error(float(own.stability_multiplier_error)),
         ]
-        for i, (case, verdict) in enumerate(zip(found.stability_case, map(str, found.stability_verdict), strict=True))
+        for case, own in found
     ]
     text = (
         "Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
         "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does."
     )
     head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
-    lines = all_lines(response.data, [c.label for c in response.cases]) if any(told) else ()
+    told = any(str(own.stability_sentence) for _, own in found)
+    lines = all_lines(response.data, [c.label for c in response.cases]) if told else ()
     if len(rows) > FEW:
         every = response.table("", (), head, rows, folded=f"All {len(rows)} points")
         return [Words((text,), "Stability", lines), every]
     return [response.table("Stability", (text,), head, rows, items=lines)]
+
+
+def _decided(own: ExaminedRows) -> str:
+    if str(own.stability_verdict) not in ("stable", "unstable"):
+        return NONE
+    return "motion in time" if BY_MOTION in str(own.stability_sentence) else "multiplier"
 
 
 def _error(error: float) -> str:
@@ -62,17 +67,14 @@ def _error(error: float) -> str:
 
 def amplitudes_in_time(response: Response) -> Plot | None:
     """Draw the amplitude in each of the last periods."""
-    found = read(MotionsInTime, response.data)
-    amplitudes = found.not_periodic_amplitudes
-    if found.not_periodic_case is None or not np.any(np.isfinite(amplitudes)):
+    amplitudes = read(MotionsInTime, response.data).not_periodic_amplitudes
+    if not np.any(np.isfinite(amplitudes)):
         return None
-    scale = scale_for(amplitudes[np.isfinite(amplitudes)], "m")
+    scale = scale_for(amplitudes, "m")
     figure = go.Figure()
-    for i, (case, hz, own) in enumerate(
-        zip(found.not_periodic_case, found.not_periodic_frequency_hz, amplitudes, strict=True)
-    ):
-        label = response.cases[case].short
-        name = f"{label}, {hz:.2f} Hz" if label else f"{hz:.2f} Hz"
+    for i, (case, march) in enumerate(response.rows(MotionsInTime)):
+        own, told = march.not_periodic_amplitudes, f"{march.not_periodic_frequency_hz:.2f} Hz"
+        name = f"{case.short}, {told}" if case.short else told
         figure.add_trace(
             go.Scatter(
                 x=np.arange(own.size),
@@ -96,32 +98,25 @@ def amplitudes_in_time(response: Response) -> Plot | None:
 
 def statistics_in_time(response: Response) -> Table | None:
     """Return a table with one row a motion: envelope, root mean square, spectrum, and whether it has settled."""
-    found = read(MotionsInTime, response.data)
-    if found.not_periodic_case is None:
+    found = response.rows(MotionsInTime)
+    if not found:
         return None
     report = response.labels("output").index(response.data.attrs["report_output"])
-    sizes = [
-        own[:, report]
-        for own in (
-            found.not_periodic_largest,
-            found.not_periodic_least,
-            found.not_periodic_rms,
-            found.not_periodic_mean,
-        )
-    ]
-    spread = found.not_periodic_spread
     rows = [
         [
-            response.cases[case].short,
-            fixed(float(found.not_periodic_frequency_hz[i]), 3),
-            *(quantity(float(own[i]), "m", 4) if np.isfinite(own[i]) else NONE for own in sizes),
-            _lines(found.not_periodic_line_hz[i], found.not_periodic_line_amplitude[i]),
-            f"{found.not_periodic_periods[i]}",
-            f"{'yes' if found.not_periodic_settled[i] else 'no'}, {number(100 * float(spread[i]), 2)} %"
-            if np.isfinite(spread[i])
+            case.short,
+            fixed(float(own.not_periodic_frequency_hz), 3),
+            _size(own.not_periodic_largest[report]),
+            _size(own.not_periodic_least[report]),
+            _size(own.not_periodic_rms[report]),
+            _size(own.not_periodic_mean[report]),
+            _lines(own.not_periodic_line_hz, own.not_periodic_line_amplitude),
+            f"{own.not_periodic_periods}",
+            f"{'yes' if own.not_periodic_settled else 'no'}, {number(100 * float(own.not_periodic_spread), 2)} %"
+            if np.isfinite(own.not_periodic_spread)
             else NONE,
         ]
-        for i, case in enumerate(found.not_periodic_case)
+        for case, own in found
     ]
     head = [
         "frequency (Hz)",
@@ -137,8 +132,12 @@ def statistics_in_time(response: Response) -> Table | None:
         "Amplitudes are half of peak to peak in a period, over the later half of the march. It has settled "
         "where the largest amplitudes and root mean squares of four windows of that half are alike."
     )
-    items = response.sentences(found.not_periodic_case, found.not_periodic_sentence)
+    items = response.sentences((case, own.not_periodic_sentence) for case, own in found)
     return response.table("What is not periodic", (text,), head, rows, items=items)
+
+
+def _size(metres: float) -> str:
+    return quantity(float(metres), "m", 4) if np.isfinite(metres) else NONE
 
 
 def _lines(hz: FloatArray, heights: FloatArray) -> str:
@@ -155,28 +154,28 @@ _SETTLED = {0: "not settled", 1: "settled", -1: NONE}  # where older results do 
 
 def time_integration(response: Response) -> Table | None:
     """Compare time integration with harmonic balance."""
-    found = read(TimeChecks, response.data)
-    if found.verify_case is None:
+    found = response.rows(TimeChecks)
+    if not found:
         return None
-    off, periods = found.verify_difference_percent, found.verify_periods
     rows = [
         [
-            response.cases[case].short,
-            fixed(float(found.verify_frequency_hz[i]), 3),
-            amplitude(float(found.verify_transient[i]), response.length, 5),
-            amplitude(float(found.verify_balance[i]), response.length, 5),
-            percent(float(off[i])),
-            str(found.verify_motion[i]) or _SETTLED[int(found.verify_settled[i])],
-            fixed(float(periods[i]), 0) if periods[i] >= 0 else NONE,
+            case.short,
+            fixed(float(own.verify_frequency_hz), 3),
+            amplitude(float(own.verify_transient), response.length, 5),
+            amplitude(float(own.verify_balance), response.length, 5),
+            percent(float(own.verify_difference_percent)),
+            str(own.verify_motion) or _SETTLED[int(own.verify_settled)],
+            fixed(float(own.verify_periods), 0) if own.verify_periods >= 0 else NONE,
         ]
-        for i, case in enumerate(found.verify_case)
+        for case, own in found
     ]
-    finite = np.abs(off[np.isfinite(off)])
+    off = np.abs([float(own.verify_difference_percent) for _, own in found])
+    finite = off[np.isfinite(off)]
     worst = percent(float(finite.max())) if finite.size else NONE
     ways = ["by time integration", "by harmonic balance"]
     head = ["frequency (Hz)", *ways, "difference", "motion in time", "periods"]
     text = f"Amplitude of {response.output_name}: the two independent ways differ by at most {worst}."
-    items = response.sentences(found.verify_case, found.verify_sentence)
+    items = response.sentences((case, own.verify_sentence) for case, own in found)
     return response.table("Time integration", (text,), head, rows, items=items)
 
 

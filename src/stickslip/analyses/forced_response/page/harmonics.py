@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.records.columns import MoreHarmonics, read
+from stickslip.analyses.forced_response.records.columns import Attempts, MoreHarmonics, read
 from stickslip.analyses.forced_response.summary import cost_sentence
 from stickslip.arrays import IntArray
 from stickslip.harmonic.harmonic_set import named
@@ -200,7 +200,7 @@ def _auto_text(response: Response) -> str:
 
 def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
     mine = response.converged & (response.point_case == case.index)
-    each = [own[mine] for own in (response.of_points.own_error_percent, response.of_points.audit_error_percent)]
+    each = [own[mine] for own in (response.of_points.own_error_percent, response.audit)]
     told = [predicted(float(np.nanmax(e))) if np.isfinite(e).any() else NONE for e in each]
     return _kept_where(response, case), "; ".join(told)
 
@@ -247,7 +247,7 @@ def _kept_where(response: Response, case: ShownCase | None = None) -> str:
 
 def attempts(response: Response) -> Table | None:
     """Return a table with one row a case and set of harmonics: the work, including discarded solutions."""
-    made = response.attempts
+    made = read(Attempts, response.data)
     if made.attempt_case is None or not made.attempt_kept.size:
         return None
     sets = np.array([named(np.flatnonzero(row)) for row in made.attempt_kept])
@@ -272,8 +272,8 @@ def attempts(response: Response) -> Table | None:
 
 def more_harmonics(response: Response) -> Table | None:
     """Report the predicted change by twice as many harmonics."""
-    found = [read(MoreHarmonics, response.data, c.index) for c in response.cases]
-    if all(own.reference_above < 0 for own in found):
+    found = [(c, read(MoreHarmonics, response.data, c.index)) for c in response.cases]
+    if all(own.reference_above < 0 for _, own in found):
         return None
     rows = [
         [
@@ -282,12 +282,12 @@ def more_harmonics(response: Response) -> Table | None:
             fixed(own.reference_worst_hz, 2),
             fixed(own.reference_above, 0),
         ]
-        for c, own in zip(response.cases, found, strict=True)
+        for c, own in found
     ]
     head = ["largest predicted change", "at (Hz)", "points above the threshold"]
     text = (
         f"What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
         "points: the change of the complex amplitude, phase included, over its size."
     )
-    items = response.sentences(range(len(found)), [own.reference_sentence for own in found])
+    items = response.sentences((c, own.reference_sentence) for c, own in found)
     return response.table("More harmonics", (text,), head, rows, items=items)

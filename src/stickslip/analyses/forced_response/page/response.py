@@ -13,12 +13,14 @@ from stickslip.analyses.forced_response.records.columns import (
     Attempts,
     Blades,
     CaseNumbers,
+    Kind,
     ModelFacts,
     PeakPeriod,
     PointFields,
     Points,
     PointStability,
     Verdicts,
+    each,
     read,
 )
 from stickslip.analyses.forced_response.stability.stable_words import said_of
@@ -98,11 +100,6 @@ class Response(Node):
     def verdicts(self) -> Verdicts:
         """Verdicts on cases and points; empty and None for results without."""
         return read(Verdicts, self.data)
-
-    @cached_property
-    def attempts(self) -> Attempts:
-        """All solutions, and the first solutions judged by an alert."""
-        return read(Attempts, self.data)
 
     @property
     def point_case(self) -> IntArray:
@@ -204,12 +201,18 @@ class Response(Node):
     @cached_property
     def alert(self) -> Alert:
         """Solutions judged by the strategy; with raised harmonics, or if the file does not say, the accepted points that have an indicator."""
-        asked, own = self.attempts, self.of_points
+        asked, own = read(Attempts, self.data), self.of_points
         if asked.alert_case is not None and not self.auto:
             return Alert(asked.alert_case, asked.alert_frequency_hz, asked.alert_error_percent)
         error = own.own_error_percent if self.auto else self.first_error
         at = np.flatnonzero(~np.isnan(error))
         return Alert(self.point_case[at], self.hz[at], error[at])
+
+    @property
+    def audit(self) -> FloatArray:
+        """(point,) difference of a solution from one with more harmonics, percent; NaN without an audit."""
+        found = self.of_points.audit_error_percent
+        return np.full(self.hz.size, np.nan) if found is None else found
 
     @property
     def first_error(self) -> FloatArray:
@@ -331,10 +334,13 @@ class Response(Node):
         cells = [list(row)[first:] for row in rows]
         return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
 
-    def sentences(self, cases: Iterable[int], told: Iterable[str]) -> list[str]:
-        """Return sentences with the labels of their cases; none where nothing is told."""
-        every = [str(text) for text in told]
-        return [said(self.cases[k].label, text) for k, text in zip(cases, every, strict=True)] if any(every) else []
+    def rows(self, kind: type[Kind]) -> list[tuple[ShownCase, Kind]]:
+        """Return the rows of all cases, such as checks of single points, each with its case."""
+        return [(c, row) for c in self.cases for row in each(read(kind, self.data, c.index))]
+
+    def sentences(self, told: Iterable[tuple[ShownCase, object]]) -> list[str]:
+        """Return sentences with the labels of their cases; empty ones are left out."""
+        return [said(case.label, str(text)) for case, text in told if str(text)]
 
     def points(self, case: ShownCase) -> IntArray:
         """Return the points of a case in the order of the curve, unconverged ones included.
