@@ -1,13 +1,16 @@
 """[all_motions] of a study: an isola named in verdicts and on the page, resuming, Python, bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-import xarray as xr
 from study_texts import DETACHED, study_of
 
 from stickslip.analyses.all_motions.analysis import ALL_MOTIONS
 from stickslip.analyses.all_motions.page import Motions, basin_table, branch_table, branches
+from stickslip.analyses.all_motions.records import FoundMotions
 from stickslip.analyses.all_motions.verdicts import case_verdicts
+from stickslip.analyses.columns import record_of
 from stickslip.api.study import Study
 from stickslip.errors import InputError
 from stickslip.study.models.study import read_study
@@ -98,34 +101,27 @@ def test_bad_tables_are_refused_by_key(tmp_path, line, said):
 
 
 def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
-    case = one_case(result.data["all_motions"].to_dataset(), 0)
-    told = {name: case[name].variable for name in case.variables}
-    for name in ("seconds", "solves", "budget_solves", "tries", "spent", "unmarched"):
-        told[name] = xr.Variable((), case.attrs[name])
-    stable = np.where(case["motion_stability"].values[0] == "stable", case["motion_amplitude"].values[0], np.nan)
-    count = case["motion_count"].values.copy()
+    case = record_of(FoundMotions, one_case(result.data["all_motions"].to_dataset(), 0))
+    (place,) = case.places
+    top = max((m for m in place.motions if m.stability == "stable"), key=lambda m: m.amplitude)
     for reached in (3, 0):
-        count[0, int(np.nanargmax(stable))] = reached
-        found = case_verdicts("", told | {"motion_count": xr.Variable(("searched", "motion"), count)})
+        motions = tuple(replace(m, count=reached) if m is top else m for m in place.motions)
+        found = case_verdicts("", replace(case, places=(replace(place, motions=motions),)))
         notes = [v for v in found if "was reached by none of 12 starts" in v.why]
         assert [v.word for v in notes] == ["note"] * (reached == 0)
 
 
 def test_what_the_budget_left_and_where_a_branch_was_lost_are_said(result):
-    case = one_case(result.data["all_motions"].to_dataset(), 0)
-    told = {name: case[name].variable for name in case.variables}
-    for name in ("seconds", "solves", "budget_solves", "tries", "spent", "unmarched"):
-        told[name] = xr.Variable((), case.attrs[name])
-    lost = case["end"].values.astype(object)
-    lost[-1] = "lost at 0.05 Hz (why)"
-    told |= {
-        "spent": xr.Variable((), 1),
-        "searched_spent": xr.Variable("searched", [1]),
-        "end": xr.Variable("branch", lost),
+    case = record_of(FoundMotions, one_case(result.data["all_motions"].to_dataset(), 0))
+    *branches, last = case.branches
+    changed = {
+        "spent": True,
+        "places": tuple(replace(place, spent=True) for place in case.places),
+        "branches": (*branches, replace(last, end="lost at 0.05 Hz (why)")),
     }
-    said = [v.why for v in case_verdicts("", told) if v.level == "doubtful"]
+    said = [v.why for v in case_verdicts("", replace(case, **changed)) if v.level == "doubtful"]
     assert any("at 1 of 1 frequencies (0.055 Hz) not all was tried" in why for why in said)
-    assert any(f"branch {lost.size} (deflation) is not known to its end: lost" in why for why in said)
+    assert any(f"branch {len(case.branches)} (deflation) is not known to its end: lost" in why for why in said)
 
 
 def test_motions_that_need_more_harmonics_are_doubtful(result):

@@ -1,6 +1,6 @@
 """Records become variables of a result and come back from them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from stickslip.analyses.columns import described, record_of, variables
 from stickslip.arrays import FloatArray
 from stickslip.column import column, rows
-from stickslip.study.store.archive import decode_record, encode_record
+from stickslip.study.store.archive import decode_record, encode_record, flat, from_flat
 from stickslip.study.store.netcdf import one_case, stacked
 
 TURN = 2 * np.pi
@@ -26,11 +26,19 @@ class Leaf:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Bud:
+    rank: int = column("1", "rank of a bud; -1 where there are no more")
+    colour: str = column("1", "its colour")
+    width: float = column("m", "its width")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Branch:
     number: int = column("1", "number of the branch")
     omega: float = column("Hz", "frequency of the branch", "frequency_hz", per=TURN)
     along: FloatArray = column("m", "place along the branch", along="point")
     leaves: tuple[Leaf, ...] = rows("leaf", "leaf_", "index of the branch of a leaf")
+    buds: tuple[Bud, ...] = rows("bud", "bud_", beside=True)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,9 +51,15 @@ class Tree:
 
 finite = st.floats(-1e6, 1e6)
 leaves = st.builds(Leaf, size=finite, green=st.booleans(), word=st.text("abc", min_size=1))
+buds = st.builds(Bud, rank=st.integers(0, 9), colour=st.text("abc"), width=finite)
 lengths = st.lists(finite, min_size=1, max_size=3).map(np.array)
 branches = st.builds(
-    Branch, number=st.integers(0, 99), omega=finite, along=lengths, leaves=st.lists(leaves, max_size=3).map(tuple)
+    Branch,
+    number=st.integers(0, 99),
+    omega=finite,
+    along=lengths,
+    leaves=st.lists(leaves, max_size=3).map(tuple),
+    buds=st.lists(buds, max_size=3).map(tuple),
 )
 trees = st.builds(
     Tree,
@@ -67,6 +81,7 @@ def assert_same(found: Tree, wanted: Tree, *, trimmed: bool) -> None:
         np.testing.assert_array_equal(own.along if trimmed else own.along[: len(other.along)], other.along)
         assert np.all(np.isnan(own.along[len(other.along) :]))
         assert [vars(leaf) for leaf in own.leaves] == [vars(leaf) for leaf in other.leaves]
+        assert [vars(bud) for bud in own.buds] == [vars(bud) for bud in other.buds]
 
 
 @given(st.lists(trees, min_size=1, max_size=3))
@@ -79,6 +94,7 @@ def test_records_come_back_from_the_dataset_of_several_cases(every: list[Tree]) 
 @given(trees)
 def test_a_journal_gives_back_records_that_hold_records(tree: Tree) -> None:
     assert_same(decode_record(encode_record(tree), Tree), tree, trimmed=True)
+    assert_same(from_flat(flat(tree), Tree), tree, trimmed=True)
 
 
 def test_variables_say_unit_meaning_and_dimensions() -> None:
@@ -121,6 +137,19 @@ def test_rows_may_have_variables_of_length_zero() -> None:
     assert all(found[name].shape == (0,) for name in kinds)
     assert record_of(Bush, found).boughs[0].leaves == ()
     assert variables(Bush()) == {}
+
+
+def test_rows_beside_one_another_are_a_padded_table() -> None:
+    bud = Bud(rank=4, colour="green", width=2.0)
+    branch = Branch(number=0, omega=1.0, along=np.zeros(1))
+    none = variables(Tree(name="a", height=1.0, branches=(branch, branch)))
+    assert none["bud_rank"].sizes == {"branch": 2, "bud": 0}
+    assert [one.buds for one in record_of(Tree, none).branches] == [(), ()]
+    found = variables(Tree(name="a", height=1.0, branches=(branch, replace(branch, buds=(bud,)))))
+    assert found["bud_rank"].dims == ("branch", "bud")
+    assert found["bud_rank"].values.tolist() == [[-1], [4]]
+    assert found["bud_colour"].values.tolist() == [[""], ["green"]]
+    np.testing.assert_array_equal(found["bud_width"].values, [[np.nan], [2.0]])
 
 
 def test_a_value_that_one_row_lacks_is_no_variable() -> None:

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stickslip.analyses.all_motions.dataset import dataset as of_motions
-from stickslip.analyses.all_motions.dataset import noted
+from stickslip.analyses.all_motions.analysis import ALL_MOTIONS
+from stickslip.analyses.all_motions.records import FOUND, FoundMotions, found_motions
 from stickslip.analyses.columns import described, variables
 from stickslip.analyses.facts import ModelFacts
 from stickslip.analyses.forced_response.records.columns import KINDS
@@ -49,6 +49,7 @@ from stickslip.response.residual_tractions.bounds import Bound
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.solve.status import Status
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
+from stickslip.study.store.archive import flat
 from stickslip.units import DEG, HZ, RPM
 
 NAN = np.nan
@@ -481,7 +482,7 @@ def test_all_motions() -> None:
         AtFrequency(12.0, (), Basins(12.0, ()), 8, False),
     )
     found = AllMotions(branches, at, 14, 10, 3.5, 19, True, "not marched")
-    data = of_motions(solved([], {"found": noted(found, 60), "model": {"output": "b.x"}}))
+    data = ALL_MOTIONS.dataset(solved([], {FOUND: flat(found_motions(found, 60, "b.x"))}))
     shares = [share_interval(3, 10), share_interval(1, 10)]
     nothing = [NAN, NAN]
     check(
@@ -833,6 +834,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
 
 
 RECORDS = (
+    FoundMotions,
     LimitCycles,
     ModelFacts,
     ModalSynthesis,

@@ -9,6 +9,7 @@ import xarray as xr
 from verdict_rows import INF, NAN, above, case_of, check
 
 from stickslip.analyses.all_motions import verdicts as motions
+from stickslip.analyses.all_motions.records import FoundMotions
 from stickslip.analyses.columns import record_of
 from stickslip.analyses.forced_response.verdicts.curve import jumps
 from stickslip.analyses.limit_cycle import verdicts as cycles
@@ -353,7 +354,7 @@ FOUND: dict[str, Any] = {
 }
 ALL = ("trusted", "2 branches, 1 isola among them, by 7 deflated solves and 40 starts in time, 55 solves in all")
 FOUND_ROWS: list[Row] = [
-    ({"origin": None}, [("wrong", "not finished", "Run it again")]),
+    (dict.fromkeys(FOUND), [("wrong", "not finished", "Run it again")]),
     ({"peak_amplitude": [1e-3, 1.001e-3 - 1e-12]}, [ALL]),
     ({"peak_amplitude": [1e-3, 1.002e-3]}, [("warning", "an isola reaches 1.002 mm at 60 Hz, 1 times"), ALL]),
     (
@@ -463,6 +464,7 @@ RECORDS: dict[Any, type[Any]] = {  # what the rules of an analysis are given
     backbones: NonlinearModes,
     synthesis: ModalSynthesis,
     two_frequencies: QuasiPeriodic,
+    motions: FoundMotions,
 }
 
 
@@ -484,7 +486,7 @@ RECORDS: dict[Any, type[Any]] = {  # what the rules of an analysis are given
 def test_a_case_is_told_as_it_is(words: Any, base: dict[str, Any], row: Row) -> None:
     changes, expected = row
     case = case_of(base, changes)
-    check(words.case_verdicts("", record_of(RECORDS[words], case) if words in RECORDS else case), expected)
+    check(words.case_verdicts("", record_of(RECORDS[words], case)), expected)
 
 
 @pytest.mark.parametrize("row", PEAK_ROWS)

@@ -48,12 +48,16 @@ class Rows:
         to the case itself.
     always
         Whether a result without any records has the variables, of length zero.
+    beside
+        Whether each owner has a row of the variables, along the dimension of the owners; shorter ones are padded. The first field of the
+        record is missing in the padding.
     """
 
     dim: str
     prefix: str = ""
     owner: str = ""
     always: bool = False
+    beside: bool = False
 
 
 def column(
@@ -63,9 +67,9 @@ def column(
     return field(default=default, metadata={"column": Column(unit, meaning, name, per, tuple(along.split()))})
 
 
-def rows(dim: str, prefix: str = "", owner: str = "", *, always: bool = False) -> Any:
+def rows(dim: str, prefix: str = "", owner: str = "", *, always: bool = False, beside: bool = False) -> Any:
     """Return a field that holds a tuple of records; see `Rows`."""
-    return field(default=(), metadata={"rows": Rows(dim, prefix, owner, always)})
+    return field(default=(), metadata={"rows": Rows(dim, prefix, owner, always, beside)})
 
 
 def columns_of(kind: type[Any]) -> dict[str, Column]:

@@ -8,39 +8,9 @@ import xarray as xr
 
 from stickslip.analyses.columns import variables
 from stickslip.analyses.facts import ModelFacts, facts_in
-from stickslip.arrays import FloatArray
 from stickslip.study.analysis import Solved
 from stickslip.study.store.netcdf import alike, one_case, stacked
 from stickslip.study.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
-
-Variables = dict[str, xr.Variable]
-
-
-def of_cases(
-    solved: Sequence[Solved],
-    of_case: Callable[[Solved], Variables],
-    verdicts: Callable[[str, Variables], Iterable[Verdict]],
-    lost: Callable[[Variables], int] = lambda _: 0,
-) -> xr.Dataset:
-    """Return the node of all cases.
-
-    Parameters
-    ----------
-    solved
-        Content of the jobs.
-    of_case
-        Returns the variables of a case.
-    verdicts
-        Returns the verdicts on a case from its label and its variables.
-    lost
-        Returns the number of its points without a solution.
-    """
-    cases = [of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    found = [v for label, own in zip(labels, cases, strict=True) for v in verdicts(label, own)]
-    failed = sum(lost(own) for own in cases)
-    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
 
 
 def of_answers(
@@ -49,7 +19,19 @@ def of_answers(
     verdicts: Callable[[str, Any], Iterable[Verdict]],
     lost: Callable[[Any], int] = lambda _: 0,
 ) -> xr.Dataset:
-    """Return the node of all cases, as `of_cases`; `answer` turns the content of a job into one record."""
+    """Return the node of all cases.
+
+    Parameters
+    ----------
+    solved
+        Content of the jobs.
+    answer
+        Returns the record of a case.
+    verdicts
+        Returns the verdicts on a case from its label and its record.
+    lost
+        Returns the number of its points without a solution.
+    """
     answers = [answer(one) for one in solved]
     labels = [one.case.label for one in solved]
     models = [variables(ModelFacts(**facts_in(one.notes))) for one in solved]
@@ -57,15 +39,6 @@ def of_answers(
     found = [v for label, own in zip(labels, answers, strict=True) for v in verdicts(label, own)]
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": sum(map(lost, answers))}
     return xr.Dataset(stacked(cases), attrs=attributes)
-
-
-def rows(records: Sequence[object], name: str, missing: float = np.nan) -> FloatArray:
-    """Return one attribute of all records as rows (records, n); shorter ones are padded."""
-    every = [getattr(one, name) for one in records]
-    out = np.full((len(every), max((own.size for own in every), default=0)), missing)
-    for row, own in zip(out, every, strict=True):
-        row[: own.size] = own
-    return out
 
 
 def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:

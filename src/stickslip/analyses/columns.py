@@ -56,13 +56,12 @@ def record_of(
 
 def described(kind: type[Any], dim: str = "", prefix: str = "") -> Iterator[tuple[str, tuple[str, ...], str, str]]:
     """Yield name, dimensions, unit and meaning of all variables of a class of records, for the documentation."""
-    own = (dim,) if dim else ()
     for name, c in columns_of(kind).items():
-        yield prefix + (c.name or name), (*own, *c.along), c.unit, c.meaning
+        yield prefix + (c.name or name), (*dim.split(), *c.along), c.unit, c.meaning
     for name, inner in rows_of(kind).items():
         if inner.owner:
             yield inner.prefix + dim, (inner.dim,), "1", inner.owner
-        yield from described(_row_type(kind, name), inner.dim, inner.prefix)
+        yield from described(_row_type(kind, name), f"{dim} {inner.dim}" if inner.beside else inner.dim, inner.prefix)
 
 
 def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.Variable]:
@@ -76,9 +75,20 @@ def _of_rows(kind: type[Any], of: Rows, records: Sequence[Any]) -> dict[str, xr.
         found |= _told(of.prefix + (c.name or name), _stored(c, (of.dim,), told), always=not records)
     for name, inner in rows_of(kind).items():
         own = [getattr(one, name) for one in records]
+        if inner.beside:
+            found |= _beside(_row_type(kind, name), of, inner, own)
+            continue
         owner = np.repeat(np.arange(len(own)), [len(each) for each in own])
         found |= _told(inner.prefix + of.dim, variable(inner.dim, owner, "1", inner.owner), always=inner.always)
         found |= _of_rows(_row_type(kind, name), inner, [row for each in own for row in each])
+    return found
+
+
+def _beside(kind: type[Any], of: Rows, inner: Rows, owned: Sequence[Sequence[Any]]) -> dict[str, xr.Variable]:
+    found = {}
+    for name, c in columns_of(kind).items():
+        each = [np.array([getattr(row, name) for row in own], dtype=_plain_type(kind, name)) for own in owned]
+        found[inner.prefix + (c.name or name)] = variable(f"{of.dim} {inner.dim}", _filled(each), c.unit, c.meaning)
     return found
 
 
@@ -123,7 +133,16 @@ def _owned(
     kind: type[Any], name: str, inner: Rows, of: Rows, case: xr.Dataset | Mapping[str, xr.Variable]
 ) -> list[tuple[int, Any]]:
     """Return the rows within rows, each with the index of the row that holds it."""
-    found = list(_rows_read(_row_type(kind, name), inner, case))
+    row_type = _row_type(kind, name)
+    if inner.beside:
+        first, *others = (inner.prefix + (c.name or n) for n, c in columns_of(row_type).items())
+        if first not in case:
+            return []
+        values = case[first].values
+        at = np.nonzero(~np.isnan(values) if values.dtype.kind == "f" else values != FILLED[values.dtype.kind])
+        flat = {n: xr.Variable(inner.dim, case[n].values[at]) for n in (first, *others) if n in case}
+        return list(zip(at[0].tolist(), _rows_read(row_type, inner, flat), strict=True))
+    found = list(_rows_read(row_type, inner, case))
     return list(zip(np.asarray(case[inner.prefix + of.dim].values).tolist(), found, strict=True)) if found else []
 
 

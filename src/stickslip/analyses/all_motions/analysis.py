@@ -1,19 +1,20 @@
 """Search for motions that a sweep misses, with their basins of attraction: the analysis ``all_motions``."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
-from stickslip.analyses.all_motions.dataset import dataset, noted
 from stickslip.analyses.all_motions.problem import Question, question_of
+from stickslip.analyses.all_motions.records import FOUND, answer, found_motions
 from stickslip.analyses.all_motions.table import AllMotionsTable
-from stickslip.analyses.all_motions.verdicts import tables
+from stickslip.analyses.all_motions.verdicts import case_verdicts, tables
+from stickslip.analyses.collected import of_answers
 from stickslip.assembly.model import Model
 from stickslip.response.all_motions.found import Stage, gathered
 from stickslip.response.all_motions.search import PERIODS_OF_A_START, search_seconds, search_stages
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
+from stickslip.study.store.archive import flat
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ
-
-MODEL, FOUND = "model", "found"  # notes
 
 
 def _inputs(case: Case, model: Model) -> Question:
@@ -27,7 +28,8 @@ def _solve(inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[St
     """Yield the missing stages."""
     if notes.get(FOUND) is not None:
         return
-    notes.put(MODEL, dict(inputs.facts) | {"output": inputs.model.output_labels[0]})
+    output = inputs.model.output_labels[0]
+    notes.put("model", dict(inputs.facts) | {"output": output})
     problem, stages = inputs.problem, list(done)
     most = 3 * len(inputs.search.places)
     for stage in search_stages(problem, inputs.search, done):
@@ -35,7 +37,8 @@ def _solve(inputs: Question, done: Sequence[Stage], notes: Notes) -> Iterator[St
         over = sum(s.kind != "branch" for s in stages)
         advance(0.95 * min(over / most, 1.0), _told(stage, inputs))
         yield stage
-    notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.solves))
+    found = gathered(problem, stages, inputs.search)
+    notes.put(FOUND, flat(found_motions(found, inputs.search.solves, output)))
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
@@ -76,7 +79,7 @@ ALL_MOTIONS = Analysis(
     key=of_tables("all_motions", "solver"),
     inputs=_inputs,
     solve=_solve,
-    dataset=dataset,
+    dataset=partial(of_answers, answer=answer, verdicts=case_verdicts),
     check=_check,
     summary=tables,
     shared=("solver",),

@@ -1,11 +1,14 @@
 """All motions on the page: every branch in one figure, and the basins of attraction."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.all_motions.records import FoundMotions, SearchedFrequency
+from stickslip.analyses.columns import record_of
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import MUTED, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
@@ -20,43 +23,47 @@ _ORIGIN = {"sweep": "the sweep", "deflation": "found by deflation", "time": "fou
 class Motions(Node):
     """One case."""
 
+    @cached_property
+    def found(self) -> FoundMotions:
+        """The record of the case."""
+        known: FoundMotions = record_of(FoundMotions, self.data)
+        return known
+
     @property
     def names(self) -> list[str]:
         """Of the branches."""
-        isola = self.integers("isola")
         return [
-            f"{i + 1}: {'isola, ' * bool(isola[i])}{_ORIGIN.get(o, o)}" for i, o in enumerate(self.labels_of("origin"))
+            f"{i + 1}: {'isola, ' * b.isola}{_ORIGIN.get(b.origin, b.origin)}"
+            for i, b in enumerate(self.found.branches)
         ]
 
 
 def branches(view: Motions) -> Plot:
     """Show all branches, and the motions at the frequencies that were searched."""
-    figure = go.Figure()
-    hertz, height = (view.values(n, "branch", "point") for n in ("frequency_hz", "amplitude"))
-    scale = scale_for(height, "m")
-    for i, name in enumerate(view.names):
-        there = np.isfinite(hertz[i])
+    figure, found = go.Figure(), view.found
+    scale = scale_for(np.concatenate([branch.amplitude for branch in found.branches]), "m")
+    for i, (name, branch) in enumerate(zip(view.names, found.branches, strict=True)):
+        there = np.isfinite(branch.frequency_hz)
         figure.add_trace(
             go.Scatter(
-                x=hertz[i][there],
-                y=scale.factor * height[i][there],
+                x=branch.frequency_hz[there],
+                y=scale.factor * branch.amplitude[there],
                 mode="lines",
                 name=name,
                 line={"color": colour(i), "width": 1},
                 hovertemplate=f"{name}: %{{y:.6g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
             )
         )
-    if view.has("motion_branch"):
-        _mark(view, figure, scale.factor, scale.unit)
+    _mark(found, figure, scale.factor, scale.unit)
     styled(figure, 480)
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")
-    spent = " The budget ended the search before all was tried." * bool(view.scalar("spent"))
+    figure.update_yaxes(title_text=f"amplitude of {found.output} ({scale.unit})", rangemode="tozero")
+    spent = " The budget ended the search before all was tried." * bool(found.spent)
     caption = (
-        f"{_several(len(view.names), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
-        f"{_several(view.integers('searched_hz').size, 'frequency', 'frequencies')} (marks) other motions were searched by "
-        f"{int(view.scalar('tries'))} deflated solves and from {int(np.sum(view.integers('starts')))} random states in time, "
-        f"{int(view.scalar('solves'))} solves of a budget of {int(view.scalar('budget_solves'))}; what was new was followed.{spent} "
+        f"{_several(len(found.branches), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
+        f"{_several(len(found.places), 'frequency', 'frequencies')} (marks) other motions were searched by "
+        f"{found.tries} deflated solves and from {found.starts} random states in time, "
+        f"{found.solves} solves of a budget of {found.budget}; what was new was followed.{spent} "
         "Stability is examined at the marks alone: the lines between them are thin, for nobody knows whether a motion there lasts. "
         "Nothing proves that there is no other motion."
     )
@@ -67,20 +74,16 @@ def _several(count: int, one: str, more: str) -> str:
     return f"{count} {one if count == 1 else more}"
 
 
-def _mark(view: Motions, figure: go.Figure, factor: float, unit: str) -> None:
+def _mark(found: FoundMotions, figure: go.Figure, factor: float, unit: str) -> None:
     """Mark the motions at the frequencies that were searched by their stability."""
-    dims = ("searched", "motion")
-    height, hertz = view.values("motion_amplitude", *dims), view.floats("searched_hz")
-    words = view.data["motion_stability"].transpose(*dims).values.astype(str)
-    where = np.broadcast_to(hertz[:, None], height.shape)
     for word, symbol in _SYMBOLS.items():
-        own = words == word
-        if not np.any(own):
+        own = [(place, motion) for place, motion in found.motions if motion.stability == word]
+        if not own:
             continue
         figure.add_trace(
             go.Scatter(
-                x=where[own],
-                y=factor * height[own],
+                x=np.array([place.hertz for place, _ in own]),
+                y=factor * np.array([motion.amplitude for _, motion in own]),
                 mode="markers",
                 name=word,
                 marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.6, "color": MUTED}},
@@ -94,20 +97,12 @@ def branch_table(view: Motions) -> Table:
     rows = [
         [
             name,
-            f"{number(float(low), 6)} to {number(float(high), 6)}",
-            quantity(float(peak), "m", 5),
-            number(float(hertz), 6),
-            end,
+            f"{number(branch.lowest_hz, 6)} to {number(branch.highest_hz, 6)}",
+            quantity(branch.peak_amplitude, "m", 5),
+            number(branch.peak_hz, 6),
+            branch.end,
         ]
-        for name, low, high, peak, hertz, end in zip(
-            view.names,
-            view.floats("lowest_hz"),
-            view.floats("highest_hz"),
-            view.floats("peak_amplitude"),
-            view.floats("peak_hz"),
-            view.labels_of("end"),
-            strict=True,
-        )
+        for name, branch in zip(view.names, view.found.branches, strict=True)
     ]
     head = ["branch", "range (Hz)", "largest amplitude", "at (Hz)", "how it ends"]
     return Table(head, rows, "Branches")
@@ -115,48 +110,9 @@ def branch_table(view: Motions) -> Table:
 
 def basin_table(view: Motions) -> Table | Words:
     """Return the motions at each frequency with the share of the starts that ends on them."""
-    if not view.has("motion_branch"):
+    if not view.found.motions:
         return Words(("No motion was found at a frequency that was searched.",))
-    dims, names = ("searched", "motion"), view.names
-    told = ("amplitude", "share", "share_low", "share_high", "multiplier", "change")
-    column = {n: view.values(f"motion_{n}", *dims) for n in told}
-    number_of = view.data["motion_branch"].transpose(*dims).values.astype(int)
-    words = view.data["motion_stability"].transpose(*dims).values.astype(str)
-    starts = view.integers("starts")
-    others = {
-        "none of the load's period": view.integers("aperiodic"),
-        "no solution with these harmonics": view.integers("unsolved"),
-        "none: it grows without bound": view.integers("diverged"),
-    }
-    rows = []
-    for i, hertz in enumerate(view.floats("searched_hz")):
-        for k in np.flatnonzero(number_of[i] >= 0):
-            share, low, high = (100 * column[n][i, k] for n in ("share", "share_low", "share_high"))
-            ends = f"{number(share, 3)} % ({number(low, 2)} to {number(high, 2)} %) of {starts[i]}"
-            rows.append(
-                [
-                    number(float(hertz), 6),
-                    names[number_of[i, k]],
-                    quantity(float(column["amplitude"][i, k]), "m", 5),
-                    f"**{words[i, k]}**",
-                    number(float(column["multiplier"][i, k]), 4),
-                    _changed(float(column["change"][i, k])),
-                    ends if starts[i] else NONE,
-                ]
-            )
-        rows += [
-            [
-                number(float(hertz), 6),
-                what,
-                NONE,
-                NONE,
-                NONE,
-                NONE,
-                f"{number(100 * count[i] / starts[i], 3)} % of {starts[i]}",
-            ]
-            for what, count in others.items()
-            if count[i]
-        ]
+    rows = [row for place in view.found.places for row in _basins(place, view.names)]
     head = [
         "frequency (Hz)",
         "branch",
@@ -173,6 +129,30 @@ def basin_table(view: Motions) -> Table | Words:
     return Table(head, rows, "Motions and their basins", (said,))
 
 
+def _basins(place: SearchedFrequency, names: Sequence[str]) -> Iterator[list[str]]:
+    """Yield the rows of a frequency: its motions, and what other starts end on."""
+    hertz, starts = number(place.hertz, 6), place.starts
+    for motion in place.motions:
+        share, low, high = 100 * motion.share, 100 * motion.share_low, 100 * motion.share_high
+        yield [
+            hertz,
+            names[motion.branch],
+            quantity(motion.amplitude, "m", 5),
+            f"**{motion.stability}**",
+            number(motion.multiplier, 4),
+            _changed(motion.change),
+            f"{number(share, 3)} % ({number(low, 2)} to {number(high, 2)} %) of {starts}" if starts else NONE,
+        ]
+    others = {
+        "none of the load's period": place.aperiodic,
+        "no solution with these harmonics": place.unsolved,
+        "none: it grows without bound": place.diverged,
+    }
+    for what, count in others.items():
+        if count:
+            yield [hertz, what, NONE, NONE, NONE, NONE, f"{number(100 * count / starts, 3)} % of {starts}"]
+
+
 def _changed(share: float) -> str:
     if np.isnan(share):
         return NONE
@@ -180,11 +160,10 @@ def _changed(share: float) -> str:
 
 
 def _cards(view: Motions) -> Sequence[Card]:
-    origin, peak = np.array(view.labels_of("origin")), view.floats("peak_amplitude")
-    isolas = int(np.sum(view.integers("isola")))
-    higher = bool(np.any(peak[origin != "sweep"] > np.max(peak[origin == "sweep"], initial=0.0)))
-    note = f"{counted(isolas, 'isola')}" + "; one branch reaches higher than the sweep" * higher
-    return [Card(str(len(origin)), "branches of motions", note, higher)]
+    found = view.found
+    higher = any(b.peak_amplitude > found.swept_peak for b in found.branches if not b.swept)
+    note = f"{counted(found.isolas, 'isola')}" + "; one branch reaches higher than the sweep" * higher
+    return [Card(str(len(found.branches)), "branches of motions", note, higher)]
 
 
 _BLOCK = Block("all-motions", "All motions", (branches, branch_table, basin_table))

@@ -57,8 +57,8 @@ def _array(content: bytes) -> Any:
     shape, by_columns, dtype = _described(content[:end])
     if dtype.hasobject:
         raise ValueError("an array of objects")
-    flat = np.frombuffer(content, dtype, offset=end)
-    return flat.reshape(shape, order="F" if by_columns else "C").copy(order="K")
+    values = np.frombuffer(content, dtype, offset=end)
+    return values.reshape(shape, order="F" if by_columns else "C").copy(order="K")
 
 
 @lru_cache(maxsize=512)
@@ -76,10 +76,10 @@ _hints = cache(get_type_hints)
 
 def encode_record(record: Any) -> bytes:
     """Return a dataclass of arrays, numbers, texts, enumerations, None, and tuples of such dataclasses as a NumPy archive."""
-    return encode(_flat(record))
+    return encode(flat(record))
 
 
-def _flat(record: Any) -> dict[str, Any]:
+def flat(record: Any) -> dict[str, Any]:
     """Return the fields of a record by name; those of nested records as ``field/index/name``, with their number."""
     found: dict[str, Any] = {}
     for own in (f for f in fields(record) if f.init):
@@ -89,7 +89,7 @@ def _flat(record: Any) -> dict[str, Any]:
             continue
         found[own.name] = len(value)
         for i, row in enumerate(value):
-            found |= {f"{own.name}/{i}/{name}": entry for name, entry in _flat(row).items()}
+            found |= {f"{own.name}/{i}/{name}": entry for name, entry in flat(row).items()}
     return found
 
 
@@ -102,10 +102,11 @@ def _row_type(kind: type[Any], name: str) -> type[Any] | None:
 
 def decode_record(payload: bytes, kind: type[Any]) -> Any:
     """Return a record of class `kind` written by `encode_record`."""
-    return _record(decode(payload), kind)
+    return from_flat(decode(payload), kind)
 
 
-def _record(values: dict[str, Any], kind: type[Any]) -> Any:
+def from_flat(values: Mapping[str, Any], kind: type[Any]) -> Any:
+    """Return a record of class `kind` from what `flat` returns, as a note keeps it."""
     hints = _hints(kind)  # type: ignore[arg-type]  # a class has a hash
     own: dict[str, Any] = {}
     inner: dict[str, dict[int, dict[str, Any]]] = {}
@@ -122,7 +123,7 @@ def _record(values: dict[str, Any], kind: type[Any]) -> Any:
     for field, count in own.items():
         row = _row_type(kind, field)
         if row is not None:
-            own[field] = tuple(_record(inner[field][i], row) for i in range(count))
+            own[field] = tuple(from_flat(inner[field][i], row) for i in range(count))
     missing = {f.name: None for f in fields(kind) if f.init and f.name not in own}
     return kind(**own, **missing)
 
