@@ -33,10 +33,18 @@ from stickslip.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
 from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord
 from stickslip.analyses.resonance.analysis import RESONANCE
 from stickslip.analyses.resonance.records import Resonances
-from stickslip.analyses.run_up import values
-from stickslip.analyses.run_up.fast import name_of
-from stickslip.analyses.run_up.values import OPEN, SLIP, _of_fast, _of_order, _of_statics
-from stickslip.analyses.run_up.values import dataset as of_run_up
+from stickslip.analyses.run_up import records as of_run_up
+from stickslip.analyses.run_up.analysis import RUN_UP
+from stickslip.analyses.run_up.records import (
+    OPEN,
+    SLIP,
+    LinePoint,
+    RunUp,
+    fast_run_up,
+    line_of,
+    points_of,
+    static_forces,
+)
 from stickslip.analyses.waves.of_wheel import variables as of_wheel
 from stickslip.analyses.waves.records.about import STATIC, skin_note
 from stickslip.analyses.waves.records.about import _static as static_numbers
@@ -666,20 +674,33 @@ def along(order: int, speeds: list[float], force: float) -> Any:
     )
 
 
+def run_up_point(error: float) -> LinePoint:
+    return LinePoint(
+        engine_order=3,
+        speed_rpm=1000.0,
+        frequency_hz=50.0,
+        amplitude=np.array([1e-3]),
+        converged=True,
+        harmonic=1,
+        error=error,
+        dissipated_w=0.0,
+        slipping=0.0,
+        opening=0.0,
+    )
+
+
 def test_run_ups() -> None:
     lines = [along(2, [1000.0, 3000.0], 1.0), along(3, [1000.0, 2000.0, 3000.0], 10.0)]
-    statics = _of_statics(lines)
-    check(
-        {k: xr.Variable(["a", "b"][: np.ndim(v)], v) for k, v in statics.items()},
-        static_speed_rpm=[1000.0, 2000.0, 3000.0],
-        static_normal_n=[[2.0, 3.0, 4.0], [20.0, 40.0, 60.0]],
-    )
+    speeds, forces = static_forces(lines)
+    assert speeds / RPM == pytest.approx([1000.0, 2000.0, 3000.0])
+    np.testing.assert_allclose(forces, [[2.0, 3.0, 4.0], [20.0, 40.0, 60.0]], rtol=1e-12)
     top = SimpleNamespace(point=SimpleNamespace(omega=1200.0 * RPM * 3, stage="sweep"))
     rest = [SimpleNamespace(point=SimpleNamespace(omega=w * RPM * 3, stage="sweep")) for w in (1400.0, 1000.0)]
     response = SimpleNamespace(
         accepted=[rest[0], top, rest[1]], top=top, peak_amplitude=2e-3, peak_hz=60.0, failed=1, newton_steps=17
     )
-    own = _of_order(lines[1], response, 10)
+    shown = np.array([[40.0, 80.0]]), np.array([[50.0, 90.0]]), forces[1]
+    own = line_of(lines[1], response, 10, *shown)
     expected = {
         "engine_orders": 3,
         "wave_number": 3,
@@ -693,30 +714,34 @@ def test_run_ups() -> None:
         "speed_error": 3e-6,
         "common_modes": 1,
     }
-    assert own == pytest.approx(expected)
+    assert {name: getattr(own, name.replace("orders", "order")) for name in expected} == pytest.approx(expected)
     edge = SimpleNamespace(**{**vars(response), "top": rest[0]})
-    assert [_of_order(lines[0], edge, 0)[n] for n in ("peak_inside", "common_modes", "peak_point")] == [0, 0, 2]
+    beside = line_of(lines[0], edge, 0, *shown)
+    assert (beside.peak_inside, beside.common_modes, beside.peak_point) == (False, False, 2)
     none = SimpleNamespace(**{**vars(response), "top": None})
-    assert [_of_order(lines[0], none, 5)[n] for n in ("peak_inside", "peak_point")] == [0, -1]
-    slow = {
-        "speed_rpm": np.array([1000.0, 1100.0, 1210.0]),
-        "amplitude": np.array([1e-3, 3e-3, 2e-3]),
-        "harmonic": 3,
-        "finished": 1,
-        "neglected": 0.01,
-    }
-    quick = {
-        "speed_rpm": np.array([1000.0, 1250.0]),
-        "amplitude": np.array([1e-3, 1.5e-3]),
-        "harmonic": 5,
-        "finished": 0,
-        "neglected": 0.02,
-    }
-    question: Any = SimpleNamespace(lines=lines[1:], rates=(50.0, 500.0))
-    fast = _of_fast(question, [own], {name_of(3, 50.0): slow, name_of(3, 500.0): quick})  # type: ignore[arg-type]
-    data = of_run_up([{**fast, **statics, **{k: np.array([v]) for k, v in own.items()}}])
+    assert (line_of(lines[0], none, 5, *shown).peak_inside, line_of(lines[0], none, 5, *shown).peak_point) == (
+        False,
+        -1,
+    )
+    slow = fast_run_up(
+        own,
+        50.0,
+        np.array([1000.0, 1100.0, 1210.0]),
+        np.array([1e-3, 3e-3, 2e-3]),
+        harmonic=3,
+        finished=True,
+        neglected=0.01,
+    )
+    quick = fast_run_up(own, 500.0, np.array([1000.0, 1250.0]), np.array([1e-3, 1.5e-3]), harmonic=5, neglected=0.02)
+    found = RunUp(lines=(own,), static_speed_rpm=speeds / RPM, fast=(slow, quick))
+    data = RUN_UP.dataset(solved([], {of_run_up.FOUND: flat(replace(found, points=(run_up_point(0.5),) * 12))}))
     check(
         data,
+        **{name: [value] for name, value in expected.items()},
+        open_hz=[[[40.0, 80.0]]],
+        stuck_hz=[[[50.0, 90.0]]],
+        static_normal_n=[[20.0, 40.0, 60.0]],
+        mode=[1, 2],
         fast_order=[3, 3],
         fast_rate_rpm_per_s=[50.0, 500.0],
         fast_peak_amplitude=[3e-3, 1.5e-3],
@@ -737,7 +762,7 @@ def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four contact points: two slip at some instant, one of them and another are open at some instant."""
     state = np.zeros((4, 2, 8), dtype=int)
     state[0, 1, 3], state[1, 0, :4], state[1, 0, 4:], state[2, :, 7] = SLIP, SLIP, OPEN, OPEN
-    monkeypatch.setattr(values, "signals", lambda *_: SimpleNamespace(state=state))
+    monkeypatch.setattr(of_run_up, "signals", lambda *_: SimpleNamespace(state=state))
 
     def point(rpm: float, energy: float | None, stage: str = "sweep") -> Any:
         fields = None if energy is None else SimpleNamespace(energy=np.array([energy, 2 * energy]))
@@ -752,7 +777,7 @@ def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
 
     line: Any = SimpleNamespace(order=3, problem=None, model=SimpleNamespace(output_labels=("a.x", "b.x")))
     response: Any = SimpleNamespace(accepted=[point(1000.0, 0.5), point(1200.0, None), point(1100.0, 0.25, OF_PEAK[0])])
-    found = values._of_points(line, response)
+    found = variables(RunUp(points=tuple(points_of(line, response))))
     rpm = np.array([1000.0, 1100.0, 1200.0])
     expected = {
         "points_order": [3, 3, 3],
@@ -768,10 +793,10 @@ def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     assert set(found) == set(expected)
     for name, value in expected.items():
-        np.testing.assert_allclose(found[name], value, rtol=1e-12, err_msg=name)
+        np.testing.assert_allclose(found[name].values, value, rtol=1e-12, err_msg=name)
     # a branch that turns is told along it
     turned: Any = SimpleNamespace(accepted=[point(1000.0, 0.5), point(1200.0, 0.5), point(1100.0, 0.5)])
-    assert values._of_points(line, turned)["speed_rpm"] == pytest.approx([1000.0, 1200.0, 1100.0])
+    assert [p.speed_rpm for p in points_of(line, turned)] == pytest.approx([1000.0, 1200.0, 1100.0])
 
 
 def test_modes_of_a_wheel_whose_sectors_differ() -> None:
@@ -842,6 +867,7 @@ RECORDS = (
     QuasiPeriodic,
     ResidualTractions,
     Resonances,
+    RunUp,
     *KINDS,
 )  # of cases, whose fields are columns
 
@@ -860,7 +886,7 @@ def written() -> set[str]:
                     and ast.unparse(value.func) in ("variable", "Quantity")
                 }
             table = isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict)
-            if table and getattr(node.targets[0], "id", "") in ("ABOUT", "NUMBERS", "QUANTITIES"):
+            if table and getattr(node.targets[0], "id", "") in ("NUMBERS", "QUANTITIES"):
                 names |= {str(k.value) for k in node.value.keys if isinstance(k, ast.Constant)}
     return names
 

@@ -10,9 +10,11 @@ from newton_bounds import allowed, answer_at
 from test_assembly_wheel import H, sector_model, shrouded_sector
 
 import stickslip as ss
+from stickslip.analyses.columns import record_of
 from stickslip.analyses.run_up.analysis import RUN_UP as RUN_UP_ANALYSIS
 from stickslip.analyses.run_up.problem import question_of
-from stickslip.analyses.run_up.verdicts import verdicts_of
+from stickslip.analyses.run_up.records import RunUp
+from stickslip.analyses.run_up.verdicts import UNKNOWN, case_verdicts
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import InputError
@@ -155,10 +157,17 @@ def test_a_study_follows_engine_orders_over_speed(finished):
     assert "doubtful" not in said
     assert "engine order 2" not in said  # steady or fast, its peak is inside
     # whether more harmonics were examined is told either way
-    steady = data.drop_dims("fast").assign(peak_inside=0 * data["peak_inside"] + 1)
-    (calm,) = verdicts_of(steady.assign(error=0 * data["error"] + 0.0312), "", 0.05)
+    found = record_of(RunUp, data)
+    inside = tuple(replace(line, peak_inside=True) for line in found.lines)
+    steady = replace(found, lines=inside, fast=(), limit=0.05)
+
+    def told(error):
+        points = tuple(replace(point, error=error) for point in steady.points)
+        return [v for v in case_verdicts("", replace(steady, points=points)) if v.why != UNKNOWN.why]
+
+    (calm,) = told(0.0312)
     assert calm.why.endswith("more harmonics are predicted to change their peaks by 3.1 % at most")
-    blind = verdicts_of(steady.assign(error=np.nan * data["error"]), "", 0.05)
+    blind = told(np.nan)
     assert [v.level for v in blind] == 2 * ["doubtful"]
     assert "whether more harmonics than H = 1 change the peak was not examined" in blind[0].why
     assert "engine order 3 at 5000 rpm/s: the largest amplitude is at an end of the range" in said

@@ -1,5 +1,6 @@
 """Each rule of a verdict at and beside its threshold, and the word that comes out, on cases made of plain numbers."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,6 +28,7 @@ from stickslip.analyses.residual_tractions.records import ResidualTractions
 from stickslip.analyses.resonance import verdicts as resonances
 from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.run_up import verdicts as running
+from stickslip.analyses.run_up.records import RunUp
 from stickslip.analyses.waves import doubts as waves
 from stickslip.analyses.waves.flutter import _doubts, _unstable, _unstable_wheel
 from stickslip.response.nonlinear_modes.single_mode_validity import Isolation
@@ -677,8 +679,9 @@ RUN_ROWS: list[Row] = [
 @pytest.mark.parametrize("row", RUN_ROWS)
 def test_a_run_up_is_told_as_it_is(row: Row) -> None:
     changes, expected = row
-    own = {n: (dims.split(), changes.get(n, value)) for n, (dims, value) in RUN.items()}
-    check(running.verdicts_of(xr.Dataset(own), "", 0.02), expected)
+    case = xr.Dataset({n: (dims.split(), changes.get(n, value)) for n, (dims, value) in RUN.items()})
+    found = replace(record_of(RunUp, case), limit=0.02)
+    check([v for v in running.case_verdicts("", found) if v.why != running.UNKNOWN.why], expected)
 
 
 def flutter_waves(*hertz: tuple[float, ...]) -> list[Any]:

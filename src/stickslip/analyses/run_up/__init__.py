@@ -1,1 +1,1 @@
-"""The run-up: table, problem, values, verdicts."""
+"""The run-up: table, problem, solve, records, verdicts."""

@@ -1,11 +1,15 @@
 """The run-up: a Campbell diagram with the response on it, amplitudes over speed, static forces."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.arrays import BoolArray
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.run_up.records import LinePoint, RunUp
+from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
@@ -21,39 +25,39 @@ _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"
 class RunUpView(Node):
     """One case of a run-up."""
 
-    @property
-    def orders(self) -> list[int]:
-        """Engine orders."""
-        return [int(m) for m in self.integers("engine_orders")]
+    @cached_property
+    def found(self) -> RunUp:
+        """The record of the case."""
+        known: RunUp = record_of(RunUp, self.data)
+        return known
 
-    @property
-    def output(self) -> int:
-        """Index of the output whose peak is resolved."""
-        return int(self.scalar("report_output", 0))
-
-    def own(self, order: int) -> BoolArray:
-        """Return which points are those of an engine order."""
-        return np.asarray(self.integers("points_order") == order)
+    def amplitude(self, points: Sequence[LinePoint]) -> FloatArray:
+        """Return (points,) amplitudes of the output whose peak is resolved."""
+        return np.array([point.amplitude[self.found.report_output or 0] for point in points])
 
     @property
     def output_name(self) -> str:
         """Name of that output."""
-        return self.labels_of("output_label")[self.output]
+        return str(self.found.output_label[self.found.report_output or 0])
+
+
+def _of(points: Sequence[LinePoint], name: str) -> FloatArray:
+    """Return a number of all points."""
+    return np.array([getattr(point, name) for point in points])
 
 
 def campbell_with_response(view: RunUpView) -> Plot:
     """Show the amplitudes on the lines of their engine orders, between natural frequencies with stuck and open contacts."""
-    rpm, hz = view.floats("speed_rpm"), view.floats("frequency_hz")
-    amplitude = view.values("amplitude", "point", "output")[:, view.output]
+    found = view.found
+    hz, amplitude = _of(found.points, "frequency_hz"), view.amplitude(found.points)
     scale = scale_for(amplitude, "m")
     top = float(np.nanmax(amplitude)) if np.isfinite(amplitude).any() else 1.0
     figure = go.Figure()
-    speeds = view.floats("line_speed_rpm")
+    speeds = np.asarray(found.line_speed_rpm)
     span = [float(hz.min()), float(hz.max())]
     pad = 0.08 * (span[1] - span[0])
     for name, dash, title in (("stuck_hz", "solid", "stuck"), ("open_hz", "dot", "open")):
-        found = view.values(name, "line", "line_speed", "mode")
-        shown = {int(view.integers("wave_number")[i]): found[i] for i in reversed(range(len(found)))}
+        shown: dict[int, FloatArray] = {line.wave_number: getattr(line, name) for line in reversed(found.lines)}
         for j, (wave, lines) in enumerate(sorted(shown.items())):
             for mode in range(lines.shape[1]):
                 figure.add_scatter(
@@ -66,8 +70,10 @@ def campbell_with_response(view: RunUpView) -> Plot:
                     line={"color": colour(j), "width": 1.3, "dash": dash},
                     hovertemplate=f"wave {wave}, mode {mode + 1}, {title}: %{{y:.6g}} Hz at %{{x:.5g}} rpm<extra></extra>",
                 )
-    for i, order in enumerate(view.orders):
-        own = view.own(order) & np.isfinite(amplitude)
+    for i, line in enumerate(found.lines):
+        order = line.engine_order
+        own = [point for point in found.along(line) if np.isfinite(view.amplitude([point])[0])]
+        sizes = view.amplitude(own)
         figure.add_scatter(
             x=speeds[[0, -1]],
             y=order * speeds[[0, -1]] / 60,
@@ -83,15 +89,15 @@ def campbell_with_response(view: RunUpView) -> Plot:
             line={"color": MUTED, "width": 1, "dash": "dash"},
         )
         figure.add_scatter(
-            x=rpm[own],
-            y=hz[own],
+            x=_of(own, "speed_rpm"),
+            y=_of(own, "frequency_hz"),
             mode="markers",
             name=f"EO {order}",
             showlegend=False,
-            customdata=amplitude[own] * scale.factor,
+            customdata=sizes * scale.factor,
             marker={
-                "size": _SMALLEST + (_LARGEST - _SMALLEST) * np.sqrt(amplitude[own] / top),
-                "color": amplitude[own] * scale.factor,
+                "size": _SMALLEST + (_LARGEST - _SMALLEST) * np.sqrt(sizes / top),
+                "color": sizes * scale.factor,
                 "colorscale": _SCALE,
                 "cmin": 0.0,
                 "cmax": top * scale.factor,
@@ -118,7 +124,7 @@ def campbell_with_response(view: RunUpView) -> Plot:
     )
     figure.update_yaxes(title_text="frequency (Hz), rotating frame", range=[max(span[0] - pad, 0.0), span[1] + pad])
     caption = (
-        f"Amplitude of {view.output_name} along {counted(len(view.orders), 'engine order')}: size and colour of the circles, the largest "
+        f"Amplitude of {view.output_name} along {counted(len(found.lines), 'engine order')}: size and colour of the circles, the largest "
         f"{quantity(top, 'm')}. Each point has the stiffness, the contact state and the static preload of its own speed. Lines: natural "
         "frequencies of the waves that the engine orders excite, with all contacts stuck (solid) and open (dotted)."
     )
@@ -127,18 +133,17 @@ def campbell_with_response(view: RunUpView) -> Plot:
 
 def amplitudes(view: RunUpView) -> Plot:
     """Show the amplitude of each engine order over the speed."""
-    rpm, shares = view.floats("speed_rpm"), view.floats("slipping")
-    amplitude = view.values("amplitude", "point", "output")[:, view.output]
-    scale = scale_for(amplitude, "m")
+    scale = scale_for(view.amplitude(view.found.points), "m")
     figure = go.Figure()
-    for i, order in enumerate(view.orders):
-        own = view.own(order)
+    for i, line in enumerate(view.found.lines):
+        order = line.engine_order
+        own = view.found.along(line)
         figure.add_scatter(
-            x=rpm[own],
-            y=scale.factor * amplitude[own],
+            x=_of(own, "speed_rpm"),
+            y=scale.factor * view.amplitude(own),
             mode="lines+markers",
             name=f"EO {order}",
-            customdata=100 * shares[own],
+            customdata=100 * _of(own, "slipping"),
             line={"color": colour(i), "width": 1.6},
             marker={"size": 4},
             hovertemplate=f"EO {order}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm, %{{customdata:.0f}} % of the contacts slip<extra></extra>",
@@ -152,38 +157,36 @@ def amplitudes(view: RunUpView) -> Plot:
 
 def fast(view: RunUpView) -> Plot | None:
     """Show fast run-ups beside the steady response."""
-    if not view.has("fast_speed_rpm", "fast_amplitude"):
+    found = view.found
+    if not found.fast:
         return None
-    rpm, swept = view.floats("fast_speed_rpm"), view.floats("fast_amplitude")
-    steady = view.values("amplitude", "point", "output")[:, view.output]
-    scale = scale_for(steady, "m")
+    scale = scale_for(view.amplitude(found.points), "m")
     figure = go.Figure()
-    for i, order in enumerate(view.orders):
-        own = view.own(order)
+    for i, line in enumerate(found.lines):
+        order, own = line.engine_order, found.along(line)
         figure.add_scatter(
-            x=view.floats("speed_rpm")[own],
-            y=scale.factor * steady[own],
+            x=_of(own, "speed_rpm"),
+            y=scale.factor * view.amplitude(own),
             mode="lines",
             name=f"EO {order}, steady",
             line={"color": colour(i), "width": 2.2},
             hovertemplate=f"EO {order}, steady: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
         )
-        for j, k in enumerate(np.flatnonzero(view.integers("fast_order") == order)):
-            rate = float(view.floats("fast_rate_rpm_per_s")[k])
+        for j, swept in enumerate(one for one in found.fast if one.engine_order == order):
+            name = f"EO {order}, {swept.rate:g} rpm/s"
             figure.add_scatter(
-                x=rpm[k],
-                y=scale.factor * swept[k],
+                x=swept.speed_rpm,
+                y=scale.factor * swept.amplitude,
                 mode="lines",
-                name=f"EO {order}, {rate:g} rpm/s",
+                name=name,
                 line={"color": colour(i), "width": 1.2, "dash": _DASHES[j % len(_DASHES)]},
-                hovertemplate=f"EO {order}, {rate:g} rpm/s: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
+                hovertemplate=f"{name}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
             )
     styled(figure, 480)
     figure.update_xaxes(title_text="speed (rpm)", exponentformat="none", separatethousands=True)
     figure.update_yaxes(title_text=f"amplitude of {view.output_name} ({scale.unit})", rangemode="tozero")
-    ratios = view.floats("fast_ratio")
-    known = ratios[np.isfinite(ratios)]
-    told = f": the smallest peak is {number(100 * known.min(), 4)} % of the steady one" if known.size else ""
+    known = [one.ratio for one in found.fast if np.isfinite(one.ratio)]
+    told = f": the smallest peak is {number(100 * min(known), 4)} % of the steady one" if known else ""
     caption = (
         f"Amplitude while the speed changes at a constant rate, beside that of the steady motion{told}. Contact forces are those of the "
         "momentary amplitude; beats behind a peak are less certain than the peak."
@@ -193,25 +196,27 @@ def fast(view: RunUpView) -> Plot | None:
 
 def fast_peaks(view: RunUpView) -> Table | None:
     """Return the peaks of fast run-ups as a table."""
-    if not view.has("fast_speed_rpm"):
+    if not view.found.fast:
         return None
-    rows = []
-    for k in range(len(view.integers("fast_order"))):
-        peak, rpm, ratio, shift, off = (
-            float(view.floats(f"fast_{name}")[k])
-            for name in ("peak_amplitude", "peak_speed_rpm", "ratio", "shift_rpm", "neglected")
-        )
-        rate = float(view.floats("fast_rate_rpm_per_s")[k])
-        first = [str(view.integers("fast_order")[k]), number(rate, 6), quantity(peak, "m", 5)]
-        later = [number(ratio, 4), number(rpm, 6), number(shift, 4), percent(100 * off)]
-        rows.append([*first, *later])
+    rows = [
+        [
+            str(swept.engine_order),
+            number(swept.rate, 6),
+            quantity(swept.peak_amplitude, "m", 5),
+            number(swept.ratio, 4),
+            number(swept.peak_speed_rpm, 6),
+            number(swept.shift_rpm, 4),
+            percent(100 * swept.neglected),
+        ]
+        for swept in view.found.fast
+    ]
     head = ["engine order", "rpm/s", "peak", "of the steady one", "at rpm", "shift in rpm", "left out"]
     return Table(head, rows, "Peaks of fast run-ups")
 
 
 def static_forces(view: RunUpView) -> Plot:
     """Show how the static normal force of the contacts grows with the speed."""
-    rpm, force = (view.floats("static_speed_rpm"), view.values("static_normal_n", "line", "static_speed")[0])
+    rpm, force = view.found.static_speed_rpm, view.found.lines[0].static_normal_n
     figure = go.Figure(go.Scatter(x=rpm, y=force, mode="lines+markers", line={"color": colour(0)}, showlegend=False))
     styled(figure, 360)
     figure.update_xaxes(title_text="speed (rpm)", exponentformat="none", separatethousands=True)
@@ -226,20 +231,19 @@ def static_forces(view: RunUpView) -> Plot:
 def peaks(view: RunUpView) -> Table:
     """Return the peaks as a table."""
     rows = []
-    for i, order in enumerate(view.orders):
-        top = int(view.integers("peak_point")[i])
-        slip, power = (view.floats(name)[top] if top >= 0 else np.nan for name in ("slipping", "dissipated_w"))
+    for line in view.found.lines:
+        top = view.found.peak(line)
         rows.append(
             [
-                str(order),
-                str(view.integers("wave_number")[i]),
-                quantity(float(view.floats("peak_amplitude")[i]), "m", 5),
-                number(float(view.floats("peak_speed_rpm")[i]), 6),
-                number(float(view.floats("peak_frequency_hz")[i]), 6),
-                percent(100 * float(slip)),
-                quantity(float(power), "W"),
-                str(view.integers("failed")[i]),
-                "" if view.integers("peak_inside")[i] else "at an end of the range",
+                str(line.engine_order),
+                str(line.wave_number),
+                quantity(line.peak_amplitude, "m", 5),
+                number(line.peak_speed_rpm, 6),
+                number(line.peak_frequency_hz, 6),
+                percent(np.nan if top is None else 100 * top.slipping),
+                quantity(np.nan if top is None else top.dissipated_w, "W"),
+                str(line.failed),
+                "" if line.peak_inside else "at an end of the range",
             ]
         )
     head = ["engine order", "wave", "peak", "rpm", "Hz", "contacts that slip", "dissipated", "failed points", ""]
@@ -247,12 +251,12 @@ def peaks(view: RunUpView) -> Table:
 
 
 def _cards(view: RunUpView) -> list[Card]:
-    peak = view.floats("peak_amplitude")
-    if not np.isfinite(peak).any():
+    known = [line for line in view.found.lines if np.isfinite(line.peak_amplitude)]
+    if not known:
         return []
-    i = int(np.nanargmax(peak))
-    note = f"engine order {view.orders[i]} at {number(float(view.floats('peak_speed_rpm')[i]), 5)} rpm"
-    return [Card(quantity(float(peak[i]), "m"), "largest amplitude of the run-up", note)]
+    top = max(known, key=lambda line: line.peak_amplitude)
+    note = f"engine order {top.engine_order} at {number(top.peak_speed_rpm, 5)} rpm"
+    return [Card(quantity(top.peak_amplitude, "m"), "largest amplitude of the run-up", note)]
 
 
 _NEEDS = ("engine_orders", "speed_rpm", "amplitude", "stuck_hz")

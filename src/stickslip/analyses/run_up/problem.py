@@ -1,6 +1,6 @@
 """The problem of a job of the run-up, picklable."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, cast
@@ -9,8 +9,7 @@ import numpy as np
 
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
-from stickslip.analyses.forced_response.problem import measured, peak_first
-from stickslip.analyses.run_up.sweeps import sweep_along
+from stickslip.analyses.forced_response.problem import measured, peak_first, sweep_through
 from stickslip.analyses.run_up.table import RunUpTable
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
@@ -153,6 +152,12 @@ class Question:
     def said(self, text: str) -> str:
         """Return a sentence about the case."""
         return said(self.label, text)
+
+
+def sweep_along(settings: Any, engine_order: int, driven: Iterable[int] = (1,)) -> Sweep:
+    """Return the sweep along an engine order, as the tables of a study define it; `driven` are the harmonics of the loads."""
+    lowest, highest = (engine_order * speed for speed in settings.run_up.speeds)
+    return sweep_through(settings, settings.run_up, (lowest, highest), driven)
 
 
 def question_of(case: Case, model: Model) -> Question:

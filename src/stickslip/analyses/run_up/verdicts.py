@@ -1,14 +1,16 @@
 """Verdicts on a run-up, and the terminal tables."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from stickslip.arrays import FloatArray
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.run_up.records import FastRunUp, Line, RunUp
 from stickslip.study.analysis import TextTable
 from stickslip.study.store.netcdf import one_case
-from stickslip.study.verdict import Verdict
+from stickslip.study.verdict import Verdict, from_json
 
 TOO_FAST = 0.05  # share that slowly varying amplitudes leave out, above which there is a doubt
 BETWEEN = 1e-5  # error between the speeds of the model above which there is a doubt
@@ -19,60 +21,56 @@ UNKNOWN = Verdict(
 )
 
 
-def verdicts_of(case: xr.Dataset, label: str, limit: float) -> list[Verdict]:
-    """Return what is to be thought of a case."""
-    found = [v for i in range(case.sizes["line"]) for v in _of_line(case, i, label, limit)]
-    found += _of_fast(case, label)
-    return found or [Verdict("trusted", label, None, _followed(case))]
+def case_verdicts(label: str, found: RunUp) -> list[Verdict]:
+    """Return the verdicts on a case, with those on its models."""
+    if not found.lines:
+        return []
+    told = [replace(v, case=label) for v in (*from_json(found.doubts), UNKNOWN)]
+    own = [v for line in found.lines for v in _of_line(label, found, line)]
+    own += [v for fast in found.fast for v in _of_fast(label, fast)]
+    return [*told, *(own or [Verdict("trusted", label, None, _followed(found))])]
 
 
-def _followed(case: xr.Dataset) -> str:
-    most = float(case["error"].values[case["peak_point"].values].max())
+def _followed(found: RunUp) -> str:
+    most = max(found.points[line.peak_point].error for line in found.lines)
     return f"every engine order was followed; more harmonics are predicted to change their peaks by {100 * most:.2g} % at most"
 
 
-def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Verdict]:
-    order = int(case["engine_orders"].values[i])
-    own = case["points_order"].values == order
-    name, hertz = f"engine order {order}", float(case["peak_frequency_hz"].values[i])
-    failed, total = int(case["failed"].values[i]), int(own.sum())
-    top = int(case["peak_point"].values[i])
-    if top < 0:
+def _of_line(label: str, found: RunUp, line: Line) -> Iterator[Verdict]:
+    name, hertz, top = f"engine order {line.engine_order}", line.peak_frequency_hz, found.peak(line)
+    if top is None:
         yield Verdict(
             "wrong", label, None, f"{name}: no point has a solution", "See the forced response at one of the speeds."
         )
         return
-    if failed:
+    if line.failed:
         yield Verdict(
             "doubtful",
             label,
             None,
-            f"{name}: {failed} of {total} points have no solution",
+            f"{name}: {line.failed} of {len(found.along(line))} points have no solution",
             "Give more points, or look at a [forced_response] at such a speed.",
         )
-    error = float(case["error"].values[top])
-    if error > limit:
+    if top.error > found.limit:
         yield Verdict(
             "doubtful",
             label,
             hertz,
-            f"{name}: missing harmonics may change the peak by {100 * error:.2g} %",
+            f"{name}: missing harmonics may change the peak by {100 * top.error:.2g} %",
             "Raise harmonics.high.",
         )
-    if np.isnan(error):
-        h = int(case["harmonic"].values[top])
-        why = f"{name}: whether more harmonics than H = {h} change the peak was not examined"
+    if np.isnan(top.error):
+        why = f"{name}: whether more harmonics than H = {top.harmonic} change the peak was not examined"
         yield Verdict("doubtful", label, hertz, why, 'harmonics.high = "auto" examines it.')
-    between = float(case["speed_error"].values[i])
-    if between > BETWEEN:
+    if line.speed_error > BETWEEN:
         yield Verdict(
             "doubtful",
             label,
             None,
-            f"{name}: between the speeds at which the model was assembled its matrices are off by {between:.1e}",
+            f"{name}: between the speeds at which the model was assembled its matrices are off by {line.speed_error:.1e}",
             "Take a narrower range of speeds, or a smaller run_up.tolerance.",
         )
-    if not case["peak_inside"].values[i]:
+    if not line.peak_inside:
         yield Verdict(
             "trusted",
             label,
@@ -82,115 +80,93 @@ def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Ver
         )
 
 
-def _of_fast(case: xr.Dataset, label: str) -> Iterator[Verdict]:
-    for i in range(case.sizes.get("fast", 0)):
-        order, rate = (int(case["fast_order"].values[i]), float(case["fast_rate_rpm_per_s"].values[i]))
-        name = f"engine order {order} at {rate:g} rpm/s"
-        if not case["fast_finished"].values[i]:
-            yield Verdict(
-                "doubtful",
-                label,
-                None,
-                f"{name}: the fast run-up was not followed to its end",
-                "Take a smaller range of speeds, or another rate.",
-            )
-        elif case["fast_peak_speed_rpm"].values[i] in _ends(case["fast_speed_rpm"].values[i]):
-            # no peak was passed, whose error could be told
-            yield Verdict(
-                "trusted",
-                label,
-                None,
-                f"{name}: the largest amplitude is at an end of the range",
-                "Widen speeds_rpm to see the peak.",
-            )
-            continue
-        share = float(case["fast_neglected"].values[i])
-        if share > TOO_FAST:
-            yield Verdict(
-                "doubtful",
-                label,
-                None,
-                f"{name}: the amplitude varies so fast that {100 * share:.2g} % of its change is left out, and the peak may be off by as much",
-                "Take a slower rate, or integrate in time.",
-            )
-
-
-def _ends(speeds: FloatArray) -> FloatArray:
-    """Return the first and the last speed of a fast run-up, which may be padded with NaN."""
-    return np.asarray(speeds[np.isfinite(speeds)][[0, -1]])
+def _of_fast(label: str, fast: FastRunUp) -> Iterator[Verdict]:
+    name = f"engine order {fast.engine_order} at {fast.rate:g} rpm/s"
+    if not fast.finished:
+        yield Verdict(
+            "doubtful",
+            label,
+            None,
+            f"{name}: the fast run-up was not followed to its end",
+            "Take a smaller range of speeds, or another rate.",
+        )
+    elif fast.peak_at_end:
+        # no peak was passed, whose error could be told
+        yield Verdict(
+            "trusted",
+            label,
+            None,
+            f"{name}: the largest amplitude is at an end of the range",
+            "Widen speeds_rpm to see the peak.",
+        )
+        return
+    if fast.neglected > TOO_FAST:
+        yield Verdict(
+            "doubtful",
+            label,
+            None,
+            f"{name}: the amplitude varies so fast that {100 * fast.neglected:.2g} % of its change is left out, and the peak may be off by as much",
+            "Take a slower rate, or integrate in time.",
+        )
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints."""
-    found = []
-    for k in range(data.sizes["case"]):
-        case = one_case(data, k) if data.sizes["case"] > 1 else data.isel(case=0)
-        label = str(data["case_label"].values[k])
+    told = []
+    for k, label in enumerate(data["case_label"].values):
+        found: RunUp = record_of(RunUp, one_case(data, k))
         head = f"{label}: " if label and data.sizes["case"] > 1 else ""
-        found.append(_peaks(case, head))
-        if case.sizes.get("fast"):
-            found.append(_fast(case, head))
-    return tuple(found)
+        if found.lines:
+            told.append(_peaks(found, head))
+        if found.fast:
+            told.append(_fast(found.fast, head))
+    return tuple(told)
 
 
-def _peaks(case: xr.Dataset, head: str) -> TextTable:
+def _peaks(found: RunUp, head: str) -> TextTable:
     rows = []
-    for i, order in enumerate(case["engine_orders"].values.astype(int)):
-        own = case["points_order"].values == order
-        top = int(case["peak_point"].values[i])
-        slip = "-" if top < 0 else f"{100 * case['slipping'].values[top]:.0f} %"
+    for line in found.lines:
+        own, top = found.along(line), found.peak(line)
         rows.append(
             (
-                f"{order}",
-                f"{int(case['wave_number'].values[i])}",
-                f"{1e3 * case['peak_amplitude'].values[i]:.5g}",
-                f"{case['peak_speed_rpm'].values[i]:.6g}",
-                f"{case['peak_frequency_hz'].values[i]:.6g}",
-                slip,
-                f"{own.sum()}",
-                f"{int(case['harmonic'].values[own].max())}",
-                f"{int(case['failed'].values[i])}",
-                f"{int(case['newton_steps'].values[i])}",
-                "" if case["peak_inside"].values[i] else "end of the range",
+                f"{line.engine_order}",
+                f"{line.wave_number}",
+                f"{1e3 * line.peak_amplitude:.5g}",
+                f"{line.peak_speed_rpm:.6g}",
+                f"{line.peak_frequency_hz:.6g}",
+                "-" if top is None else f"{100 * top.slipping:.0f} %",
+                f"{len(own)}",
+                f"{max(point.harmonic for point in own)}",
+                f"{line.failed}",
+                f"{line.newton_steps}",
+                "" if line.peak_inside else "end of the range",
             )
         )
     names = ("engine order", "wave", "peak mm", "at rpm", "at Hz", "slipping", "points", "H", "failed", "Newton", "")
-    speeds = case["static_speed_rpm"].values
-    errors = float(np.max(case["speed_error"].values))
-    lines = [f"the model was assembled at {speeds.size} speeds; between them it is off by {errors:.1e} at most"]
-    if np.any(case["common_modes"].values == 1):
+    errors = max(line.speed_error for line in found.lines)
+    speeds = found.lines[0].static_normal_n.size
+    lines = [f"the model was assembled at {speeds} speeds; between them it is off by {errors:.1e} at most"]
+    if any(line.common_modes for line in found.lines):
         lines.append(
             "what the modes of three speeds span is kept at all: at some speed another mode would take the place of one kept"
         )
     return TextTable(f"{head}Run-up along engine orders", names, tuple(rows), tuple(lines))
 
 
-def _fast(case: xr.Dataset, head: str) -> TextTable:
+def _fast(every: tuple[FastRunUp, ...], head: str) -> TextTable:
     """Return the fast run-ups beside the steady peaks."""
-    columns = (
-        "order",
-        "rate_rpm_per_s",
-        "peak_amplitude",
-        "ratio",
-        "peak_speed_rpm",
-        "shift_rpm",
-        "harmonic",
-        "neglected",
-    )
     rows = tuple(
         (
-            f"{m:.0f}",
-            f"{rate:g}",
-            f"{1e3 * peak:.5g}",
-            f"{ratio:.4f}",
-            f"{rpm:.6g}",
-            f"{shift:+.4g}",
-            f"{h:.0f}",
-            f"{100 * off:.2g} %",
+            f"{fast.engine_order}",
+            f"{fast.rate:g}",
+            f"{1e3 * fast.peak_amplitude:.5g}",
+            f"{fast.ratio:.4f}",
+            f"{fast.peak_speed_rpm:.6g}",
+            f"{fast.shift_rpm:+.4g}",
+            f"{fast.harmonic}",
+            f"{100 * fast.neglected:.2g} %",
         )
-        for m, rate, peak, ratio, rpm, shift, h, off in zip(
-            *(case[f"fast_{name}"].values for name in columns), strict=True
-        )
+        for fast in every
     )
     names = ("engine order", "rpm/s", "peak mm", "of the steady one", "at rpm", "shift rpm", "H", "left out")
     return TextTable(f"{head}Fast run-up", names, rows)
