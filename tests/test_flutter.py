@@ -14,7 +14,7 @@ from test_assembly_wheel import SECTORS, sector_model, shrouded_sector
 
 import stickslip as ss
 from stickslip.analyses.page import report_html
-from stickslip.analyses.waves.flutter import _others as others
+from stickslip.analyses.waves.verdicts import others
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import flow_around
 from stickslip.assembly.fluid.aero_forces import largest_displacements, phases

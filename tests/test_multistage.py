@@ -10,7 +10,7 @@ import scipy.sparse
 from cyclic_models import wedge
 
 import stickslip as ss
-from stickslip.analyses.waves.records.results import WaveModes
+from stickslip.analyses.waves.records import WaveModes
 from stickslip.analyses.waves.stages import flange_doubts, unreached
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
@@ -145,13 +145,13 @@ def test_what_does_not_fit_is_said(stages):
 
 def test_few_harmonics_are_doubted_where_holding_the_others_changes_much():
     def found(stiffest):
-        none = np.zeros((1, 0, 3), dtype=complex)
-        return WaveModes(3, np.array([100.0]), none, np.zeros(1), 0.1, stiffest_hz=np.array(stiffest))
+        hz = np.array([100.0])
+        return WaveModes(wave_number=3, seconds=0.1, frequencies_hz=hz, growth=np.zeros(1), stiffest_hz=stiffest)
 
-    (said,) = flange_doubts([found([100.5]), found([104.0])])
+    (said,) = flange_doubts([found(np.array([100.5])), found(np.array([104.0]))])
     assert "nodal diameters 3 (up to 4 %)" in said.why
-    assert flange_doubts([found([100.5])]) == []
-    assert flange_doubts([found([])]) == []
+    assert flange_doubts([found(np.array([100.5]))]) == []
+    assert flange_doubts([found(None)]) == []
 
 
 def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):

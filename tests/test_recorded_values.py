@@ -45,9 +45,10 @@ from stickslip.analyses.run_up.records import (
     points_of,
     static_forces,
 )
-from stickslip.analyses.waves.of_wheel import variables as of_wheel
-from stickslip.analyses.waves.records.about import STATIC, skin_note
-from stickslip.analyses.waves.records.about import _static as static_numbers
+from stickslip.analyses.waves.modes import wheel_modes_in
+from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes
+from stickslip.analyses.waves.solve import STATIC, skin_note
+from stickslip.analyses.waves.solve import _static as static_numbers
 from stickslip.reduction.waves import wave
 from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC, Basins, share_interval
 from stickslip.response.all_motions.found import AllMotions, AtFrequency, MotionAt, MotionBranch
@@ -804,9 +805,10 @@ def test_modes_of_a_wheel_whose_sectors_differ() -> None:
     shares = np.array([[0.25] * 4, [0.0, 1.0, 0.0, -1e-17], [0.64, 0.16, 0.16, 0.04]])
     note = {"mistuned_hz": [10.0, 20.0, 30.0], "sector_share": shares, "wave_share": shares[:, ::-1]}
     others = np.sqrt((0.16 + 0.16 + 0.04) / 3)
-    check(of_wheel(note), mistuned_hz=[10.0, 20.0, 30.0], sector_share=shares, wave_share=shares[:, ::-1])
-    assert of_wheel(note)["mode_localisation"].values == pytest.approx([0.0, 1.0, 1.0 - others / 0.8])
-    assert of_wheel(None) == {}
+    found = variables(Modes(wheel_modes=wheel_modes_in(note)))
+    check(found, mistuned_hz=[10.0, 20.0, 30.0], sector_share=shares, wave_share=shares[:, ::-1])
+    assert found["mode_localisation"].values == pytest.approx([0.0, 1.0, 1.0 - others / 0.8])
+    assert wheel_modes_in(None) == ()
 
 
 def test_measured_peaks() -> None:
@@ -860,8 +862,12 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
 
 RECORDS = (
     FoundMotions,
+    Campbell,
+    Flutter,
+    Interference,
     LimitCycles,
     ModelFacts,
+    Modes,
     ModalSynthesis,
     NonlinearModes,
     QuasiPeriodic,

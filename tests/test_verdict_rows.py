@@ -29,8 +29,8 @@ from stickslip.analyses.resonance import verdicts as resonances
 from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.run_up import verdicts as running
 from stickslip.analyses.run_up.records import RunUp
-from stickslip.analyses.waves import doubts as waves
-from stickslip.analyses.waves.flutter import _doubts, _unstable, _unstable_wheel
+from stickslip.analyses.waves import verdicts as waves
+from stickslip.analyses.waves.verdicts import energy_doubts, unstable, unstable_wheel
 from stickslip.response.nonlinear_modes.single_mode_validity import Isolation
 from stickslip.units import HZ, RPM
 
@@ -708,7 +708,7 @@ def flutter_waves(*hertz: tuple[float, ...]) -> list[Any]:
 )
 def test_waves_that_flutter_are_told(total: Any, expected: Any) -> None:
     own = flutter_waves((100.0, 200.0), (110.0, 210.0))
-    check(_unstable(own, np.array(total), 7, SimpleNamespace(required_percent=1.0)), expected)
+    check(unstable(own, np.array(total), 7, SimpleNamespace(required_percent=1.0)), expected)
 
 
 @pytest.mark.parametrize(
@@ -723,7 +723,7 @@ def test_waves_that_flutter_are_told(total: Any, expected: Any) -> None:
 def test_a_wheel_that_flutters_is_told(damping: Any, expected: Any) -> None:
     share = np.array(damping)
     values = 50.0 * HZ / np.sqrt(1 - share**2) * (-share + 1j * np.sqrt(1 - share**2))
-    check(_unstable_wheel(values, SimpleNamespace(required_percent=1.0)), expected)
+    check(unstable_wheel(values, SimpleNamespace(required_percent=1.0)), expected)
 
 
 @pytest.mark.parametrize(
@@ -731,8 +731,8 @@ def test_a_wheel_that_flutters_is_told(damping: Any, expected: Any) -> None:
     [(0.1, []), (above(0.1), [("doubtful", "differ by up to 10 % of critical", "trust the eigen")])],
 )
 def test_energy_and_eigenvalue_are_held_against_each_other(off: float, expected: Any) -> None:
-    check(_doubts(np.array([[off, 1.0]]), np.array([[0.0, 1.0]])), expected)
-    check(_doubts(np.array([[0.0, 1.0]]), np.array([[off, 1.0]])), expected)
+    check(energy_doubts(np.array([[off, 1.0]]), np.array([[0.0, 1.0]])), expected)
+    check(energy_doubts(np.array([[0.0, 1.0]]), np.array([[off, 1.0]])), expected)
 
 
 def test_a_basis_of_a_campbell_diagram_is_doubted_beyond_its_error() -> None:

@@ -12,7 +12,7 @@ from cyclic_models import unlike_wedge
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
-from stickslip.analyses.waves.records.results import Wheel
+from stickslip.analyses.waves.records import Wheel
 from stickslip.analyses.waves.solve import Question, solve_wave
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
@@ -133,7 +133,7 @@ def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
 def test_basis_that_is_too_small_is_told(joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # two modes and none to spare, over a range in which the shapes change
     monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE_MODES", 0)
-    monkeypatch.setattr("stickslip.analyses.waves.doubts.BASIS_ERROR", 1e-9)
+    monkeypatch.setattr("stickslip.analyses.waves.verdicts.BASIS_ERROR", 1e-9)
     outcome = done(study(tmp_path, {"campbell.engine_orders": "[2]"}), "campbell")
     said = "wave number 2: frequencies between the speeds of the basis are off"
     assert any(v.why.startswith(said) for v in outcome.verdicts)

@@ -15,14 +15,15 @@ from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.waves.page.campbell import campbell_diagram
 from stickslip.analyses.waves.page.safe import interference, safe_diagram, zigzag
 from stickslip.analyses.waves.page.shapes import coarse_skin
-from stickslip.analyses.waves.page.waves import Waves
+from stickslip.analyses.waves.page.waves import Waves, view_of
+from stickslip.analyses.waves.records import Campbell, Interference
 
 TITLE = "A <flat> ring & nothing else"
 
 
-def view(data: xr.Dataset) -> Waves:
+def view(kind: type, data: xr.Dataset) -> Waves:
     """Return the first case of a node."""
-    return Waves(data.isel(case=0))
+    return view_of(kind)(data.isel(case=0))
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +133,7 @@ def test_choosing_a_case_shows_its_chapter(browser: Browser, tmp_path: Path) -> 
 
 
 def test_every_line_of_a_campbell_diagram_can_be_told_without_colours() -> None:
-    plot = campbell_diagram(view(campbell_result()))
+    plot = campbell_diagram(view(Campbell, campbell_result()))
     lines = [t for t in plot.figure.data if t.mode == "lines+markers+text"]
     labels = [[text for text in line.text if text] for line in lines]
     assert labels == [[f"ND {k}, {m}"] for k in (2, 3) for m in (1, 2, 3)]
@@ -153,7 +154,7 @@ def test_orders_that_leave_the_picture_or_the_modes_are_named() -> None:
     highest = float(data.frequency_hz.max())
     hidden = [m for m in (2, 3, 5, 6) if m * 200.0 > 1.06 * highest]  # at 12000 rpm
     assert hidden
-    plot = campbell_diagram(view(data))
+    plot = campbell_diagram(view(Campbell, data))
     assert f"the lines of {', '.join(f'EO {m}' for m in hidden)}." in plot.caption
     assert "EO 6 from 4321 rpm" in plot.caption
 
@@ -162,7 +163,7 @@ def test_orders_that_are_not_judged_are_crossed_out() -> None:
     data = safe_result(0.1)
     data["pair_judged"] = (data.pair_engine_order != 12).astype(int)
     data["pair_resonance_rpm"] = variable("case pair", np.full((1, data.sizes["pair"]), np.inf), "rpm")
-    result = view(data)
+    result = view(Interference, data)
     plot = safe_diagram(result)
     orders = next(t for t in plot.figure.data if t.name == "engine orders asked")
     crossed = [t.strip() for t, s in zip(orders.text, orders.marker.symbol, strict=True) if "x" in s]

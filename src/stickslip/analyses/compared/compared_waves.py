@@ -5,6 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 import plotly.graph_objects as go
+import xarray as xr
 from plotly.subplots import make_subplots
 
 from stickslip.analyses.compared.designs import Design
@@ -12,7 +13,8 @@ from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
 from stickslip.analyses.nonlinear_mode.page import Modes
 from stickslip.analyses.nonlinear_mode.page import table as mode_table
 from stickslip.analyses.waves.page.flutter import margins
-from stickslip.analyses.waves.page.waves import Waves
+from stickslip.analyses.waves.page.waves import view_of
+from stickslip.analyses.waves.records import Flutter
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, Plot, styled
 from stickslip.report.quantities import NONE, scale_for
@@ -24,7 +26,7 @@ _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def told_by(
-    designs: Sequence[Design], name: str, kind: type[View], needed: Sequence[str]
+    designs: Sequence[Design], name: str, kind: Callable[[xr.Dataset], View], needed: Sequence[str]
 ) -> list[tuple[Design, str, View]]:
     """Return every case of the designs with an analysis: design, label, view."""
     found = []
@@ -94,15 +96,15 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
 
 def flutter(designs: Sequence[Design]) -> list[Content]:
     """Return figure and table of the flutter margins: damping over the phase angle, and all waves."""
-    views = told_by(designs, "flutter", Waves, ("phase_angle_deg", "damping", "frequency_hz"))
+    views = told_by(designs, "flutter", view_of(Flutter), ("phase_angle_deg", "damping", "frequency_hz"))
     if not views:
         return []
     figure = go.Figure()
     for k, (design, label, view) in enumerate(views):
         before = sum(own is design for own, _, _ in views[:k])
-        angle = view.floats("phase_angle_deg")
+        angle = np.array([w.phase_angle_deg for w in view.found.waves])
         order = np.argsort(angle, kind="stable")
-        for m, own in enumerate(100.0 * view.floats("damping").T):
+        for m, own in enumerate(100.0 * view.found.damping.T):
             name = ", ".join(word for word in (design.name, label, f"mode {m + 1}") if word)
             figure.add_scatter(
                 x=angle[order],

@@ -11,7 +11,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
-from stickslip.analyses.waves.page.waves import Waves
+from stickslip.analyses.waves.page.waves import Waves, view_of
+from stickslip.analyses.waves.records import Modes
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.readers.measured_columns import LENGTHS, read_columns
@@ -58,12 +59,12 @@ class Design:
         return Response(data) if known else None
 
     @cached_property
-    def modes(self) -> Waves | None:
+    def modes(self) -> Waves[Modes] | None:
         """Its modes in the first case; None without them."""
         if "modes" not in self.tree.children:
             return None
         data = analysis(self.tree, "modes")
-        return Waves(data.isel(case=0) if "case" in data.dims else data)
+        return view_of(Modes)(data.isel(case=0) if "case" in data.dims else data)
 
     @cached_property
     def inputs(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.content import Table, Words, chooser
@@ -308,7 +309,7 @@ def frequencies(designs: Sequence[Design]) -> Table | None:
     if len(told) < 2:
         return None
     known = [
-        {(w, m): float(f) for w, row in zip(v.waves, v.floats("frequency_hz"), strict=True) for m, f in enumerate(row)}
+        {(w, m): float(f) for w, row in zip(v.waves, hertz(v.found), strict=True) for m, f in enumerate(row)}
         for _, v in told
     ]
     rows = []

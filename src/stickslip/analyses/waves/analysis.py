@@ -1,19 +1,26 @@
 """The common part of the analyses by waves."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
-from stickslip.analyses.waves.records.dataset import Variables, dataset
+from stickslip.analyses.columns import variables
+from stickslip.analyses.facts import NOTE, ModelFacts, facts_in
+from stickslip.analyses.waves.records import wave_name
 from stickslip.analyses.waves.solve import Question, each_wave
-from stickslip.analyses.waves.texts import of_cases
+from stickslip.analyses.waves.verdicts import summary
 from stickslip.assembly.model import Model
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, TextTable
-from stickslip.study.verdict import Verdict
+from stickslip.study.store.netcdf import stacked
+from stickslip.study.verdict import ATTRIBUTE, Verdict, from_json, of_all_cases, to_json
 
 Solve = Callable[[Any, Sequence[Any], Notes], Iterator[Any]]
+Answer = Callable[[Solved, Mapping[str, Any]], tuple[ModelFacts, list[Verdict]]]
+LABELS = {"xyz": ["x", "y", "z"], "part": ["re", "im"]}
 
 
 def wave_analysis(
@@ -22,8 +29,8 @@ def wave_analysis(
     record: type[Any],
     inputs: Callable[[Case, Model], Any],
     solve: Solve,
-    variables: Callable[[Solved], tuple[Variables, list[Verdict]]],
-    tables: Callable[[xr.Dataset], Sequence[TextTable]],
+    answer: Answer,
+    tables: tuple[type[Any], Callable[[Any], Sequence[TextTable]]],
     *,
     compared: frozenset[str] = frozenset(),
 ) -> Analysis:
@@ -33,13 +40,14 @@ def wave_analysis(
     ----------
     name, table, record, inputs, solve
         As in `Analysis`.
-    variables
-        Returns the variables of a case beside those of its model and waves, and its verdicts.
+    answer
+        Returns the record of a case and its verdicts from the content of its job and the facts of its model.
     tables
-        Returns the terminal tables of a case.
+        Class of the record of a case, and the function that returns its terminal tables.
     compared
         Keys of the table for reference data, on which no record depends.
     """
+    kind, tables_of = tables
     return Analysis(
         name=name,
         table=table,
@@ -47,11 +55,37 @@ def wave_analysis(
         key=partial(_key, name=name, left_out=compared),
         inputs=inputs,
         solve=solve,
-        dataset=partial(dataset, of_case=variables),
+        dataset=partial(dataset, answer=answer),
         check=partial(_check, name=name, inputs=inputs),
-        summary=partial(of_cases, tables=tables),
+        summary=partial(summary, kind=kind, tables=tables_of),
         linear=True,
     )
+
+
+def dataset(solved: Sequence[Solved], answer: Answer) -> xr.Dataset:
+    """Return the dataset of all cases; `answer` as in `wave_analysis`."""
+    cases = []
+    doubts: list[Verdict] = []
+    for one in solved:
+        facts = facts_in(one.notes)
+        own, said = (
+            answer(_with_names(one, int(facts.get("sectors", 1))), facts) if one.records else (ModelFacts(**facts), [])
+        )
+        cases.append(variables(own))
+        noted = from_json(one.notes.get(NOTE, {}).get("verdicts", "[]"))
+        doubts += [replace(v, case=one.case.label) for v in (*noted, *said)]
+    data = stacked(cases)
+    sizes = {dim: size for v in data.values() for dim, size in v.sizes.items()}
+    coordinates: dict[str, Any] = {"mode": np.arange(1, sizes.get("mode", 0) + 1), **LABELS}
+    used = {name: values for name, values in coordinates.items() if name in sizes}
+    every = of_all_cases(doubts, [s.case.label for s in solved])
+    return xr.Dataset(data, coords=used, attrs={ATTRIBUTE: to_json(every)})
+
+
+def _with_names(one: Solved, sectors: int) -> Solved:
+    """Add nodal diameters and kinds to the waves."""
+    named = ((w, *wave_name(w.wave_number, sectors)) for w in one.records)
+    return replace(one, records=tuple(replace(w, nodal_diameter=d, kind=kind) for w, d, kind in named))
 
 
 def solved_by(of_wave: Callable[[Question, int], Any]) -> Solve:

@@ -1,21 +1,19 @@
 """Natural frequencies against rotor speed, and their crossings with engine orders."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from stickslip.analyses.facts import NOTE
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
-from stickslip.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
-from stickslip.analyses.waves.records.dataset import Variables, frequencies
-from stickslip.analyses.waves.records.results import WaveBranches, Wheel
+from stickslip.analyses.waves.records import Campbell, Unfollowed, WaveBranches, Wheel
 from stickslip.analyses.waves.solve import Question, follow_wave, in_still_fluid
 from stickslip.analyses.waves.tables import CampbellTable
-from stickslip.analyses.waves.texts import campbell_tables
+from stickslip.analyses.waves.verdicts import basis_doubts, campbell_doubts, campbell_tables, unfollowed_from
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.study.analysis import Case, Solved
-from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import Verdict
 from stickslip.units import RPM
 
@@ -27,15 +25,20 @@ def _numbers(asked: CampbellTable, wheel: Wheel) -> tuple[int, ...]:
     return tuple(sorted({wheel.diagram(m) for m in asked.engine_orders}))
 
 
-def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
+def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Verdict]]:
     asked: CampbellTable = solved.case.settings.campbell
-    waves: Sequence[WaveBranches] = solved.records
-    told = solved.notes["model"]
-    wheel = Wheel(int(told["sectors"]), bool(told["parted"]))
+    waves: tuple[WaveBranches, ...] = tuple(solved.records)
+    wheel = Wheel(int(facts["sectors"]), bool(solved.notes[NOTE]["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
     unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel))
-    doubts = [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
-    return _curves(waves, asked) | _crossings(waves) | _beyond(beyond), doubts
+    found = Campbell(
+        **facts,
+        speeds_rpm=np.array(asked.speeds) / RPM,
+        waves=waves,
+        engine_orders=np.array(asked.engine_orders),
+        unfollowed=tuple(Unfollowed(engine_order=m, from_rpm=rpm) for m, rpm in beyond),
+    )
+    return found, [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
 
 
 def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable) -> list[tuple[int, float]]:
@@ -48,43 +51,6 @@ def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTabl
         if rpm is not None:
             found.append((order, rpm))
     return found
-
-
-def _curves(waves: Sequence[WaveBranches], asked: CampbellTable) -> Variables:
-    orders, error = asked.engine_orders, [w.error for w in waves]
-    about = "natural frequency in the rotating frame"
-    return {
-        "speed_rpm": variable("speed", np.array(asked.speeds) / RPM, "rpm", "speed of the rotor"),
-        "engine_orders": variable("order", orders, "1", "engine order whose crossings are looked for"),
-        "frequency_hz": variable("wave speed mode", frequencies(waves), "Hz", about),
-        "basis_error": variable("wave", error, "1", "relative error of frequencies between speeds"),
-    }
-
-
-def _crossings(waves: Sequence[WaveBranches]) -> Variables:
-    which = np.repeat(np.arange(len(waves)), [len(w.modes) for w in waves])
-
-    def every(name: str) -> Any:
-        return np.concatenate([getattr(w, name) for w in waves])
-
-    found = {
-        "wave": (which, "1", "index of the wave"),
-        "mode": (every("modes"), "1", "index of the mode"),
-        "engine_order": (every("engine_orders"), "1", "engine order that crosses"),
-        "speed_rpm": (every("speeds") / RPM, "rpm", "speed of the crossing"),
-        "frequency_hz": (every("crossings_hz"), "Hz", "frequency of the crossing"),
-    }
-    return {f"crossing_{name}": variable("crossing", *of) for name, of in found.items()}
-
-
-def _beyond(unfollowed: Sequence[tuple[int, float]]) -> Variables:
-    orders = np.array([m for m, _ in unfollowed], dtype=np.int64)
-    speeds = np.array([rpm for _, rpm in unfollowed], dtype=float)
-    about = "engine order that goes beyond the followed modes of its nodal diameter"
-    return {
-        "unfollowed_engine_order": variable("unfollowed", orders, "1", about),
-        "unfollowed_from_rpm": variable("unfollowed", speeds, "rpm", "speed from which it does"),
-    }
 
 
 def _inputs(case: Case, model: Model) -> Question:
@@ -117,6 +83,6 @@ CAMPBELL = wave_analysis(
     WaveBranches,
     _inputs,
     solved_by(follow_wave),
-    _of_case,
-    campbell_tables,
+    _answer,
+    (Campbell, campbell_tables),
 )

@@ -1,16 +1,15 @@
 """Natural frequencies and mode shapes: of each nodal diameter of a wheel, or of a structure as a whole."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from stickslip.analyses.forced_response.records.bounds import localisation
 from stickslip.analyses.waves.analysis import counted, wave_analysis
-from stickslip.analyses.waves.of_wheel import NOTE, variables
-from stickslip.analyses.waves.of_wheel import solved as solved_wheel
-from stickslip.analyses.waves.records.dataset import Variables, frequencies, growth
-from stickslip.analyses.waves.records.results import WaveModes, Wheel
+from stickslip.analyses.waves.records import Modes, WaveModes, Wheel, WheelMode
 from stickslip.analyses.waves.reference import Reference, read_reference
 from stickslip.analyses.waves.solve import Question, each_wave, solve_wave
 from stickslip.analyses.waves.stages import (
@@ -21,15 +20,15 @@ from stickslip.analyses.waves.stages import (
     unreached,
 )
 from stickslip.analyses.waves.tables import ModesTable
-from stickslip.analyses.waves.texts import modes_tables
-from stickslip.arrays import FloatArray
+from stickslip.analyses.waves.verdicts import modes_tables
 from stickslip.assembly.model import Model
+from stickslip.assembly.sides.wheel_modes import wheel_modes
 from stickslip.errors import input_error
-from stickslip.response.rotating.flutter import damping_ratio
 from stickslip.study.analysis import Case, Notes, Solved
-from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import Verdict
-from stickslip.units import HZ, RPM
+from stickslip.units import RPM
+
+WHEEL = "mistuned"  # note of a job with the modes of a wheel whose sectors differ
 
 
 def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
@@ -39,74 +38,52 @@ def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
     return read_reference(home / asked.reference, asked.reference_case)
 
 
-def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
-    waves: Sequence[WaveModes] = solved.records
-    hertz = frequencies(waves)
-    found = {"frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"), "growth": growth(waves)}
-    more = _of_stages(waves) | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves)
-    of_wheel = variables(solved.notes.get(NOTE))
-    return found | more | of_wheel, [*flange_doubts(waves), *_of_other_speed(solved)]
+def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Modes, list[Verdict]]:
+    known = _compared_with(solved.case.settings.modes, solved.case.home)
+    waves = _compared([_with_shape(w) for w in solved.records], known, int(facts["sectors"]))
+    found = Modes(**facts, waves=waves, wheel_modes=wheel_modes_in(solved.notes.get(WHEEL)))
+    return found, [*flange_doubts(waves), *_of_other_speed(known, float(facts["speed_rpm"]))]
 
 
-def _of_stages(waves: Sequence[WaveModes]) -> Variables:
-    """Return the energy share of each stage; empty for a single wheel."""
-    shares = np.array([w.shares.T for w in waves])
-    if not shares.size:
-        return {}
-    stiffest = np.array([w.stiffest_hz for w in waves])
-    return {
-        "stage_share": variable("wave mode stage", shares, "1", "share of a stage in the kinetic energy"),
-        "stiffest_hz": variable(
-            "wave mode", stiffest, "Hz", "natural frequency with all harmonics held that flanges do not couple"
-        ),
-    }
+def _with_shape(found: WaveModes) -> WaveModes:
+    """Return a wave with its shapes as real and imaginary parts."""
+    parts = np.stack([found.shapes.real, found.shapes.imag], axis=-1).astype(np.float32)
+    return replace(found, shape=parts) if parts.size else found
 
 
-def _in_flow(waves: Sequence[WaveModes]) -> Variables:
-    """Return damping and frequency of the eigenvalues with aerodynamic forces; empty without such forces."""
-    values = np.array([w.in_flow for w in waves])
-    if not values.size:
-        return {}
-    about = "of the eigenvalue with aerodynamic forces and the structure's damping"
-    return {
-        "damping": variable("wave mode", damping_ratio(values), "1", f"damping ratio {about}"),
-        "damped_hz": variable("wave mode", values.imag / HZ, "Hz", f"frequency {about}"),
-    }
-
-
-def _compared(solved: Solved, hertz: FloatArray) -> Variables:
-    asked: ModesTable = solved.case.settings.modes
-    known = _compared_with(asked, solved.case.home)
+def _compared(waves: Sequence[WaveModes], known: Reference | None, sectors: int) -> tuple[WaveModes, ...]:
+    """Return the waves with their reference frequencies."""
     if known is None:
-        return {}
-    numbers = [w.wave_number for w in solved.records]
-    reference = known.of_waves(numbers, hertz.shape[1], int(solved.notes["model"]["sectors"]))
-    off = hertz / reference - 1
-    return {
-        "reference_hz": variable("wave mode", reference, "Hz", "frequency to compare with"),
-        "difference": variable("wave mode", off, "1", "relative difference from the reference"),
-    }
+        return tuple(waves)
+    reference = known.of_waves([w.wave_number for w in waves], len(waves[0].frequencies_hz), sectors)
+    pairs = zip(waves, reference, strict=True)
+    return tuple(replace(w, reference_hz=own, difference=w.frequencies_hz / own - 1) for w, own in pairs)
 
 
-def _of_other_speed(solved: Solved) -> list[Verdict]:
+def wheel_modes_in(note: Mapping[str, Any] | None) -> tuple[WheelMode, ...]:
+    """Return the modes of a mistuned wheel from the note of a job; none for a tuned one."""
+    if not note:
+        return ()
+    each = zip(*(np.asarray(note[n]) for n in ("mistuned_hz", "sector_share", "wave_share")), strict=True)
+    return tuple(
+        WheelMode(
+            frequency_hz=hertz,
+            sector_share=sectors,
+            wave_share=waves,
+            localisation=localisation(np.sqrt(np.maximum(sectors, 0.0))),
+        )
+        for hertz, sectors, waves in each
+    )
+
+
+def _of_other_speed(known: Reference | None, rpm: float) -> list[Verdict]:
     """Report reference frequencies at another speed."""
-    asked: ModesTable = solved.case.settings.modes
-    known, rpm = _compared_with(asked, solved.case.home), float(solved.notes["model"]["speed_rpm"])
     others = known.not_at(rpm) if known is not None else ()
     if not others:
         return []
     speeds = ", ".join(f"{s:g} rpm" for s in others)
     why = f"the frequencies of modes.reference are of {speeds}, those of [modes] of {rpm:g} rpm: the differences hold what the speed does"
     return [Verdict("trusted", why=why, remedy="Compare at the same speed.")]
-
-
-def _shapes(waves: Sequence[WaveModes]) -> Variables:
-    shapes = np.stack([w.shapes for w in waves])
-    if not shapes.size:
-        return {}
-    parts = np.stack([shapes.real, shapes.imag], axis=-1).astype(np.float32)
-    about = "displacement of sector 0, largest is 1"
-    return {"shape": variable("wave mode skin_point xyz part", parts, "1", about)}
 
 
 def _inputs(case: Case, model: Model) -> Question | StagesQuestion:
@@ -142,8 +119,11 @@ def _solve(inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: 
         yield from each_diameter(inputs, done, notes)
         return
     yield from each_wave(solve_wave, inputs, done, notes)
-    if inputs.model.mistuning is not None and notes.get(NOTE) is None:
-        notes.put(NOTE, solved_wheel(inputs))
+    model = inputs.model
+    if model.mistuning is not None and notes.get(WHEEL) is None:  # as many a blade as the table asks for a wave
+        found = wheel_modes(model, inputs.n_modes * model.sectors, inputs.contacts)
+        arrays = found.frequencies_hz, found.sector_share, found.wave_share
+        notes.put(WHEEL, dict(zip(("mistuned_hz", "sector_share", "wave_share"), arrays, strict=True)))
 
 
 def _unreached(asked: Question | StagesQuestion) -> list[str]:
@@ -175,8 +155,8 @@ MODES = replace(
         WaveModes,
         _inputs,
         _solve,
-        _of_case,
-        modes_tables,
+        _answer,
+        (Modes, modes_tables),
         compared=frozenset({"reference", "reference_case"}),
     ),
     check=_check,

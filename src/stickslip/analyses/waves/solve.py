@@ -5,20 +5,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy
 
-from stickslip.analyses.facts import NOTE
-from stickslip.analyses.waves.records.about import about, skin_note
-from stickslip.analyses.waves.records.results import WaveBranches, WaveFlutter, WaveModes, Wheel
+from stickslip.analyses.facts import NOTE, facts_of
+from stickslip.analyses.waves.records import Crossing, WaveBranches, WaveFlutter, WaveModes, Wheel
+from stickslip.analyses.waves.verdicts import static_doubts
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.fluid.aero_forces import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.parts.reduced import stiffening
 from stickslip.assembly.sides.waves import damping_by_modes
+from stickslip.assembly.statics import StaticState
 from stickslip.errors import input_error
 from stickslip.model.damping import Damping
 from stickslip.model.gyroscopic import gyroscopic_modes
@@ -27,11 +28,13 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
-from stickslip.response.rotating.flutter import FlutterOfWave, flutter_of_wave
+from stickslip.response.rotating.flutter import FlutterOfWave, damping_ratio, flutter_of_wave
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import advance
-from stickslip.study.verdict import Verdict
+from stickslip.study.verdict import Verdict, doubt, to_json
+from stickslip.units import HZ, RPM
 
+STATIC = ("static_rpm", "static_displacement_m", "static_strain", "static_rotation_rad")
 FLUID = "the aerodynamic coefficients play no part: frequencies are those in still fluid"
 ALIKE = "mistuning plays no part: frequencies are those of the wheel with all sectors alike"
 
@@ -180,6 +183,48 @@ class Question:
         return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
 
 
+def about(
+    model: Model, contacts: ContactsAs, rpm: float, highest: float, more: Sequence[Verdict] = ()
+) -> dict[str, Any]:
+    """Return the note about a model.
+
+    Parameters
+    ----------
+    model
+        The model.
+    contacts
+        State of its contacts: stuck, sliding or open.
+    rpm
+        Speed of the rotor; NaN for a range.
+    highest
+        Speed of the reported static displacement, rad/s.
+    more
+        Additional entries of the note.
+    """
+    state = model.static_state(highest)
+    doubts = static_doubts(state, contacts=bool(model.contacts))
+    note = facts_of(model, rpm) | {
+        "speed_rpm": rpm,
+        "contacts": contacts if model.contacts else "none",
+        "verdicts": to_json([*map(doubt, model.warnings), *doubts, *more]),
+    }
+    return note | _static(state)
+
+
+def _static(state: StaticState | None) -> dict[str, float]:
+    if state is None:
+        return dict.fromkeys(STATIC, np.nan)
+    found = state.speed / RPM, state.displacement, state.strain, state.rotation
+    return dict(zip(STATIC, found, strict=True))
+
+
+def skin_note(model: Model) -> dict[str, Any]:
+    """Return the note about the skin, for drawings of mode shapes."""
+    skin = model.skin
+    assert skin is not None
+    return {"skin_point": skin.points, "skin_triangle": skin.triangles, "skin_cut": skin.cut}
+
+
 def each_wave(solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes) -> Iterator[W]:
     """Yield the records of unfinished waves; the note about the model comes first."""
     if notes.get(NOTE) is None:
@@ -223,8 +268,11 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
         moved = unit_shapes(moved, _own_points(asked.model))
     growth = _growth(asked, structure, hertz, vectors)
     flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
-    found = WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
-    return found if flow is None else replace(found, in_flow=flow.damped)
+    seconds = perf_counter() - began
+    found = WaveModes(wave_number=wave_number, seconds=seconds, frequencies_hz=hertz, growth=growth, shapes=moved)
+    if flow is None:
+        return found
+    return replace(found, damping=damping_ratio(flow.damped), damped_hz=flow.damped.imag / HZ)
 
 
 def _growth(asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix) -> FloatArray:
@@ -278,14 +326,13 @@ def follow_wave(asked: Question, wave_number: int) -> WaveBranches:
         coriolis=coriolis,
     )
     found = campbell(small.at, speeds, asked.n_modes, orders, coriolis=coriolis)
-    crossings = found.crossings
     return WaveBranches(
-        wave_number,
-        found.frequencies_hz,
-        np.array([c.engine_order for c in crossings], dtype=np.int64),
-        np.array([c.mode for c in crossings], dtype=np.int64),
-        np.array([c.speed for c in crossings]),
-        np.array([c.frequency_hz for c in crossings]),
-        small.error,
-        perf_counter() - began,
+        wave_number=wave_number,
+        seconds=perf_counter() - began,
+        frequencies_hz=found.frequencies_hz,
+        error=small.error,
+        crossings=tuple(
+            Crossing(mode=c.mode, engine_order=c.engine_order, speed_rpm=c.speed / RPM, frequency_hz=c.frequency_hz)
+            for c in found.crossings
+        ),
     )

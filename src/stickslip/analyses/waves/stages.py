@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyses.facts import NOTE, facts_of
-from stickslip.analyses.waves.records.about import STATIC
-from stickslip.analyses.waves.records.results import WaveModes
+from stickslip.analyses.waves.records import WaveModes
+from stickslip.analyses.waves.solve import STATIC
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.facts import facts_of_part
@@ -81,19 +81,18 @@ def _solved(asked: StagesQuestion, number: int) -> WaveModes:
     began = perf_counter()
     found = multistage_modes(asked.assembly, number, asked.n_modes)
     return WaveModes(
-        number,
-        found.frequencies_hz,
-        np.zeros((asked.n_modes, 0, 3), dtype=complex),
-        np.zeros(asked.n_modes),
-        perf_counter() - began,
-        shares=found.shares,
+        wave_number=number,
+        seconds=perf_counter() - began,
+        frequencies_hz=found.frequencies_hz,
+        growth=np.zeros(asked.n_modes),
+        shares=found.shares.T,
         stiffest_hz=found.stiffest_hz,
     )
 
 
 def flange_doubts(waves: Sequence[WaveModes]) -> list[Verdict]:
     """Doubt frequencies that the uncoupled harmonics of the flanges could change."""
-    off = {w.wave_number: w.stiffest_hz / w.frequencies_hz - 1 for w in waves if w.stiffest_hz.size}
+    off = {w.wave_number: w.stiffest_hz / w.frequencies_hz - 1 for w in waves if w.stiffest_hz is not None}
     poor = [f"{k} (up to {100 * d.max():.2g} %)" for k, d in off.items() if d.max() > LEFT_OUT]
     if not poor:
         return []

@@ -183,7 +183,7 @@ def _nearest(
 def least_stable_curve(
     influence: InfluenceCoefficients,
     angles: FloatArray,
-    waves: Sequence[FlutterOfWave],
+    waves: Sequence[tuple[FloatArray, ComplexArray]],
     phase_angles: FloatArray,
     reference: float,
 ) -> FloatArray:
@@ -196,7 +196,7 @@ def least_stable_curve(
     angles
         (a,) in rad.
     waves
-        Waves of the wheel.
+        Frequencies (n,), rad/s, and amplitudes (n, m) of the modes at the phase angles that the wheel has.
     phase_angles
         (w,) theirs, in rad.
     reference
@@ -212,8 +212,8 @@ def least_stable_curve(
     wrapped = np.concatenate([known[-1:] - turn, known, known[:1] + turn])
     own = [waves[i] for i in order]
     own = [own[-1], *own, own[0]]
-    omegas = np.array([w.frequencies for w in own])
-    work = np.array([np.einsum("ni,nj->nij", w.amplitudes, w.amplitudes.conj()) for w in own])
+    omegas = np.array([frequencies for frequencies, _ in own])
+    work = np.array([np.einsum("ni,nj->nij", amplitudes, amplitudes.conj()) for _, amplitudes in own])
     out = np.empty((omegas.shape[1], angles.size))
     for a, angle in enumerate(np.mod(angles, turn)):
         right = int(np.clip(np.searchsorted(wrapped, angle), 1, wrapped.size - 1))

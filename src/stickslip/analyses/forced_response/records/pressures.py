@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stickslip.analyses.waves.records.results import label
+from stickslip.analyses.waves.records import label
 from stickslip.arrays import ComplexArray
 from stickslip.assembly.build import holding_points
 from stickslip.assembly.fluid.aero_forces import own_dofs, phases

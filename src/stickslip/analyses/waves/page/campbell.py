@@ -3,7 +3,8 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.waves.page.waves import NEEDED, Waves
+from stickslip.analyses.waves.page.waves import NEEDED, Waves, view_of
+from stickslip.analyses.waves.records import Campbell
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, MUTED, Plot, ring, styled
@@ -37,8 +38,8 @@ def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
     return speed, side
 
 
-def _branches(view: Waves) -> list[go.Scatter]:
-    rpm, hz = view.floats("speed_rpm"), view.floats("frequency_hz")
+def _branches(view: Waves[Campbell]) -> list[go.Scatter]:
+    rpm, hz = view.found.speeds_rpm, np.array([w.frequencies_hz for w in view.found.waves])
     pairs = zip(view.waves, view.colours, strict=True)
     at, side = _label_places(hz, float(np.nanmax(hz)))
     return [
@@ -62,11 +63,11 @@ def _branches(view: Waves) -> list[go.Scatter]:
     ]
 
 
-def _orders(view: Waves, top: float) -> list[go.Scatter]:
+def _orders(view: Waves[Campbell], top: float) -> list[go.Scatter]:
     """Draw the engine-order lines inside the figure, each with its name at the end."""
-    last, first = view.floats("speed_rpm").max(), view.floats("speed_rpm").min()
+    last, first = view.found.speeds_rpm.max(), view.found.speeds_rpm.min()
     traces = []
-    for index, order in enumerate(view.numbers("engine_orders").astype(int)):
+    for index, order in enumerate(view.found.engine_orders.astype(int)):
         end = last if order == 0 else min(last, top * 60 / order)
         if end <= first:
             continue
@@ -90,15 +91,12 @@ def _orders(view: Waves, top: float) -> list[go.Scatter]:
     return traces
 
 
-def _crossings(view: Waves) -> go.Scatter:
-    names = view.waves
-    each = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
-    found = zip(*each, strict=True)
-    text = [f"EO {order} meets {names[w]}, mode {mode + 1}" for order, w, mode in found]
+def _crossings(view: Waves[Campbell]) -> go.Scatter:
+    names, found = view.waves, view.found.crossings
     return go.Scatter(
-        x=view.floats("crossing_speed_rpm"),
-        y=view.floats("crossing_frequency_hz"),
-        text=text,
+        x=np.array([c.speed_rpm for _, c in found]),
+        y=np.array([c.frequency_hz for _, c in found]),
+        text=[f"EO {c.engine_order} meets {names[w]}, mode {c.mode + 1}" for w, c in found],
         mode="markers",
         name="crossings",
         marker=ring(INK, 12, 2),
@@ -106,19 +104,17 @@ def _crossings(view: Waves) -> go.Scatter:
     )
 
 
-def _not_shown(view: Waves, top: float) -> str:
+def _not_shown(view: Waves[Campbell], top: float) -> str:
     """Name the engine orders that leave the figure, and the speed from which their crossings are unknown."""
-    last, first = float(view.floats("speed_rpm").max()), float(view.floats("speed_rpm").min())
-    asked = [int(m) for m in view.numbers("engine_orders")]
+    last, first = float(view.found.speeds_rpm.max()), float(view.found.speeds_rpm.min())
+    asked = [int(m) for m in view.found.engine_orders]
     cut = [f"EO {m}" for m in asked if first < top * 60 / m < last]
     outside = [f"EO {m}" for m in asked if top * 60 / m <= first]
     text = f" Cut at the upper edge of the picture: the lines of {', '.join(cut)}." if cut else ""
     if outside:
         text += f" Above the picture at all speeds: {', '.join(outside)}."
-    if view.has("unfollowed_engine_order", "unfollowed_from_rpm"):
-        orders, lowest = (view.numbers(f"unfollowed_{k}") for k in ("engine_order", "from_rpm"))
-        each = zip(orders, lowest, strict=True)
-        named = [f"EO {order:.0f} from {rpm:.4g} rpm" for order, rpm in each]
+    if view.found.unfollowed:
+        named = [f"EO {own.engine_order} from {own.from_rpm:.4g} rpm" for own in view.found.unfollowed]
         text += (
             " **Not judged**, because they lie above the followed modes of the nodal diameters that they excite: "
             f"{', '.join(named)}."
@@ -126,12 +122,12 @@ def _not_shown(view: Waves, top: float) -> str:
     return text
 
 
-def campbell_diagram(view: Waves) -> Plot:
+def campbell_diagram(view: Waves[Campbell]) -> Plot:
     """Draw frequencies against speed with engine-order lines and the crossings of modes that they excite."""
-    hz, rpm = view.floats("frequency_hz"), view.floats("speed_rpm")
+    hz, rpm = np.array([w.frequencies_hz for w in view.found.waves]), view.found.speeds_rpm
     top = 1.06 * float(hz[np.isfinite(hz)].max())
     figure = go.Figure([*_orders(view, top), *_branches(view)])
-    n = int(view.data.sizes.get("crossing", 0))
+    n = len(view.found.crossings)
     if n:
         figure.add_trace(_crossings(view))
     styled(figure, 620)
@@ -149,28 +145,26 @@ def campbell_diagram(view: Waves) -> Plot:
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 
 
-def crossings(view: Waves) -> Table | Words:
+def crossings(view: Waves[Campbell]) -> Table | Words:
     """Return the crossings of a Campbell diagram in the order of speed."""
     title = "Crossings"
-    if not view.has("crossing_speed_rpm"):
+    if not view.found.crossings:
         told = "No engine order meets a mode that it excites within the speeds."
         return Words((told,), title)
-    rpm, hz = view.floats("crossing_speed_rpm"), view.floats("crossing_frequency_hz")
-    order, wave, mode = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
-    rows = []
-    for i in np.argsort(rpm, kind="stable"):
-        met = [number(float(v), 6) for v in (rpm[i], hz[i])]
-        rows.append([*met, f"{order[i]}", view.waves[wave[i]], str(mode[i] + 1)])
+    rows = [
+        [number(c.speed_rpm, 6), number(c.frequency_hz, 6), f"{c.engine_order}", view.waves[w], str(c.mode + 1)]
+        for w, c in sorted(view.found.crossings, key=lambda met: met[1].speed_rpm)
+    ]
     head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
     return Table(head, rows, title)
 
 
-def _cards(view: Waves) -> list[Card]:
-    rpm = view.floats("speed_rpm")
+def _cards(view: Waves[Campbell]) -> list[Card]:
+    rpm = view.found.speeds_rpm
     note = f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm"
-    return [Card(str(view.data.sizes.get("crossing", 0)), "crossings with engine orders", note)]
+    return [Card(str(len(view.found.crossings)), "crossings with engine orders", note)]
 
 
 _NEEDS = (*NEEDED, "speed_rpm")
 _BLOCK = Block("campbell", "Frequencies against speed", (campbell_diagram, crossings))
-SECTION: Section = Section("campbell", _NEEDS, Waves, (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section("campbell", _NEEDS, view_of(Campbell), (_BLOCK,), by_case=True, cards=_cards)

@@ -3,7 +3,9 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.waves.page.waves import Waves
+from stickslip.analyses.waves.page.waves import Waves, view_of
+from stickslip.analyses.waves.records import Flutter, hertz
+from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import counted, number
@@ -13,18 +15,19 @@ _NEEDED = ("wave_number", "phase_angle_deg", "damping_by_energy", "damping_by_ei
 _PERCENT = 100.0
 
 
-def least_stable_diagram(view: Waves) -> Plot:
+def least_stable_diagram(view: Waves[Flutter]) -> Plot:
     """Draw the damping of each mode over the inter-blade phase angle."""
-    angle, names = view.floats("phase_angle_deg"), view.waves
-    energy, eigen, total = (_PERCENT * view.floats(name) for name in _NEEDED[2:])
+    found, names = view.found, view.waves
+    angle = np.array([w.phase_angle_deg for w in found.waves])
+    energy, eigen, total = _percents(found)
     figure = go.Figure()
     for m in range(energy.shape[1]):
         mode, line = f"mode {m + 1}", {"color": colour(m), "width": 1.4}
         said = "%{text}: %{y:.4g} %<extra></extra>"
         figure.add_trace(
             go.Scatter(
-                x=view.floats("curve_angle_deg"),
-                y=_PERCENT * view.floats("curve_damping")[m],
+                x=found.curve_angle_deg,
+                y=_PERCENT * found.curve_damping[m],
                 mode="lines",
                 line=line,
                 name=f"{mode}, any phase angle",
@@ -52,12 +55,12 @@ def least_stable_diagram(view: Waves) -> Plot:
                     hovertemplate=said,
                 )
             )
-    required = _PERCENT * view.scalar("required_damping", 0.0)
+    required = _PERCENT * view.found.required_damping
     figure.add_hline(y=required, line={"color": ALARM, "width": 1, "dash": "dash"})
     styled(figure, 540)
     figure.update_xaxes(title_text="inter-blade phase angle (degrees)", range=[-186, 186], dtick=45)
     figure.update_yaxes(title_text="damping ratio (%)", zeroline=True, zerolinecolor=MUTED)
-    i, m = int(view.scalar("least_wave", 0)), int(view.scalar("least_mode", 0))
+    i, m = view.found.least_wave, view.found.least_mode
     below = int(np.count_nonzero(total < required))
     fate = (
         f"{counted(below, 'wave')} and modes lie below the dashed line of {number(required)} %."
@@ -73,24 +76,29 @@ def least_stable_diagram(view: Waves) -> Plot:
     return Plot(f"flutter{view.key}", "Least stable diagram", caption, figure)
 
 
-def margins(view: Waves) -> Table:
+def _percents(found: Flutter) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (w, n) damping ratios in %: by energy, by eigenvalue, with the structure."""
+    energy, eigen = np.array([w.by_energy for w in found.waves]), np.array([w.by_eigenvalue for w in found.waves])
+    return _PERCENT * energy, _PERCENT * eigen, _PERCENT * found.damping
+
+
+def margins(view: Waves[Flutter]) -> Table:
     """Return a table of the damping of each wave: one row a wave and mode, by phase angle."""
-    hz, angle = view.floats("frequency_hz"), view.floats("phase_angle_deg")
-    shares = [_PERCENT * view.floats(name) for name in _NEEDED[2:]]
-    flow = view.floats("frequency_in_flow_hz")
-    required = _PERCENT * view.scalar("required_damping", 0.0)
+    hz, waves = hertz(view.found), view.found.waves
+    shares = _percents(view.found)
+    required = _PERCENT * view.found.required_damping
     rows = []
     for m in range(hz.shape[1]):
-        for w in np.argsort(angle, kind="stable"):
+        for w in np.argsort([w.phase_angle_deg for w in waves], kind="stable"):
             told = [number(float(share[w, m]), 4) for share in shares]
             fate = "" if shares[2][w, m] >= required else "unstable" if shares[2][w, m] < 0 else "below required"
             name = view.waves[w]
             rows.append(
                 [
                     f"{name}, mode {m + 1}",
-                    number(float(angle[w]), 5),
+                    number(waves[w].phase_angle_deg, 5),
                     number(float(hz[w, m]), 6),
-                    number(float(flow[w, m]), 6),
+                    number(float(waves[w].in_flow_hz[m]), 6),
                     *told,
                     fate,
                 ]
@@ -108,25 +116,25 @@ def margins(view: Waves) -> Table:
     return Table(head, rows, "Margins")
 
 
-def mistuned(view: Waves) -> Words | None:
+def mistuned(view: Waves[Flutter]) -> Words | None:
     """Return the modes of the mistuned wheel in the flow."""
-    if not view.has("wheel_damping"):
+    modes = view.found.wheel_modes
+    if not modes:
         return None
-    damping, hertz = _PERCENT * view.floats("wheel_damping"), view.floats("wheel_frequency_hz")
-    tuned = _PERCENT * float(view.floats("damping").min())
-    grows = int(np.count_nonzero(damping < 0))
+    tuned = _PERCENT * float(view.found.damping.min())
+    grows = sum(mode.damping < 0 for mode in modes)
     told = (
         f"No wave is a mode then. The least damped mode of the wheel has "
-        f"{number(float(damping[0]), 4)} % at {number(float(hertz[0]), 6)} Hz, where the least stable wave of the tuned wheel has "
-        f"{number(tuned, 4)} %; {grows} of {len(damping)} modes grow. The coefficients are those of the reference frequency."
+        f"{number(_PERCENT * modes[0].damping, 4)} % at {number(modes[0].frequency_hz, 6)} Hz, where the least stable wave of the tuned wheel has "
+        f"{number(tuned, 4)} %; {grows} of {len(modes)} modes grow. The coefficients are those of the reference frequency."
     )
     return Words((told,), "With the sectors as they differ")
 
 
-def _cards(view: Waves) -> list[Card]:
-    total = view.floats("damping")
-    i, m = int(view.scalar("least_wave", 0)), int(view.scalar("least_mode", 0))
-    least, required = float(total[i, m]), view.scalar("required_damping", 0.0)
+def _cards(view: Waves[Flutter]) -> list[Card]:
+    total = view.found.damping
+    i, m = view.found.least_wave, view.found.least_mode
+    least, required = float(total[i, m]), view.found.required_damping
     note = f"{view.waves[i]}, mode {m + 1}"
     if least < required:
         grow = int(np.count_nonzero(total < 0))
@@ -137,14 +145,13 @@ def _cards(view: Waves) -> list[Card]:
         )
         note += f"; {fate}"
     found = [Card(f"{number(_PERCENT * least, 4)} %", "least damping in the flow", note, least < required)]
-    if view.has("wheel_damping"):
-        wheel = view.floats("wheel_damping")
-        grow = int(np.count_nonzero(wheel < 0))
-        note = f"{grow} of {counted(wheel.size, 'mode')} unstable"
-        text = f"{number(_PERCENT * float(wheel[0]), 4)} %"
-        found.append(Card(text, "least damping with the sectors as they differ", note, wheel[0] < required))
+    if wheel := view.found.wheel_modes:
+        grow = sum(mode.damping < 0 for mode in wheel)
+        note = f"{grow} of {counted(len(wheel), 'mode')} unstable"
+        text = f"{number(_PERCENT * wheel[0].damping, 4)} %"
+        found.append(Card(text, "least damping with the sectors as they differ", note, wheel[0].damping < required))
     return found
 
 
 _BLOCK = Block("flutter", "Flutter", (least_stable_diagram, margins, mistuned))
-SECTION: Section = Section("flutter", _NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section("flutter", _NEEDED, view_of(Flutter), (_BLOCK,), by_case=True, cards=_cards)

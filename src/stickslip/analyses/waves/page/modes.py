@@ -5,19 +5,22 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.analyses.waves.page.shapes import mode_shapes
-from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines
+from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
+from stickslip.analyses.waves.records import Modes, hertz, stages
+from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, Plot, colour, legend_above, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 
 
-def modes_of_wheel(view: Waves) -> Plot | None:
+def modes_of_wheel(view: Waves[Modes]) -> Plot | None:
     """Draw the localisation of each mode, and its distribution over blades and waves."""
-    if not view.has("mistuned_hz", "sector_share", "wave_share"):
+    own = view.found.wheel_modes
+    if not own:
         return None
-    hertz, blades = view.floats("mistuned_hz"), view.floats("sector_share")
-    factor, waves = view.floats("mode_localisation"), view.floats("wave_share")
+    hz, factor = np.array([mode.frequency_hz for mode in own]), np.array([mode.localisation for mode in own])
+    blades, waves = np.array([mode.sector_share for mode in own]), np.array([mode.wave_share for mode in own])
     figure = make_subplots(
         1,
         3,
@@ -25,13 +28,13 @@ def modes_of_wheel(view: Waves) -> Plot | None:
         column_widths=[0.3, 0.35, 0.35],
         subplot_titles=("localisation factor", "share of each blade", "share of each wave"),
     )
-    modes = np.arange(1, hertz.size + 1)
+    modes = np.arange(1, hz.size + 1)
     figure.add_bar(
         x=factor,
         y=modes,
         orientation="h",
         marker_color=INK,
-        customdata=hertz,
+        customdata=hz,
         showlegend=False,
         hovertemplate="mode %{y}, %{customdata:.6g} Hz: %{x:.3f}<extra></extra>",
         row=1,
@@ -47,13 +50,13 @@ def modes_of_wheel(view: Waves) -> Plot | None:
                 showscale=column == 3,
                 colorbar={"title": {"text": "%"}},
                 zmin=0,
-                customdata=np.tile(hertz[:, None], share.shape[1]),
+                customdata=np.tile(hz[:, None], share.shape[1]),
                 hovertemplate=f"mode %{{y}}, %{{customdata:.6g}} Hz<br>{name} %{{x}}: %{{z:.2g}} %<extra></extra>",
             ),
             row=1,
             col=column,
         )
-    styled(figure, max(380, min(12 * hertz.size + 160, 900)))
+    styled(figure, max(380, min(12 * hz.size + 160, 900)))
     legend_above(figure)
     figure.update_yaxes(title_text="mode", col=1)
     figure.update_xaxes(range=[0, 1], col=1)
@@ -61,24 +64,25 @@ def modes_of_wheel(view: Waves) -> Plot | None:
     figure.update_xaxes(title_text="wave number", col=3)
     most = int(np.argmax(factor))
     text = (
-        f"{hertz.size} modes of all sectors together, {number(float(hertz.min()), 6)} to {number(float(hertz.max()), 6)} Hz: the share of the "
+        f"{hz.size} modes of all sectors together, {number(float(hz.min()), 6)} to {number(float(hz.max()), 6)} Hz: the share of the "
         "kinetic energy that each blade and each wave has. With all sectors alike every mode is one wave. The most localised one is mode "
-        f"{most + 1} ({number(float(hertz[most]), 6)} Hz): factor {number(float(factor[most]), 3)} (0: all blades alike, 1: one alone), blade "
+        f"{most + 1} ({number(float(hz[most]), 6)} Hz): factor {number(float(factor[most]), 3)} (0: all blades alike, 1: one alone), blade "
         f"{int(np.argmax(blades[most]))}."
     )
     return Plot(f"wheel_modes{view.key}", "Modes of the wheel whose sectors differ", text, figure)
 
 
-def diameter_map(view: Waves) -> Plot:
+def diameter_map(view: Waves[Modes]) -> Plot:
     """Draw the frequencies over the nodal diameters."""
     figure = go.Figure(mode_lines(view))
     reference = ""
-    if view.has("reference_hz"):
-        known, mode = np.nonzero(np.isfinite(view.floats("reference_hz")))
+    given = np.array([w.reference_hz for w in view.found.waves if w.reference_hz is not None])
+    if given.size:
+        known, mode = np.nonzero(np.isfinite(given))
         figure.add_trace(
             go.Scatter(
-                x=view.integers("nodal_diameter")[known],
-                y=view.floats("reference_hz")[known, mode],
+                x=np.array([w.nodal_diameter for w in view.found.waves])[known],
+                y=given[known, mode],
                 mode="markers",
                 name="reference",
                 hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
@@ -90,56 +94,55 @@ def diameter_map(view: Waves) -> Plot:
     diameter_axes(figure, view)
     if view.sectors == 1:
         figure.update_xaxes(title_text="", showticklabels=False)
-    hz = view.floats("frequency_hz")
+    hz = hertz(view.found)
     caption = (
         f"{counted(hz.shape[1], 'mode')} of {counted(len(hz), 'wave')}, {number(hz.min(), 5)} to {number(hz.max(), 5)} Hz, "
-        f"{view.text('rotation')}. Lines join the same mode number; modes of different families that come close repel each "
+        f"{view.found.rotation or ''}. Lines join the same mode number; modes of different families that come close repel each "
         f"other instead of crossing (veering).{reference}"
     )
     return Plot(f"diameters{view.key}", "Nodal-diameter map", caption, figure)
 
 
-def frequencies(view: Waves) -> list[Table]:
+def frequencies(view: Waves[Modes]) -> list[Table]:
     """Return a table of the natural frequencies: one row a wave, one column a mode."""
-    hz = view.floats("frequency_hz")
+    hz = hertz(view.found)
     head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
     # where nothing parts the directions, both have the frequencies
-    parted = len(set(view.integers("nodal_diameter"))) < len(hz)
-    kinds = [kind if parted or kind == "standing" else "both ways" for kind in view.kinds]
+    kinds = [w.kind if view.both or w.kind == "standing" else "both ways" for w in view.found.waves]
     names = [f"{name}, {kind}" if view.sectors > 1 else name for name, kind in zip(view.waves, kinds, strict=True)]
     rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]
     found = [Table(head, rows, "Natural frequencies")]
-    if not view.has("stiffest_hz"):
+    held = [w.stiffest_hz for w in view.found.waves if w.stiffest_hz is not None]
+    if not held:
         return found
-    held = view.floats("stiffest_hz")
     rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, held, strict=True)]
     title = "All harmonics held that flanges do not couple"
     told = "Flanges move freely in the harmonics that they do not couple, which makes them softer than they are; held there, they are stiffer."
     return [*found, Table(head, rows, title, (told,))]
 
 
-def in_flow(view: Waves) -> Table | None:
+def in_flow(view: Waves[Modes]) -> Table | None:
     """Return a table of frequencies and damping ratios with aerodynamic forces, one row a wave."""
-    if not view.has("damped_hz", "damping"):
-        return None
-    hz, damping = view.floats("damped_hz"), 100 * view.floats("damping")
-    head = ["wave", *(f"mode {m + 1}" for m in range(hz.shape[1]))]
     rows = [
-        [f"{name}, {kind}", *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
-        for name, kind, own in zip(view.waves, view.kinds, zip(hz, damping, strict=True), strict=True)
+        [
+            f"{name}, {w.kind}",
+            *(f"{number(f, 7)} Hz, {number(100 * d, 4)} %" for f, d in zip(w.damped_hz, w.damping, strict=True)),
+        ]
+        for name, w in zip(view.waves, view.found.waves, strict=True)
+        if w.damped_hz is not None and w.damping is not None
     ]
+    if not rows:
+        return None
+    head = ["wave", *(f"mode {m}" for m in range(1, len(rows[0])))]
     text = "Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio."
     return Table(head, rows, "In the flow", (text,))
 
 
-def stage_shares(view: Waves) -> Plot | None:
+def stage_shares(view: Waves[Modes]) -> Plot | None:
     """Draw the energy share of each stage in each mode, as bars that add up to one."""
-    if not view.has("stage_share"):
+    share, hz = np.array([w.shares for w in view.found.waves if w.shares is not None]), hertz(view.found)
+    if not share.size:
         return None
-    share = view.floats("stage_share")
-    hz = view.floats("frequency_hz")
-    stages = [str(name) for name in view.data["stage_name"].values]
-    counts = view.integers("stage_sectors")
     places = [
         [name for name, row in zip(view.waves, hz, strict=True) for _ in row],
         [f"{m + 1}" for row in hz for m in range(len(row))],
@@ -148,18 +151,18 @@ def stage_shares(view: Waves) -> Plot | None:
         go.Bar(
             x=places,
             y=100 * share[:, :, i].ravel(),
-            name=f"{name} ({count} sectors)",
+            name=stage,
             marker={"color": colour(i)},
             customdata=hz.ravel(),
-            hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + name + "</extra>",
+            hovertemplate=f"%{{y:.3g}} % at %{{customdata:.6g}} Hz<extra>{name}</extra>",
         )
-        for i, (name, count) in enumerate(zip(stages, counts, strict=True))
+        for i, (stage, name) in enumerate(zip(stages(view.found), view.found.stage_name, strict=True))
     ]
     figure = styled(go.Figure(bars), 420)
     figure.update_layout(barmode="stack", bargap=0.15)
     figure.update_xaxes(title_text="mode", tickangle=0)
     figure.update_yaxes(title_text="share of the kinetic energy (%)", range=[0, 100])
-    waves = "; ".join(f"{name}: {text}" for name, text in zip(view.waves, view.data["stage_waves"].values, strict=True))
+    waves = "; ".join(f"{name}: {text}" for name, text in zip(view.waves, view.found.stage_waves, strict=True))
     caption = (
         "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
         f"exist in the assembly only. Waves that the flanges let vibrate together: {waves}. All else of the flanges moves freely."
@@ -167,11 +170,11 @@ def stage_shares(view: Waves) -> Plot | None:
     return Plot(f"stages{view.key}", "Which stage vibrates", caption, figure)
 
 
-def comparison(view: Waves) -> Table | Words | None:
+def comparison(view: Waves[Modes]) -> Table | Words | None:
     """Return a table of relative differences from the reference, one row a wave."""
-    if not view.has("difference"):
+    title, off = "Against the reference", _differences(view)
+    if not off.size:
         return None
-    title, off = "Against the reference", view.floats("difference")
     known = int(np.isfinite(off).sum())
     if not known:
         return Words(("The reference has none of these frequencies.",), title)
@@ -189,6 +192,11 @@ def comparison(view: Waves) -> Table | Words | None:
     return Table(head, rows, title, (text,))
 
 
+def _differences(view: Waves[Modes]) -> FloatArray:
+    """Return (w, m) relative differences from the reference; empty without one."""
+    return np.array([w.difference for w in view.found.waves if w.difference is not None])
+
+
 def _share(value: float) -> str:
     """Write a relative difference, in parts of a million where it is small."""
     if not np.isfinite(value):
@@ -196,13 +204,12 @@ def _share(value: float) -> str:
     return f"{number(1e6 * value)} ppm" if abs(value) < 1e-4 else percent(100 * value, 3)
 
 
-def _cards(view: Waves) -> list[Card]:
-    hz = view.floats("frequency_hz")
+def _cards(view: Waves[Modes]) -> list[Card]:
+    hz, off = hertz(view.found), np.abs(_differences(view))
     over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
     lowest = f"{number(float(np.nanmin(hz)), 5)} Hz"
     found = [Card(lowest, "lowest natural frequency", f"{hz.size} modes, {over}")]
-    if view.has("difference") and np.isfinite(view.floats("difference")).any():
-        off = np.abs(view.floats("difference"))
+    if np.isfinite(off).any():
         note = f"of {np.count_nonzero(np.isfinite(off))} frequencies"
         worst = percent(100 * float(np.nanmax(off)))
         found.append(Card(worst, "largest difference from the reference", note))
@@ -213,4 +220,4 @@ _TITLE = "Natural frequencies and mode shapes"
 _BLOCK = Block(
     "modes", _TITLE, (diameter_map, stage_shares, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
 )
-SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section("modes", NEEDED, view_of(Modes), (_BLOCK,), by_case=True, cards=_cards)

@@ -1,9 +1,12 @@
 """The SAFE diagram: which modes engine orders can excite at a speed."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines
+from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
+from stickslip.analyses.waves.records import Interference, Pair, hertz
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled
@@ -37,13 +40,14 @@ def zigzag(highest_hz: float, sectors: int, hertz: float) -> tuple[FloatArray, F
     return folded, orders * hertz
 
 
-def safe_diagram(view: Waves) -> Plot:
+def safe_diagram(view: Waves[Interference]) -> Plot:
     """Draw the interference or SAFE diagram: the modes that engine orders excite at a speed."""
-    hertz, sectors = view.scalar("speed_rpm") / 60, view.sectors
-    orders = np.unique(view.integers("pair_engine_order"))
+    found, sectors = view.found, view.sectors
+    turns = view.rpm / 60
+    orders = np.unique([pair.engine_order for pair in found.pairs])
     figure = go.Figure(mode_lines(view))
-    top = 1.08 * max(float(view.floats("frequency_hz").max()), float(orders.max()) * hertz)
-    x, y = zigzag(top, sectors, hertz)
+    top = 1.08 * max(float(hertz(found).max()), float(orders.max()) * turns)
+    x, y = zigzag(top, sectors, turns)
     figure.add_trace(
         go.Scatter(
             x=x,
@@ -54,22 +58,22 @@ def safe_diagram(view: Waves) -> Plot:
             line={"color": MUTED, "width": 1.2, "dash": "dash"},
         )
     )
-    unjudged = _not_judged(view)
-    figure.add_trace(_orders(orders, unjudged, sectors, hertz))
-    near = view.integers("pair_near") == 1
-    if near.any():
+    unjudged = {pair.engine_order for pair in found.pairs if pair.judged is False}
+    figure.add_trace(_orders(orders, unjudged, sectors, turns))
+    near = [pair for pair in found.pairs if pair.near]
+    if near:
         figure.add_trace(_near(view, near))
     styled(figure, 600)
     diameter_axes(figure, view)
     figure.update_yaxes(range=[-0.04 * top, top])  # the names of low orders lie below the line
-    margin = number(view.scalar("margin_percent"), 3)
+    margin = number(found.margin_percent, 3)
     verdict = (
-        f"{counted(int(near.sum()), 'mode')} within {margin} % of an engine order that excites it (red)"
-        if near.any()
+        f"{counted(len(near), 'mode')} within {margin} % of an engine order that excites it (red)"
+        if near
         else f"no mode is within {margin} % of an engine order that excites it"
     )
     caption = (
-        f"At {number(view.scalar('speed_rpm'), 5)} rpm engine order m excites at m times the speed, and only the nodal diameter "
+        f"At {number(view.rpm, 5)} rpm engine order m excites at m times the speed, and only the nodal diameter "
         f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}. Margins are those of the speed at which "
         "order and mode meet, with the frequency's change over the speed."
     )
@@ -79,14 +83,6 @@ def safe_diagram(view: Waves) -> Plot:
             "computed mode of the nodal diameter."
         )
     return Plot(f"safe{view.key}", "SAFE diagram", caption, figure)
-
-
-def _not_judged(view: Waves) -> set[int]:
-    """Return the engine orders above the computed modes."""
-    if not view.has("pair_judged"):
-        return set()
-    orders = view.integers("pair_engine_order")
-    return {int(m) for m in orders[view.integers("pair_judged") == 0]}
 
 
 def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) -> go.Scatter:
@@ -114,17 +110,11 @@ def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) ->
     )
 
 
-def _near(view: Waves, near: np.ndarray) -> go.Scatter:
-    wave, mode = view.integers("pair_wave")[near], view.integers("pair_mode")[near]
-    orders, margins = view.integers("pair_engine_order")[near], view.floats("pair_margin")[near]
-    names = view.waves
-    text = [
-        f"{names[w]}, mode {m + 1} and EO {o}: {100 * d:+.3g} %"
-        for w, m, o, d in zip(wave, mode, orders, margins, strict=True)
-    ]
+def _near(view: Waves[Interference], near: Sequence[Pair]) -> go.Scatter:
+    text = [f"{view.waves[p.wave]}, mode {p.mode + 1} and EO {p.engine_order}: {100 * p.margin:+.3g} %" for p in near]
     return go.Scatter(
-        x=view.integers("nodal_diameter")[wave],
-        y=view.floats("pair_frequency_hz")[near],
+        x=np.array([view.found.waves[p.wave].nodal_diameter for p in near]),
+        y=np.array([p.frequency_hz for p in near]),
         text=text,
         mode="markers",
         name="near resonance",
@@ -133,31 +123,24 @@ def _near(view: Waves, near: np.ndarray) -> go.Scatter:
     )
 
 
-def interference(view: Waves) -> Table:
+def interference(view: Waves[Interference]) -> Table:
     """Return a table of pairs of engine order and mode, the nearest first."""
-    margin, near = view.floats("pair_margin"), view.integers("pair_near")
-    order, wave, mode = (view.integers(f"pair_{name}") for name in ("engine_order", "wave", "mode"))
-    own, excitation = view.floats("pair_frequency_hz"), view.floats("pair_excitation_hz")
-    judged = view.integers("pair_judged") if view.has("pair_judged") else np.ones_like(near)
-    known = view.has("pair_resonance_rpm")
-    meeting = view.floats("pair_resonance_rpm") if known else np.full(len(margin), np.nan)
     rows = []
-    for i in np.argsort(np.abs(margin), kind="stable"):
-        verdict = "clear" if judged[i] else "order not judged"
-        verdict = "**near resonance**" if near[i] else verdict
+    for pair in sorted(view.found.pairs, key=lambda pair: abs(pair.margin)):
+        verdict = "order not judged" if pair.judged is False else "clear"
         rows.append(
             [
-                f"{order[i]}",
-                view.waves[wave[i]],
-                str(mode[i] + 1),
-                number(float(own[i]), 6),
-                number(float(excitation[i]), 6),
-                _rpm(float(meeting[i]), float(margin[i])),
-                percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE,
-                verdict,
+                f"{pair.engine_order}",
+                view.waves[pair.wave],
+                str(pair.mode + 1),
+                number(pair.frequency_hz, 6),
+                number(pair.excitation_hz, 6),
+                _rpm(pair.resonance_rpm, pair.margin),
+                percent(100 * pair.margin, 3) if np.isfinite(pair.margin) else NONE,
+                "**near resonance**" if pair.near else verdict,
             ]
         )
-    at = f"at {number(view.scalar('speed_rpm'), 5)} rpm"
+    at = f"at {number(view.rpm, 5)} rpm"
     head = [
         "engine order",
         "wave",
@@ -178,12 +161,13 @@ def _rpm(value: float, margin: float) -> str:
     return number(value, 6) if abs(margin) <= 0.2 else f"~{float(f'{value:.2g}'):.0f}"
 
 
-def _cards(view: Waves) -> list[Card]:
-    near, rpm = int(view.integers("pair_near").sum()), number(view.scalar("speed_rpm"), 5)
-    note = f"margin {number(view.scalar('margin_percent'))} %"
+def _cards(view: Waves[Interference]) -> list[Card]:
+    found = view.found
+    near, rpm = sum(pair.near for pair in found.pairs), number(view.rpm, 5)
+    note = f"margin {number(found.margin_percent)} %"
     return [Card(str(near), f"near resonances at {rpm} rpm", note)]
 
 
 _NEEDS = (*NEEDED, "pair_margin")
 _BLOCK = Block("safe", "Interference with engine orders", (safe_diagram, interference))
-SECTION: Section = Section("safe", _NEEDS, Waves, (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section("safe", _NEEDS, view_of(Interference), (_BLOCK,), by_case=True, cards=_cards)

@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 
 from stickslip.analyses.pictures.skin import edges, segments, surface
 from stickslip.analyses.waves.page.waves import Waves
+from stickslip.analyses.waves.records import Modes, hertz
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.plot import FONT, MUTED, Plot, styled
 from stickslip.report.quantities import counted
@@ -86,18 +87,21 @@ _FULL = 32767  # largest 16-bit number
 _MM = 1e3
 
 
-def mode_shapes(view: Waves) -> Plot | None:
+def mode_shapes(view: Waves[Modes]) -> Plot | None:
     """Show the mode shapes on the skin, with controls for wave, mode, phase and size."""
-    if not view.has("shape", "skin_point", "skin_triangle"):
+    found, waves = view.found, len(view.found.waves)
+    shapes = [w.shape for w in found.waves if w.shape is not None]
+    if not shapes or found.skin_point is None or found.skin_triangle is None:
         return None
-    waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
+    there = len(shapes[0])
     most_bytes = _SHAPE_BYTES // int(view.scalar("drawn_cases", 1))
     room = most_bytes // (_POINT_BYTES * _FEWEST_POINTS * waves)
     modes = max(1, min(there, room))
-    points, triangles = view.floats("skin_point") * _MM, view.integers("skin_triangle")
+    points, triangles = found.skin_point * _MM, found.skin_triangle
     most = max(_FEWEST_POINTS, most_bytes // (_POINT_BYTES * waves * modes))
     kept, faces = coarse_skin(points, triangles, most)
-    data = _payload(view, modes, kept, faces)
+    shape = np.array(shapes)[:, :modes, kept]
+    data = _payload(view, points[kept], shape, faces)
     fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"
     left_out = "" if modes == there else f"The first {modes} of {there} modes are in the page."
     caption = (
@@ -134,39 +138,36 @@ def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
     return figure
 
 
-def _payload(view: Waves, modes: int, kept: IntArray, faces: IntArray) -> dict[str, object]:
+def _payload(view: Waves[Modes], points: FloatArray, shape: FloatArray, faces: IntArray) -> dict[str, object]:
     """Return the data of the script, arrays as text."""
-    points = view.floats("skin_point")[kept] * _MM
-    shape = view.data["shape"].values[:, :modes, kept]
+    found, modes = view.found, shape.shape[1]
     largest = np.abs(shape).max(axis=(2, 3, 4), keepdims=True)
     whole = np.round(shape / np.where(largest > 0, largest, 1.0) * _FULL).astype("<i2")
-    hz = view.floats("frequency_hz")
     inside = _outside_of_wheel(view, faces)
     wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
     origin = view.numbers("axis_origin_m") * _MM
     return {
         "sectors": view.sectors,
-        "axis": _unit(view.numbers("axis_direction")).tolist(),
+        "axis": _unit(np.zeros(0) if found.axis_direction is None else found.axis_direction).tolist(),
         "origin": origin.tolist() if origin.size == 3 else [0.0, 0.0, 0.0],
         "points": _text(points.astype("<f4")),
         "faces": _text(faces.astype("<i4")),
         "wheelPoints": _text(wheel.astype("<i4")),
         "wheelFaces": _text(wheel_faces.astype("<i4")),
-        "waveNumbers": view.integers("wave_number").tolist(),
+        "waveNumbers": [w.wave_number for w in found.waves],
         "waves": [
-            f"{name}, {kind} wave" if view.sectors > 1 else name
-            for name, kind in zip(view.waves, view.data["wave_kind"].values, strict=True)
+            f"{name}, {w.kind} wave" if view.sectors > 1 else name
+            for name, w in zip(view.waves, found.waves, strict=True)
         ],
-        "hertz": [[f"{f:.6g}" for f in row[:modes]] for row in hz],
+        "hertz": [[f"{f:.6g}" for f in row[:modes]] for row in hertz(found)],
         "shapes": [[_text(s) for s in row] for row in whole],
     }
 
 
-def _outside_of_wheel(view: Waves, faces: IntArray) -> IntArray:
+def _outside_of_wheel(view: Waves[Modes], faces: IntArray) -> IntArray:
     """Remove the faces between neighbouring sectors, if the skin is not yet coarse."""
-    cut = view.integers("skin_cut") if view.has("skin_cut") else np.zeros(0, dtype=np.int64)
-    same = len(cut) == len(faces) and view.sectors > 1
-    return faces[cut == 0] if same else faces
+    cut = view.found.skin_cut
+    return faces[cut == 0] if cut is not None and len(cut) == len(faces) and view.sectors > 1 else faces
 
 
 def _unit(direction: FloatArray) -> FloatArray:
@@ -178,10 +179,10 @@ def _text(values: npt.NDArray[np.generic]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
-def _controls(view: Waves, modes: int, data: dict[str, object]) -> Markup:
+def _controls(view: Waves[Modes], modes: int, data: dict[str, object]) -> Markup:
     """Return the form above the picture and the data behind it, as HTML."""
-    pairs = enumerate(zip(view.waves, view.kinds, strict=True))
-    waves = "".join(f'<option value="{k}">{escape(f"{name} ({kind})")}</option>' for k, (name, kind) in pairs)
+    pairs = enumerate(zip(view.waves, view.found.waves, strict=True))
+    waves = "".join(f'<option value="{k}">{escape(f"{name} ({w.kind})")}</option>' for k, (name, w) in pairs)
     numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
     views = (
         '<label>show <select name="view"><option value="wheel">whole wheel</option>'

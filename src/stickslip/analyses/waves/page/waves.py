@@ -1,41 +1,56 @@
-"""The dataset of an analysis by waves with the accesses that figures and tables need: frequencies by travelling wave and nodal diameter."""
+"""One case of an analysis by waves on the page: frequencies by travelling wave and nodal diameter."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Generic, TypeVar
 
 import numpy as np
 import plotly.graph_objects as go
+import xarray as xr
 
+from stickslip.analyses.columns import record_of
+from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes, hertz
 from stickslip.report.plot import colour
 from stickslip.report.result import Node
 
 NEEDED = ("wave_number", "nodal_diameter", "wave_kind", "frequency_hz")
 
 
-@dataclass(frozen=True, eq=False)
-class Waves(Node):
-    """One case of an analysis by waves."""
+T = TypeVar("T", Modes, Campbell, Flutter, Interference)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Waves(Node, Generic[T]):
+    """One case of an analysis by waves, with its record."""
+
+    found: T
 
     @property
     def sectors(self) -> int:
         """Number of sectors; 1 for a whole structure."""
-        return int(self.scalar("sectors", 1))
+        return self.found.sectors or 1
 
     @property
-    def kinds(self) -> list[str]:
-        """Kind of each wave: standing, forward, backward or whole."""
-        return [str(kind) for kind in self.data["wave_kind"].values]
+    def rpm(self) -> float:
+        """Speed of the rotor; NaN for a range."""
+        return np.nan if self.found.speed_rpm is None else self.found.speed_rpm
+
+    @property
+    def both(self) -> bool:
+        """Whether both directions of a nodal diameter are present."""
+        diameters = [w.nodal_diameter for w in self.found.waves]
+        return len(set(diameters)) < len(diameters)
 
     @property
     def waves(self) -> tuple[str, ...]:
         """Names of the waves, such as ``ND 3``, or ``ND 3 forward`` if both directions are present."""
-        diameters = self.integers("nodal_diameter")
         if self.sectors == 1:
-            return ("whole structure",) * len(diameters)
-        names = []
-        for diameter, kind in zip(diameters, self.kinds, strict=True):
-            both = np.count_nonzero(diameters == diameter) > 1
-            names.append(f"ND {diameter}{f' {kind}' if both else ''}")
-        return tuple(names)
+            return ("whole structure",) * len(self.found.waves)
+        each = [w.nodal_diameter for w in self.found.waves]
+        return tuple(
+            f"ND {w.nodal_diameter}{f' {w.kind}' if each.count(w.nodal_diameter) > 1 else ''}" for w in self.found.waves
+        )
 
     @property
     def colours(self) -> tuple[str, ...]:
@@ -43,14 +58,22 @@ class Waves(Node):
         return tuple(colour(k) for k in range(len(self.waves)))
 
 
-def mode_lines(view: Waves) -> list[go.Scatter]:
+def view_of(kind: type[T]) -> Callable[[xr.Dataset], Waves[T]]:
+    """Return the function that turns the dataset of a case into the view with its record."""
+    return partial(_view, kind)
+
+
+def _view(kind: type[T], data: xr.Dataset) -> Waves[T]:
+    return Waves(data=data, found=record_of(kind, data))
+
+
+def mode_lines(view: Waves[Modes] | Waves[Interference]) -> list[go.Scatter]:
     """Draw one line a mode over the nodal diameters, separately for each travelling direction."""
-    hz = view.floats("frequency_hz")
-    diameter, kinds = view.integers("nodal_diameter"), view.data["wave_kind"].values
-    names = np.array(view.waves)
+    hz, names, waves = hertz(view.found), view.waves, view.found.waves
+    diameter, kinds = np.array([w.nodal_diameter for w in waves]), np.array([w.kind for w in waves])
     # with both directions there are two frequencies at a diameter: the standing waves belong to both lines
     groups = [("", np.arange(len(names)))]
-    if len(set(diameter)) < len(diameter):
+    if view.both:
         groups = [
             (f", {way}", np.flatnonzero((kinds == way) | (kinds == "standing"))) for way in ("forward", "backward")
         ]
@@ -73,9 +96,9 @@ def mode_lines(view: Waves) -> list[go.Scatter]:
     return traces
 
 
-def diameter_axes(figure: go.Figure, view: Waves) -> None:
+def diameter_axes(figure: go.Figure, view: Waves[Modes] | Waves[Interference]) -> None:
     """Label the axes of a figure over nodal diameters."""
-    highest = int(view.integers("nodal_diameter").max())
+    highest = max(w.nodal_diameter for w in view.found.waves)
     figure.update_xaxes(title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4])
     figure.update_xaxes(dtick=1 if highest <= 30 else None)
     figure.update_yaxes(title_text="frequency (Hz)", rangemode="tozero")

@@ -1,1 +1,0 @@
-"""Records of the analyses by waves, and their datasets."""
