@@ -125,6 +125,7 @@ def test_crossings_lie_on_engine_order_and_mode(joined: Joined) -> None:
     at = joined[0].model().at(float(first.crossing_speed_rpm) * RPM, number)
     nearest = np.abs(normal_modes(at, 3).frequencies_hz / float(first.crossing_frequency_hz) - 1)
     assert nearest.min() < 1e-5
+    assert nearest.argmin() == int(first.crossing_mode)
     # on 8 sectors engine orders 2 and 6 both excite two nodal diameters
     assert set(data.nodal_diameter.values) == {2}
     assert list(data.attrs["engine_orders"]) == [2, 6]
@@ -185,7 +186,11 @@ def test_resonances_are_the_crossings_of_the_campbell_diagram(joined: Joined, tm
     changes = {"safe.engine_orders": f"[{order}]", "safe.speed_rpm": f"{1.04 * rpm!r}"}
     outcome = done(study(tmp_path, changes), "safe")
     assert f"Hz at {1.04 * rpm:g} rpm" in outcome.summaries["safe"][0].head
-    found = one_case(outcome.tree["safe"].to_dataset(), 0).isel(pair=0)
+    data = one_case(outcome.tree["safe"].to_dataset(), 0)
+    own = data.frequency_hz.values[data.pair_wave.values, data.pair_mode.values]
+    np.testing.assert_array_equal(data.pair_frequency_hz.values, own)
+    np.testing.assert_allclose(data.pair_excitation_hz, data.pair_engine_order * 1.04 * rpm / 60)
+    found = data.isel(pair=0)
     # a tangent over four per cent, against a frequency that is frozen at the speed
     frozen = float(found.pair_frequency_hz) * 60 / order
     assert abs(float(found.pair_resonance_rpm) / rpm - 1) < 0.1 * abs(frozen / rpm - 1)
