@@ -10,7 +10,7 @@ from newton_bounds import allowed, answer_at
 
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

@@ -9,9 +9,9 @@ from newton_bounds import allowed, answer_at
 
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.part_copies import copy_of, place_of
+from stickslip.assembly.part_copies import copy_of, place_of
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError

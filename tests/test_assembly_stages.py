@@ -9,7 +9,7 @@ from test_assembly_wheel import STEEL as SAME
 from test_assembly_wheel import sector_model, shrouded_sector
 
 from stickslip.assembly.assembling import assemble
-from stickslip.assembly.parts.part_copies import copy_of
+from stickslip.assembly.part_copies import copy_of
 from stickslip.model.damping import Damping
 from stickslip.model.part import solid_part
 from stickslip.reduction.choice import METHODS, Reduction

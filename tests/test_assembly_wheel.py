@@ -11,9 +11,9 @@ from newton_bounds import allowed, answer_at
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.build import holding_points, linear_side
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.parts.reduced import in_memory
+from stickslip.assembly.part_reduction import in_memory
 from stickslip.assembly.sides.waves import _one_of
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

@@ -31,7 +31,7 @@ from stickslip.analyses.forced_response.verdicts.rules import twice_the_harmonic
 from stickslip.analyses.page import plots
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.load import Load
+from stickslip.assembly.forces import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

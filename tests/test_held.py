@@ -10,9 +10,8 @@ from test_cli import done, refused
 
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.forces import force_of
+from stickslip.assembly.forces import Load, force_of
 from stickslip.assembly.joints.unconstrained_bodies import refuse_pulled, refuse_unheld, unheld
-from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring

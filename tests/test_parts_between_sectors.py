@@ -15,7 +15,7 @@ from test_assembly_wheel import SECTORS, SPEED, STEEL, shrouded_sector, whole_wh
 
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError

@@ -13,9 +13,9 @@ from test_cli import done, refused
 from stickslip.api.result import Result
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.part_copies import place_of, placed_body
+from stickslip.assembly.part_copies import place_of, placed_body
 from stickslip.assembly.sides import wheel
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError

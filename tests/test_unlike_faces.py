@@ -15,7 +15,7 @@ from test_assembly_wheel import answered
 from evidence.models.annulus import annular_sector
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.assembly import BladeMistuning, Mistuning, Model, pattern
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material

@@ -13,8 +13,8 @@ from .api.result import Result as Result
 from .api.study import Study as Study
 from .assembly.contact import Contact as Contact
 from .assembly.contact import Join as Join
-from .assembly.load import Load as Load
-from .assembly.load import Output as Output
+from .assembly.forces import Load as Load
+from .assembly.forces import Output as Output
 from .contact.interface import Interface as Interface
 from .contact.laws.bonded import Bonded as Bonded
 from .contact.laws.bouc_wen import BoucWen as BoucWen

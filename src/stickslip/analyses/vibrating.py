@@ -11,7 +11,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store
+from stickslip.assembly.part_reduction import Store
 from stickslip.column import column
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.load import Load
+from stickslip.assembly.forces import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.laws import law_name
 from stickslip.model.damping import Damping

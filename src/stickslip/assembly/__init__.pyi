@@ -9,8 +9,8 @@ from .assembling import assemble as assemble
 from .fluid.aerodynamics import Aerodynamics as Aerodynamics
 from .fluid.pressure import PressureField as PressureField
 from .model import Model as Model
-from .parts.part_copies import copy_of as copy_of
-from .parts.part_copies import place_of as place_of
+from .part_copies import copy_of as copy_of
+from .part_copies import place_of as place_of
 from .sides.mistuning import BladeMistuning as BladeMistuning
 from .sides.mistuning import ContactMistuning as ContactMistuning
 from .sides.mistuning import Mistuning as Mistuning

@@ -6,9 +6,9 @@ from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble_tuned
-from stickslip.assembly.load import refuse_second
+from stickslip.assembly.forces import refuse_second
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.assembly.sides.mistuned import assemble_mistuned
 from stickslip.errors import StickslipError
 from stickslip.model.part import Part

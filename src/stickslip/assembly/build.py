@@ -10,15 +10,15 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
-from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.fluid.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.joints.gap_coordinates import held_gaps, in_gaps, in_points, refuse_mixed_gaps
 from stickslip.assembly.joints.pairs import Pairs
+from stickslip.assembly.joints.ties import Coordinates, coordinates
 from stickslip.assembly.joints.unconstrained_bodies import held_warnings, refuse_pulled
 from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.parts.reduced import Store, in_memory, reduced_parts
+from stickslip.assembly.part_reduction import Store, in_memory, reduced_parts
 from stickslip.assembly.response_request import Asked, asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.sides.unreduced import as_it_is, refuse_rigid
 from stickslip.assembly.sides.waves import reduced_sector

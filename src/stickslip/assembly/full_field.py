@@ -9,7 +9,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import linear_side, system_of
 from stickslip.assembly.locations import AXES
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import with_ways_back
+from stickslip.assembly.part_reduction import with_ways_back
 from stickslip.assembly.response_request import asked
 from stickslip.assembly.sides.mistuned import of_all, system_of_all
 from stickslip.assembly.skin import mesh_dofs

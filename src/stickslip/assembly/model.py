@@ -10,15 +10,13 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import Contact, Join
-from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
-from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
+from stickslip.assembly.forces import Load, Output, beyond_sectors, doubtful_fields, engine_order, far_outputs
 from stickslip.assembly.joints.pairs import Pairs, pair_contacts
 from stickslip.assembly.joints.surface_checks import refuse_contacts_of_dofs, refuse_joined
-from stickslip.assembly.joints.ties import Ties, tie_joins
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.joints.ties import Coordinates, Ties, coordinates, tie_joins
 from stickslip.assembly.locations import Places, picked
-from stickslip.assembly.parts.reduced import Spin, Steady, at_speed, damped, steady_of
+from stickslip.assembly.part_reduction import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning
 from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, stages_of, with_joins
 from stickslip.assembly.skin import on_skin, skin_of

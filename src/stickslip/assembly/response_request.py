@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.forces import Labels, amplitude, error_names, force_of, output_labels
+from stickslip.assembly.forces import Labels, Load, amplitude, error_names, force_of, output_labels
 from stickslip.assembly.joints.gap_coordinates import refuse_rigid
 from stickslip.assembly.joints.unconstrained_bodies import refuse_pulled, refuse_unheld
-from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 

@@ -7,10 +7,9 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.assembly.coordinates import Coordinates
-from stickslip.assembly.joints.ties import Ties
+from stickslip.assembly.joints.ties import Coordinates, Ties
 from stickslip.assembly.locations import Places, picked
-from stickslip.assembly.parts.reduced import Steady, steady_of
+from stickslip.assembly.part_reduction import Steady, steady_of
 from stickslip.assembly.sides.wheel import Neighbours
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.prestress import strain_and_rotation

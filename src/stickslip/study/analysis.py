@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.study.models.measured import MeasuredPeaks
 from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.verdict import Verdict, stored

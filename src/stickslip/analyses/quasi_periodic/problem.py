@@ -13,7 +13,7 @@ from stickslip.analyses.quasi_periodic.table import QuasiPeriodicTable
 from stickslip.analyses.vibrating import modes_of
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
-from stickslip.assembly.load import Load
+from stickslip.assembly.forces import Load
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import input_error

@@ -12,7 +12,7 @@ from stickslip.analyses.resonance.table import ResonanceTable
 from stickslip.analyses.vibrating import refuse_rigid, represented
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store
+from stickslip.assembly.part_reduction import Store
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error

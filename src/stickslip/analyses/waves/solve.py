@@ -17,7 +17,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matr
 from stickslip.assembly.build import flow_around, holding_points
 from stickslip.assembly.fluid.aero_forces import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.parts.reduced import stiffening
+from stickslip.assembly.part_reduction import stiffening
 from stickslip.assembly.sides.waves import damping_by_modes
 from stickslip.assembly.statics import StaticState
 from stickslip.errors import input_error

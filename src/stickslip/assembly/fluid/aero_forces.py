@@ -10,11 +10,10 @@ import scipy
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
-from stickslip.assembly.forces import force_at
-from stickslip.assembly.load import Load
+from stickslip.assembly.forces import Load, force_at
 from stickslip.assembly.locations import AXES
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide

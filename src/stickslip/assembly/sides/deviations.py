@@ -9,7 +9,7 @@ import scipy
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.locations import picked, stacked
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import at_speed, damped
+from stickslip.assembly.part_reduction import at_speed, damped
 from stickslip.assembly.sides.mistuning import BladeMistuning, OwnSector
 from stickslip.assembly.sides.wheel import faces_of, leaders, own_and_onward
 from stickslip.errors import input_error

@@ -11,7 +11,7 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble_tuned
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure

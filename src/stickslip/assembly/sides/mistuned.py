@@ -25,7 +25,7 @@ from stickslip.assembly.joints.pairs import Pairs, at_rest
 from stickslip.assembly.joints.unconstrained_bodies import held_warnings
 from stickslip.assembly.locations import picked
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import Store
+from stickslip.assembly.part_reduction import Store
 from stickslip.assembly.response_request import Asked, asked, excitation
 from stickslip.assembly.sides.deviations import Deviation, deviations
 from stickslip.assembly.sides.mistuning import ContactMistuning

@@ -9,11 +9,11 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.fluid.aero_forces import Flow
 from stickslip.assembly.forces import force_of
+from stickslip.assembly.joints.ties import Coordinates
 from stickslip.assembly.model import Model
-from stickslip.assembly.parts.reduced import (
+from stickslip.assembly.part_reduction import (
     Spin,
     Store,
     at_speed,

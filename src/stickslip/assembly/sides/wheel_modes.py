@@ -8,7 +8,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.build import holding_points
 from stickslip.assembly.forces import output_labels
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.parts.reduced import Store, in_memory
+from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.assembly.response_request import Asked
 from stickslip.assembly.sides.mistuned import AllSectors, all_sectors, pairs_of_all
 from stickslip.contact.law import held_stiffness

@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.forces import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.part import Part

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import NEXT
-from stickslip.assembly.parts.part_copies import copy_of, place_of, placed_body
+from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam

@@ -8,8 +8,7 @@ from stickslip.analyses.waves.records import label
 from stickslip.arrays import ComplexArray
 from stickslip.assembly.build import holding_points
 from stickslip.assembly.fluid.aero_forces import own_dofs, phases
-from stickslip.assembly.forces import force_of
-from stickslip.assembly.load import Load
+from stickslip.assembly.forces import Load, force_of
 from stickslip.assembly.model import Model
 from stickslip.model.modes import normal_modes
 from stickslip.reduction.waves import excited_wave

@@ -9,7 +9,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.locations import node_rows
-from stickslip.assembly.parts.part_copies import turned_dofs, turned_structure
+from stickslip.assembly.part_copies import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.free_solid import inertia_relief

@@ -1,1 +1,0 @@
-"""Parts reduced, copied, and with more modes for comparison."""
