@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,16 @@ from small_v2 import write_four_masses
 from test_cli import done
 
 import stickslip as ss
+from stickslip.analyses.forced_response.records.columns import (
+    CaseNumbers,
+    OtherMotions,
+    PointFields,
+    Points,
+    TimeChecks,
+    each,
+    holds,
+    read,
+)
 from stickslip.analyses.forced_response.verdicts.cases import said_once, verdicts, with_levels
 from stickslip.analyses.forced_response.verdicts.curve import Curve, branch_length
 from stickslip.report.frame import concluded
@@ -110,6 +121,32 @@ def many(at: tuple[int, ...]) -> np.ndarray:
     kept[:, :2] = 1
     kept[list(at)] = 1
     return kept
+
+
+def test_records_of_a_result_have_the_rows_of_one_case_and_missing_values_for_what_it_lacks() -> None:
+    two = np.array([0, 0, 0, 1, 1, 1])
+    data = response(point_case=two, **{k: [*v, *v] for k, v in checked().items()})
+    data = data.drop_vars(["verify_case", "own_error_percent", *(n for n, v in data.items() if v.dims == ("case",))])
+    data = data.assign(verify_case=("check", [1, 0]), verify_settled=("check", [0, 1]), peak_point=("case", [1, -1]))
+    own, last = (read(Points, data, case) for case in (0, 1))
+    assert own.frequency_hz.tolist() == [10.0, 11.0, 12.0]
+    assert np.shares_memory(last.frequency_hz, data["frequency_hz"].values)
+    np.testing.assert_array_equal(own.own_error_percent, [np.nan] * 3)
+    assert own.order.tolist() == [-1] * 3
+    assert own.marched_sentence.tolist() == [""] * 3
+    np.testing.assert_array_equal(own.audit_error_percent, [np.nan] * 3)
+    assert read(PointFields, data, 1).amplitude.shape == (3, 1)
+    assert [read(CaseNumbers, data, case).peak_point for case in (0, 1)] == [1, -1]
+    assert math.isnan(read(CaseNumbers, data, 0).peak_amplitude)
+    every: Any = read(CaseNumbers, data)
+    assert every.peak_point.tolist() == [1, -1]
+    assert every.peak_amplitude.shape == (2,)
+    assert [int(said.verify_settled) for said in each(read(TimeChecks, data, 0))] == [1]
+    assert [int(said.verify_settled) for said in each(read(TimeChecks, data))] == [0, 1]
+    assert list(each(read(OtherMotions, data, 0))) == []
+    assert (holds(TimeChecks, data), holds(OtherMotions, data)) == (True, False)
+    apart = read(Points, data.assign(point_case=("point", [0, 1, 0, 1, 1, 0])), 0)
+    assert apart.frequency_hz.tolist() == [10.0, 12.0, 15.0]
 
 
 def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:

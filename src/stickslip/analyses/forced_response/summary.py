@@ -187,13 +187,13 @@ def _always_high(data: xr.Dataset) -> bool:
 
 def _row(data: xr.Dataset, i: int, label: str) -> tuple[str, ...]:
     case = Curve(data, i)
-    own = case.numbers
+    own, level = case.numbers, int(case.read(Verdicts).case_verdict)
     counts = (own.points, own.points_low, own.points_high, own.points_failed, own.newton_steps, own.unknowns_solved)
     return (
         label,
         _millimetres(1e3 * own.peak_amplitude),
         f"{own.peak_frequency_hz:.3f}",
-        LEVELS[int(case.read(Verdicts).case_verdict)],
+        LEVELS[level] if level >= 0 else "",
         said_of(case.peak_stability),
         *map(str, counts),
         f"{own.seconds_contact + own.seconds_linear + own.seconds_rest:.2f}",

@@ -97,11 +97,10 @@ class Points:
         "error that is predicted of the accepted solution itself: 0 where no force acts on the harmonics left out, NaN where it was not judged",
         along="point",
     )
-    audit_error_percent: FloatArray | None = column(
+    audit_error_percent: FloatArray = column(
         "percent",
         "difference of the accepted solution from one with more harmonics (an audit), NaN where none was made: not needed, or judged by prediction alone",
         along="point",
-        default=None,
     )
     audit_error_of: TextArray = column(
         "1", "the output or dof that differs so much, empty where no audit was made", along="point"

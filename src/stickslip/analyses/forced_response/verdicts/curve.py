@@ -310,8 +310,12 @@ class Curve:
     @cached_property
     def audit(self) -> FloatArray:
         """(n,) relative difference from a solution with more harmonics; NaN without an audit."""
-        percent = self.points.audit_error_percent
-        return np.full(self.at.size, np.nan) if percent is None else percent / 100
+        return self.points.audit_error_percent / 100
+
+    @property
+    def audits(self) -> bool:
+        """Whether solutions could be audited; results of early versions do not say."""
+        return "audit_error_percent" in self.data
 
     @cached_property
     def reference(self) -> FloatArray:

@@ -354,7 +354,7 @@ def audited(case: Curve) -> Iterator[Finding]:
 def not_audited(case: Curve) -> Iterator[Finding]:
     """Doubt a peak with few harmonics that rests on predictions alone; note such points elsewhere."""
     few = case.converged & case.few & ~case.exact
-    none = case.points.audit_error_percent is not None and bool(np.isnan(case.audit).all())
+    none = case.audits and bool(np.isnan(case.audit).all())
     if not none or not case.decides or not few.any() or case.attained[case.peak]:
         return
     if np.isnan(case.reference[few]).any():
