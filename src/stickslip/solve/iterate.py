@@ -13,6 +13,7 @@ from stickslip.operators import Jacobian
 from stickslip.solve.linear import LinearSolver, solve_with, whole_array
 from stickslip.solve.status import Status
 
+ROUNDED_COLUMN = 1e-15  # norm of a column over the largest, below which it is rounding
 EPS = float(np.finfo(float).eps)
 PROBED_ULPS = 4.0  # digits that are changed, in units of the last
 PROBES = 6  # changes of the last digits that are tried
@@ -114,12 +115,13 @@ class Globalisation(Protocol):
 def column_scale(jac: Jacobian, before: FloatArray | None) -> FloatArray:
     """Return the scale (n,) that makes lengths of steps independent of units: the largest norm each column has had (Moré 1978).
 
-    The scale is one for a large Jacobian known by its products only.
+    The scale is one for a large Jacobian known by its products only, and for columns of zeros or of rounding, whose unknowns nothing
+    determines: a step scaled by rounding would have any length.
     """
     norms = np.sqrt(_column_squares(jac))
     if before is not None:
         return np.maximum(before, norms)
-    norms[norms == 0.0] = 1.0
+    norms[norms <= ROUNDED_COLUMN * norms.max(initial=0.0)] = 1.0
     return norms
 
 
