@@ -41,15 +41,10 @@ class RunUpView(Node):
         return str(self.found.output_label[self.found.report_output or 0])
 
 
-def _of(points: Sequence[LinePoint], name: str) -> FloatArray:
-    """Return a number of all points."""
-    return np.array([getattr(point, name) for point in points])
-
-
 def campbell_with_response(view: RunUpView) -> Plot:
     """Show the amplitudes on the lines of their engine orders, between natural frequencies with stuck and open contacts."""
     found = view.found
-    hz, amplitude = _of(found.points, "frequency_hz"), view.amplitude(found.points)
+    hz, amplitude = np.array([point.frequency_hz for point in found.points]), view.amplitude(found.points)
     scale = scale_for(amplitude, "m")
     top = float(np.nanmax(amplitude)) if np.isfinite(amplitude).any() else 1.0
     figure = go.Figure()
@@ -89,8 +84,8 @@ def campbell_with_response(view: RunUpView) -> Plot:
             line={"color": MUTED, "width": 1, "dash": "dash"},
         )
         figure.add_scatter(
-            x=_of(own, "speed_rpm"),
-            y=_of(own, "frequency_hz"),
+            x=np.array([point.speed_rpm for point in own]),
+            y=np.array([point.frequency_hz for point in own]),
             mode="markers",
             name=f"EO {order}",
             showlegend=False,
@@ -139,11 +134,11 @@ def amplitudes(view: RunUpView) -> Plot:
         order = line.engine_order
         own = view.found.along(line)
         figure.add_scatter(
-            x=_of(own, "speed_rpm"),
+            x=np.array([point.speed_rpm for point in own]),
             y=scale.factor * view.amplitude(own),
             mode="lines+markers",
             name=f"EO {order}",
-            customdata=100 * _of(own, "slipping"),
+            customdata=100 * np.array([point.slipping for point in own]),
             line={"color": colour(i), "width": 1.6},
             marker={"size": 4},
             hovertemplate=f"EO {order}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm, %{{customdata:.0f}} % of the contacts slip<extra></extra>",
@@ -165,7 +160,7 @@ def fast(view: RunUpView) -> Plot | None:
     for i, line in enumerate(found.lines):
         order, own = line.engine_order, found.along(line)
         figure.add_scatter(
-            x=_of(own, "speed_rpm"),
+            x=np.array([point.speed_rpm for point in own]),
             y=scale.factor * view.amplitude(own),
             mode="lines",
             name=f"EO {order}, steady",
