@@ -8,10 +8,10 @@ import numpy as np
 from stickslip.analyses.forced_response.stability.examination import too_long
 from stickslip.analyses.quasi_periodic.problem import NAME, Question, hertz
 from stickslip.analyses.quasi_periodic.records import NOT_FOUND, TwoFrequencies
-from stickslip.analyses.quasi_periodic.time import compared
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath
+from stickslip.response.quasi_periodic.in_time import second_tone_in_time, two_loads_in_time
 from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, with_enough
 from stickslip.response.quasi_periodic.tone import growing_tones, solve_free, swept, tone_beside
 from stickslip.study.analysis import Notes
@@ -84,12 +84,16 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
 def _in_time(
     question: Question, problem: TwoTones, motion: TorusMotion, kind: str
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Return what time integration comes to; None where it comes to nothing."""
+    """Return largest and smallest amplitude (outputs,) in time, and the difference from the balance (NaN for a self-excited tone); None for one tone or a failure."""
     try:
-        return compared(question, problem, motion, kind)
+        if kind == "two loads":
+            return two_loads_in_time(problem, motion, question.first, question.second)
+        if kind == "second tone":
+            found = second_tone_in_time(problem, motion, question.first)
+            return found.largest, found.least, np.nan
     except FAILED as error:
         LOG.warning(f"{NAME}: {hertz(motion.omegas[0])}: not integrated in time: {error}")
-        return None
+    return None
 
 
 def _found(

@@ -9,14 +9,16 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.quasi_periodic.problem import TorusMotion, TwoTones
 from stickslip.response.time.settling import overflowed
-from stickslip.response.time.start import TransientStart
+from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.stepping.marcher import FINE, prepared, with_enough_steps
+from stickslip.response.time.transient import TimeStepping, integrate
 
 KEPT = 32  # samples of a period that are kept
 WINDOWS = 4  # of the later half, which are compared
@@ -25,6 +27,9 @@ ALIKE = 0.02  # relative spread between windows that counts as none
 WORK = 8e10  # floating point operations of a march, 20 s of them as a rule
 PEAKS = 6  # of a spectrum that are told
 FAINT = 1e-3  # of the largest peak: what is below is not told
+FEW_STEPS = 256  # in a period of the faster frequency, where a balance is compared
+SHORT = 40  # turns of the first phase that two loads may take to repeat themselves in a comparison
+LONG = 20  # such repetitions at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,3 +252,83 @@ def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray
             hertz[output, place] = (top + shift) * step
             peaks[output, place] = float(np.exp(b - 0.25 * (a - c) * shift))
     return hertz, peaks
+
+
+def second_tone_in_time(problem: TwoTones, motion: TorusMotion, load: HarmonicLoad) -> Statistics:
+    """Return the statistics of a motion with a self-excited second tone, integrated from the balance under the load of the first."""
+    system, omega = problem.system, motion.omegas[0]
+    contacts = system.interface
+    start = start_from_harmonics(_folded(motion), omega / _turns(motion)[0], contacts.gap_operator, contacts.laws)
+    outputs = np.asarray(system.outputs)
+    return statistics(course(system.structure, contacts, load, omega, outputs, start, steps=FEW_STEPS))
+
+
+def _turns(motion: TorusMotion) -> tuple[int, int]:
+    """Return how many turns of both phases nearly close."""
+    ratio = motion.omegas[1] / motion.omegas[0]
+    choices = [(p, max(1, round(ratio * p))) for p in range(1, SHORT + 1)]
+    return min(choices, key=lambda c: (round(abs(ratio - c[1] / c[0]), 9), c[0]))
+
+
+def _folded(motion: TorusMotion) -> ComplexArray:
+    """Return the motion as harmonics of the frequency of which both are nearly multiples."""
+    p, q = _turns(motion)
+    orders = [j * p + k * q for j, k in motion.indices]
+    out = np.zeros((max(abs(h) for h in orders) + 1, motion.coefficients.shape[1]), dtype=complex)
+    for h, row in zip(orders, motion.coefficients, strict=True):
+        out[abs(h)] += row if h >= 0 else row.conj()
+    out[0] = out[0].real
+    return out
+
+
+def two_loads_in_time(
+    problem: TwoTones, motion: TorusMotion, first: HarmonicLoad, second: HarmonicLoad
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Integrate loads in a ratio of whole numbers near that of a motion, and compare with the balance at that ratio.
+
+    Parameters
+    ----------
+    problem, motion
+        Problem, and its motion.
+    first, second
+        Loads of either frequency.
+
+    Returns
+    -------
+    tuple or None
+        Largest and smallest amplitude (outputs,) in time, m, and the difference from the balance, root mean square over that of the
+        motion. None for loads that beat too slowly, or without a balance at the ratio.
+    """
+    p, q = _turns(motion)
+    base = motion.omegas[0] / p
+    if p == q:
+        return None  # they beat more slowly than is marched
+    near = problem.solve((motion.omegas[0], q * base), motion.x)
+    if not near.converged:
+        return None
+    system, outputs = problem.system, np.asarray(problem.system.outputs)
+    contacts = system.interface
+    forces: dict[int, ComplexArray] = {}
+    for turns, own in ((p, first), (q, second)):
+        for h, f in own.harmonics.items():
+            forces[turns * h] = forces.get(turns * h, np.zeros_like(f)) + f
+    load = HarmonicLoad(first.static, forces)
+    steps = FEW_STEPS * max(p, q)
+    found = integrate(
+        system.structure,
+        contacts.gap_operator,
+        contacts.laws,
+        load,
+        base,
+        outputs,
+        start_from_harmonics(_folded(near), base, contacts.gap_operator, contacts.laws),
+        TimeStepping(steps_per_period=steps, max_periods=LONG, harmonics=max(load.harmonics), tolerance=1e-4),
+        weights=contacts.weights,
+    )
+    times = 2.0 * np.pi / base * np.arange(1, steps + 1) / steps
+    balance = near.at_times(outputs, times)
+    vibrates = balance - balance.mean(axis=0)
+    off = float(np.linalg.norm(found.outputs - balance) / np.linalg.norm(vibrates))
+    each = found.outputs[: steps // p * p].reshape(p, -1, outputs.size)
+    amplitude = 0.5 * np.ptp(each, axis=1)
+    return amplitude.max(axis=0), amplitude.min(axis=0), off
