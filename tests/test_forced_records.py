@@ -10,12 +10,15 @@ import pytest
 import stickslip as ss
 from stickslip.analyses.forced_response.physics import model_change
 from stickslip.analyses.forced_response.records import dataset
+from stickslip.analyses.forced_response.records.columns import COLUMNS, OWNERS
 from stickslip.analyses.forced_response.records.values import of_checks
 from stickslip.analyses.forced_response.stability import bifurcating, elsewhere
 from stickslip.analyses.forced_response.stability.bifurcating import of_bifurcations
 from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.not_periodic import Answer, of_answers
 from stickslip.units import HZ
+
+ONCE = ("peak_frequency_hz", "unstable_peak_frequency_hz")  # frequencies of a case, not of rows
 
 
 def check(found: dict[str, Any], **expected: Any) -> None:
@@ -205,9 +208,9 @@ def test_changes_of_the_peak_with_more_modes_and_fewer_points(monkeypatch: pytes
 def test_rows_of_cases_follow_each_other_and_say_whose_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dataset, "with_levels", lambda *_: {})
     told = {"points": 2, "peak_point": 1, "attributes": "{}", "choice_sentence": "at 5 Hz", "points_failed": 1}
-    one = told | {like: np.array([1.0, 2.0]) for _, like in dataset.ROWS.values()}
+    one = told | {name: np.array([1.0, 2.0]) for name in COLUMNS if name.endswith("frequency_hz") and name not in ONCE}
     data = dataset.put_together([one, one | {"peak_point": -1}], ["first", "second"])
-    owners = {owner: data[owner].values for owner, _ in dataset.ROWS.values()}
+    owners = {owner: data[owner].values for owner in OWNERS.values()}
     each = [0, 0, 1, 1]
     check(owners, point_case=each, another_case=each, attempt_case=each, alert_case=each, bifurcation_case=each)
     check(owners, verify_case=each, stability_case=each, not_periodic_case=each, tuned_case=each)
