@@ -166,10 +166,9 @@ def _work_cards(response: Response) -> list[Card]:
         note = f"{more} of {counted(n, 'accepted point')}, chosen by {response.selection}"
         label = f"of points keep other harmonics than H = {response.low_name}"
         found = [Card(f"{number(100 * more / n, 2)} %" if n else NONE, label, note)]
-    work, steps = (
-        sum(own) for own in zip(*((n.unknowns_solved, n.newton_steps) for n in response.numbers_of), strict=True)
-    )
+    work = sum(own.unknowns_solved for own in response.numbers_of)
     if work > 0:
+        steps = sum(own.newton_steps for own in response.numbers_of)
         note = f"of all solutions together, in {counted(steps, 'Newton step')}"
         found.append(Card(number(work, 6), "unknowns solved", note))
     return found
