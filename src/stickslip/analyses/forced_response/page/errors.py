@@ -84,7 +84,7 @@ def _caption(response: Response) -> str:
 
 def _above(response: Response) -> str:
     """State the outcome of the solutions with too large a predicted error; a solution with more harmonics overrules the prediction."""
-    audit = response.audit
+    audit = response.of_points.audit_error_percent
     above = response.converged & (response.of_points.own_error_percent > response.threshold)
     if not above.any():
         return "None lies above it. "

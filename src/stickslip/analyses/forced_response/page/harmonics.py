@@ -200,7 +200,7 @@ def _auto_text(response: Response) -> str:
 
 def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
     mine = response.converged & (response.point_case == case.index)
-    each = [own[mine] for own in (response.of_points.own_error_percent, response.audit)]
+    each = [own[mine] for own in (response.of_points.own_error_percent, response.of_points.audit_error_percent)]
     told = [predicted(float(np.nanmax(e))) if np.isfinite(e).any() else NONE for e in each]
     return _kept_where(response, case), "; ".join(told)
 

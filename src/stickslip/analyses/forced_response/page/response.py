@@ -209,12 +209,6 @@ class Response(Node):
         return Alert(self.point_case[at], self.hz[at], error[at])
 
     @property
-    def audit(self) -> FloatArray:
-        """(point,) difference of a solution from one with more harmonics, percent; NaN without an audit."""
-        found = self.of_points.audit_error_percent
-        return np.full(self.hz.size, np.nan) if found is None else found
-
-    @property
     def first_error(self) -> FloatArray:
         """(point,) what the strategy compared with its threshold: predicted errors of first solutions in percent, or an indicator of its own."""
         own = self.of_points
