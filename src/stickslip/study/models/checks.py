@@ -19,8 +19,8 @@ from stickslip.study.file.tables import Tables, original
 from stickslip.study.models.aero import aero_refusals, knows_speeds
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
-from stickslip.study.models.mistuning import mistuning_refusals
 from stickslip.study.models.pressure import pressure_refusals
+from stickslip.study.models.spares import mistuning_refusals
 from stickslip.study.questions import ANALYSES
 
 _FLAT_CURVED = {

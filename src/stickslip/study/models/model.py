@@ -16,9 +16,10 @@ from stickslip.study.file.model.loads import LoadTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.aero import aerodynamics_of
 from stickslip.study.models.files import alike
-from stickslip.study.models.mistuning import mistuning_of, spare_parts
+from stickslip.study.models.mistuning import mistuning_of
 from stickslip.study.models.parts import Memo, Workshop
 from stickslip.study.models.pressure import read_pressure
+from stickslip.study.models.spares import spare_parts
 from stickslip.units import DEG, HZ, RPM
 
 DOF = re.compile(r"node\d+(\.r?[xyz])?|r?[xyz]|dof\d+")
