@@ -60,18 +60,16 @@ def kept() -> dict[str, str]:
         f"keys/{name}.md": f"# Keys: {titles[name]}\n\n{MADE} [The study file](../study_file.md) explains them.\n\n{text}"
         for name, text in {**keys(), "laws": laws()}.items()
     }
-    variables = {
-        "forced_response": ("a forced response", variables_of_response()),
-        "limit_cycle": ("limit cycles", variables_of_cycles()),
-        "residual_tractions": ("residual tractions", variables_of_tractions()),
-        "model": ("the model, in modes, Campbell and SAFE diagrams and flutter", variables_of_models()),
-    }
     found |= {
-        f"variables/{name}.md": f"# Variables of {title}\n\n{MADE} [Results](../results.md) explains where they stand.\n\n{text}"
-        for name, (title, text) in variables.items()
+        f"variables/{name}.md": f"# Variables of {_node(name)}\n\n{MADE} [Results](../results.md) explains where they stand.\n\n{text}"
+        for name, text in variables().items()
     }
     pages = {**found, "api.md": interface_by_task.interface_page()}
     return {path: text.rstrip() + "\n" for path, text in pages.items()}
+
+
+def _node(name: str) -> str:
+    return "the model, in most analyses" if name == "model" else f"`[{name}]`"
 
 
 def keys() -> dict[str, str]:
@@ -214,46 +212,28 @@ def laws() -> str:
     return "\n".join(lines)
 
 
-def variables_of_response() -> str:
-    """Return the variables of a forced response, as the code that writes them lists them."""
-    from stickslip.analyses.forced_response.records.columns import COLUMNS
-
-    rows = [
-        f"| `{name}` | {', '.join(c.along)} | {_escaped(c.meaning)} | {_unit(c.unit)} |" for name, c in COLUMNS.items()
-    ]
-    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
-
-
-def variables_of_cycles() -> str:
-    """Return the variables of limit cycles."""
-    from stickslip.analyses.limit_cycle.records import LimitCycles
-
-    return _variables(LimitCycles)
-
-
-def _variables(kind: type) -> str:
-    """Return the table of the variables that a record of a case becomes."""
+def variables() -> dict[str, str]:
+    """Return the table of variables of each analysis by its name, and of the model, which most of them have."""
     from stickslip.analyses.columns import described
-
-    rows = [
-        f"| `{name}` | {', '.join(['case', *dims])} | {_escaped(about)} | {_unit(units)} |"
-        for name, dims, units, about in described(kind)
-    ]
-    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
-
-
-def variables_of_tractions() -> str:
-    """Return the variables of bounds over residual tractions."""
-    from stickslip.analyses.residual_tractions.records import ResidualTractions
-
-    return _variables(ResidualTractions)
-
-
-def variables_of_models() -> str:
-    """Return what the linear analyses say of the model."""
     from stickslip.analyses.facts import ModelFacts
+    from stickslip.study.analysis import named
 
-    return _variables(ModelFacts)
+    of_model = list(described(ModelFacts))
+    found = {"model": _variables(of_model, ("case",))}
+    for name in ANALYSES:
+        own = [row for kind in named(name).answers for row in described(kind) if row not in of_model]
+        # points of a forced response follow each other over all cases
+        found[name] = _variables(own, () if name == "forced_response" else ("case",))
+    return found
+
+
+def _variables(rows: list[tuple[str, tuple[str, ...], str, str]], outer: tuple[str, ...]) -> str:
+    """Return a table of variables from their names, dimensions, units and meanings."""
+    lines = [
+        f"| `{name}` | {', '.join([*outer, *dims])} | {_escaped(about)} | {_unit(units)} |"
+        for name, dims, units, about in rows
+    ]
+    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *lines, ""])
 
 
 def _unit(units: str) -> str:

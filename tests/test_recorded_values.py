@@ -16,23 +16,21 @@ import pytest
 import xarray as xr
 
 from stickslip.analyses.all_motions.analysis import ALL_MOTIONS
-from stickslip.analyses.all_motions.records import FOUND, FoundMotions, found_motions
+from stickslip.analyses.all_motions.records import FOUND, found_motions
 from stickslip.analyses.columns import described, variables
 from stickslip.analyses.facts import ModelFacts
-from stickslip.analyses.forced_response.records.columns import KINDS
 from stickslip.analyses.forced_response.records.dataset import with_measured
 from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE
-from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch
 from stickslip.analyses.modal_synthesis.analysis import MODAL_SYNTHESIS
-from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
+from stickslip.analyses.modal_synthesis.records import SynthesisLevel
 from stickslip.analyses.nonlinear_mode.analysis import NONLINEAR_MODE
-from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes
+from stickslip.analyses.nonlinear_mode.records import END, ModeRecord
 from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
-from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
+from stickslip.analyses.quasi_periodic.records import TwoFrequencies
 from stickslip.analyses.residual_tractions.analysis import RESIDUAL_TRACTIONS
-from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord
+from stickslip.analyses.residual_tractions.records import TractionRecord
 from stickslip.analyses.resonance.analysis import RESONANCE
-from stickslip.analyses.resonance.records import Resonances
 from stickslip.analyses.run_up import records as of_run_up
 from stickslip.analyses.run_up.analysis import RUN_UP
 from stickslip.analyses.run_up.records import (
@@ -46,7 +44,7 @@ from stickslip.analyses.run_up.records import (
     static_forces,
 )
 from stickslip.analyses.waves.modes import wheel_modes_in
-from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes
+from stickslip.analyses.waves.records import Modes
 from stickslip.analyses.waves.solve import STATIC, skin_note
 from stickslip.analyses.waves.solve import _static as static_numbers
 from stickslip.reduction.waves import wave
@@ -57,7 +55,9 @@ from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.residual_tractions.bounds import Bound
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.solve.status import Status
+from stickslip.study.analysis import named
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
+from stickslip.study.questions import ANALYSES
 from stickslip.study.store.archive import flat
 from stickslip.units import DEG, HZ, RPM
 
@@ -860,22 +860,7 @@ def test_waves_have_the_diameters_of_their_numbers() -> None:
     assert [wave(k, 6).nodal_diameter for k in range(6)] == [0, 1, 2, 3, 2, 1]
 
 
-RECORDS = (
-    FoundMotions,
-    Campbell,
-    Flutter,
-    Interference,
-    LimitCycles,
-    ModelFacts,
-    Modes,
-    ModalSynthesis,
-    NonlinearModes,
-    QuasiPeriodic,
-    ResidualTractions,
-    Resonances,
-    RunUp,
-    *KINDS,
-)  # of cases, whose fields are columns
+RECORDS = (ModelFacts, *(kind for name in ANALYSES for kind in named(name).answers))  # whose fields are columns
 
 
 def written() -> set[str]:

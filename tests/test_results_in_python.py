@@ -48,6 +48,18 @@ def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_f
         result.to_dataframe("modes")
 
 
+def test_facts_of_a_case_are_not_the_rows_of_an_analysis() -> None:
+    data = xr.Dataset(
+        {
+            "output": ("case", ["tip.x"]),
+            "largest": ("case", [3.0]),
+            "contact_stiffness": (("case", "contact"), [[1.0, 3.0]]),
+        }
+    )
+    frame = ss.Result(tree_of(stiffness=data)).to_dataframe()
+    assert frame["contact_stiffness"].tolist() == [1.0, 3.0]
+
+
 def test_a_result_is_walked_through_by_the_names_of_its_analyses() -> None:
     result = ss.Result(tree_of(modes=xr.Dataset(), forced_response=xr.Dataset()))
     assert list(result) == ["modes", "forced_response"]

@@ -4,6 +4,7 @@ import json
 import math
 import re
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
@@ -30,6 +31,7 @@ from stickslip.study.models.cost import memory_gb, waves_gb
 from stickslip.study.models.parts import damper_of
 from stickslip.study.models.study import read_study
 from stickslip.study.questions import ANALYSES
+from stickslip.units import quantity
 
 
 def refused(path: Path) -> str:
@@ -617,3 +619,17 @@ def test_replacing_keys_is_checked_like_the_file(tmp_path):
 @pytest.mark.parametrize("name", ANALYSES)
 def test_a_file_is_judged_by_the_table_of_the_analysis(name):
     assert study_tables().model_fields[name].annotation == named(name).table | None
+
+
+def test_a_unit_without_words_or_without_one_per_area_is_asked_for() -> None:
+    with pytest.raises(
+        InputError, match=r"a moment is shared, and its unit 'n_m' has none per area\. Add the pair to `PER_AREA`"
+    ):
+        quantity("a moment", "n_m", shared=True)
+
+    @dataclass(frozen=True)
+    class Lever:
+        moment: float = quantity("a moment", "n_m")
+
+    with pytest.raises(InputError, match=r"'a moment': has the unit 'n_m' without words\. Add it to `IN_WORDS`"):
+        table_of(Lever)

@@ -13,7 +13,8 @@ DEG = math.pi / 180  # rad
 MM = 1e-3  # m
 
 TO_SI = {"hz": HZ, "rpm": RPM, "deg": DEG, "mm": MM}  # of units that keys end with; others are SI
-PER_AREA = {"n_per_m": "n_per_m3", "n": "pa", "n_per_m3": "n_per_m5"}  # of what is shared, given for a square metre
+# of what is shared among the points of an interface, given for a square metre
+PER_AREA = {"n_per_m": "n_per_m3", "n": "pa", "n_per_m3": "n_per_m5", "n_s_per_m": "n_s_per_m3"}
 _METADATA = "quantity"
 
 
@@ -146,7 +147,19 @@ def _beyond(size: float) -> str:
 
 
 def quantity(about: str, unit: str = "", *, default: Any = MISSING, **limits: Any) -> Any:
-    """Return a dataclass field that becomes a key of the study file; `limits` are further fields of `Quantity`."""
+    """Return a dataclass field that becomes a key of the study file; `limits` are further fields of `Quantity`.
+
+    Raises
+    ------
+    InputError
+        If the value is shared among points and `PER_AREA` has no unit for a square metre of it.
+    """
+    if limits.get("shared") and unit and unit not in PER_AREA:
+        raise input_error(
+            "quantity",
+            f"{about} is shared, and its unit {unit!r} has none per area",
+            "Add the pair to `PER_AREA` of units.py.",
+        )
     return field(default=default, metadata={_METADATA: Quantity(about=about, unit=unit, **limits)})
 
 

@@ -87,7 +87,8 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     names = [str(v) for v in data.data_vars]
     if of and of not in names:
         raise input_error(f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names))
-    chief = of or next((v for v in _CHIEF if v in names), names[0] if names else "")
+    rows = [v for v in names if set(data[v].dims) - {"case"}] or names  # facts of a case are no rows
+    chief = of or next((v for v in _CHIEF if v in rows), next(iter(rows), ""))
     if not chief:
         raise input_error(f"to_dataframe({name!r})", "holds no variables", "Look at result.data.")
     dims = set(data[chief].dims)

@@ -221,6 +221,8 @@ class Analysis:
         in these alone share a job.
     shared
         Names of the other tables that it reads; a `Model` takes their keys with its own.
+    answers
+        Classes of the records of a case, whose columns are the variables of the node; the documentation lists them.
     checks
         Names of additional checks that a run may ask for (``verify``). A sealed job without them is opened again: `solve` then finds all
         its records done and writes the outcome of the checks into the notes.
@@ -241,6 +243,7 @@ class Analysis:
     summary: Callable[[xr.Dataset], "tuple[TextTable, ...]"]
     linear: bool = False
     shared: tuple[str, ...] = ()
+    answers: tuple[type[Any], ...] = ()
     checks: tuple[str, ...] = ()
     verdicts: Callable[[xr.Dataset], tuple[Verdict, ...]] = judged_when_made
     completed: Callable[[xr.Dataset, MeasuredPeaks | None], xr.Dataset] = nothing_to_add

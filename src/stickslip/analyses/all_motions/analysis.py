@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from stickslip.analyses.all_motions.problem import Question, question_of
-from stickslip.analyses.all_motions.records import FOUND, answer, found_motions
+from stickslip.analyses.all_motions.records import FOUND, FoundMotions, answer, found_motions
 from stickslip.analyses.all_motions.table import AllMotionsTable
 from stickslip.analyses.all_motions.verdicts import case_verdicts, tables
 from stickslip.analyses.collected import of_answers
@@ -83,4 +83,5 @@ ALL_MOTIONS = Analysis(
     check=_check,
     summary=tables,
     shared=("solver",),
+    answers=(FoundMotions,),
 )

@@ -35,7 +35,7 @@ from stickslip.analyses.forced_response.problem import (
     with_comparisons,
 )
 from stickslip.analyses.forced_response.records.blades import of_blades
-from stickslip.analyses.forced_response.records.columns import KnownVerdicts, stored
+from stickslip.analyses.forced_response.records.columns import KINDS, KnownVerdicts, stored
 from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
 from stickslip.analyses.forced_response.records.points import Response, lost_point
 from stickslip.analyses.forced_response.records.pressures import pressure_lines
@@ -338,6 +338,7 @@ FORCED_RESPONSE = Analysis(
     check=_check,
     summary=tables,
     shared=("harmonics", "solver", "limits"),
+    answers=KINDS,
     checks=(IN_TIME, HARMONICS),
     verdicts=_verdicts,
     completed=_completed,

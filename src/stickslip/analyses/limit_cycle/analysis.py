@@ -46,5 +46,6 @@ LIMIT_CYCLE = Analysis(
     check=_check,
     summary=tables,
     shared=("solver",),
+    answers=(LimitCycles,),
     checks=(IN_TIME,),
 )

@@ -4,7 +4,7 @@ from functools import partial
 
 from stickslip.analyses.collected import of_answers
 from stickslip.analyses.modal_synthesis.problem import NAME, question_of
-from stickslip.analyses.modal_synthesis.records import SynthesisLevel, answer
+from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel, answer
 from stickslip.analyses.modal_synthesis.solve import solve
 from stickslip.analyses.modal_synthesis.table import ModalSynthesisTable
 from stickslip.analyses.modal_synthesis.verdicts import case_verdicts, tables
@@ -33,4 +33,5 @@ MODAL_SYNTHESIS = Analysis(
     check=_check,
     summary=tables,
     shared=("solver",),
+    answers=(ModalSynthesis,),
 )

@@ -42,4 +42,5 @@ NONLINEAR_MODE = Analysis(
     check=_check,
     summary=tables,
     shared=("solver",),
+    answers=(NonlinearModes,),
 )

@@ -41,4 +41,5 @@ QUASI_PERIODIC = Analysis(
     dataset=partial(of_answers, answer=answer, verdicts=case_verdicts, lost=_lost),
     check=_check,
     summary=tables,
+    answers=(QuasiPeriodic,),
 )

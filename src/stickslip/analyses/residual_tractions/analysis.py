@@ -117,4 +117,5 @@ RESIDUAL_TRACTIONS = Analysis(
     check=_check,
     summary=tables,
     shared=("solver", "limits"),
+    answers=(ResidualTractions,),
 )

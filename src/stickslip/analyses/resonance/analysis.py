@@ -206,4 +206,5 @@ RESONANCE = Analysis(
     check=_check,
     summary=tables,
     shared=("solver",),
+    answers=(Resonances,),
 )

@@ -47,4 +47,5 @@ RUN_UP = Analysis(
     check=_check,
     summary=tables,
     shared=("harmonics", "solver", "limits"),
+    answers=(RunUp,),
 )

@@ -58,6 +58,7 @@ def wave_analysis(
         dataset=partial(dataset, answer=answer),
         check=partial(_check, name=name, inputs=inputs),
         summary=partial(summary, kind=kind, tables=tables_of),
+        answers=(kind,),
         linear=True,
     )
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import pydantic
 from pydantic import create_model, model_validator
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, input_error
 from stickslip.study.file.section import Section, custom_error
 from stickslip.units import Quantity, quantity_of
 
@@ -26,6 +26,8 @@ IN_WORDS = {
     "n_per_m": "N/m",
     "n_per_m3": "N/m³",
     "n_per_m5": "N/m⁵",
+    "n_s_per_m": "N s/m",
+    "n_s_per_m3": "N s/m³",
     "m_per_s": "m/s",
 }
 Column = tuple[Any, Any]  # annotation and pydantic's field
@@ -179,7 +181,11 @@ def _in_si(value: Any, q: Quantity, hint: Any) -> Any:
 def _about(q: Quantity, per_area: bool) -> str:
     """Return the description of a key: quantity, unit, range."""
     unit = q.key_of("", per_area=per_area).removeprefix(q.key).removeprefix("_")
-    texts = [q.about + (f" in {IN_WORDS.get(unit, unit)}" if unit else ""), _range(q)]
+    if unit and unit not in IN_WORDS:
+        raise input_error(
+            f"quantity {q.about!r}", f"has the unit {unit!r} without words", f"Add it to `IN_WORDS` of {__name__}."
+        )
+    texts = [q.about + (f" in {IN_WORDS[unit]}" if unit else ""), _range(q)]
     return ", ".join(filter(None, texts))
 
 
