@@ -38,7 +38,7 @@ def facts(**more: object) -> dict[str, xr.Variable]:
     numbers = {
         "sectors": SECTORS,
         "axis_direction": [0.0, 0.0, 1.0],
-        "axis_origin_m": [0.0, 0.0, 0.0],
+        "axis_origin": [0.0, 0.0, 0.0],
         "speed_rpm": 6000.0,
         "rotation": "6000 rpm, consistent tangent",
         "contacts": "none",

@@ -200,3 +200,10 @@ def test_coarse_skin_keeps_points_area_and_no_more_than_asked() -> None:
     assert area(points[kept], faces) == pytest.approx(area(points, triangles), rel=0.2)
     same, untouched = coarse_skin(points, triangles, 10_000)
     np.testing.assert_array_equal(same[untouched], triangles)
+
+
+def test_shapes_turn_about_the_axis_of_the_model() -> None:
+    data = modes_result()
+    data["axis_origin"] = variable("case xyz", [[0.1, -0.2, 0.0]], "m")
+    html = report_html(tree_of(modes=data))
+    assert '"origin":[100.0,-200.0,0.0]' in html.replace("&#34;", '"').replace(": ", ":").replace(", ", ",")

@@ -145,11 +145,11 @@ def _payload(view: Waves[Modes], points: FloatArray, shape: FloatArray, faces: I
     whole = np.round(shape / np.where(largest > 0, largest, 1.0) * _FULL).astype("<i2")
     inside = _outside_of_wheel(view, faces)
     wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
-    origin = view.numbers("axis_origin_m") * _MM
+    origin = np.zeros(3) if found.axis_origin is None else found.axis_origin * _MM
     return {
         "sectors": view.sectors,
         "axis": _unit(np.zeros(0) if found.axis_direction is None else found.axis_direction).tolist(),
-        "origin": origin.tolist() if origin.size == 3 else [0.0, 0.0, 0.0],
+        "origin": origin.tolist(),
         "points": _text(points.astype("<f4")),
         "faces": _text(faces.astype("<i4")),
         "wheelPoints": _text(wheel.astype("<i4")),
