@@ -16,6 +16,7 @@ import grimp
 import pytest
 
 import stickslip
+from evidence import house
 
 ROOT = Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "stickslip"
@@ -116,6 +117,17 @@ def test_modules_import_each_other_in_no_circle():
     imported = {m: graph.find_modules_directly_imported_by(m) for m in graph.modules}
     assert len(imported) == len(MODULES)
     TopologicalSorter(imported).prepare()  # an error names the modules of a circle
+
+
+def test_nobody_asks_for_the_class_of_a_law_or_of_a_linear_side():
+    assert house.type_questions(house.SIDES, house.BELOW_SIDES) == []
+    assert house.type_questions(house.law_classes(), ("contact",)) == []
+
+
+def test_small_modules_of_one_importer_have_a_reason():
+    small = house.imported_once()
+    assert small == [], "merge it into what imports it, or give the reason in evidence/house.py"
+    assert [name for name in house.REASONS if f"stickslip.{name}" not in house.imports()] == []
 
 
 def test_type_checking_imports_do_not_hide_from_the_contracts():
