@@ -1,6 +1,8 @@
 """Records become variables of a result and come back from them."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip.analyses.columns import described, record_of, variables
+from stickslip.analyses.page import report_html
+from stickslip.analyses.resonance.table import ResonanceTable
 from stickslip.arrays import FloatArray
 from stickslip.column import column, rows
+from stickslip.study.analysis import Case, Solved, named
+from stickslip.study.outcome import case_variables
+from stickslip.study.questions import ANALYSES
 from stickslip.study.store.archive import decode_record, encode_record, flat, from_flat
 from stickslip.study.store.netcdf import one_case, stacked
 
@@ -166,3 +173,15 @@ def test_an_older_result_without_a_variable_is_read() -> None:
     found = variables(Tree(name="a", height=1.0))
     del found["height"]
     assert np.isnan(record_of(Tree, found).height)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in ANALYSES if name != "forced_response"]
+)  # whose jobs always leave notes
+def test_a_case_without_a_solution_has_a_result_tables_and_a_page(name: str) -> None:
+    settings = SimpleNamespace(resonance=ResonanceTable.model_construct(parameter="excitation", by="amplitude"))
+    case = Case(0, "", {}, settings, None, "", Path())
+    data = named(name).dataset([Solved(case, (), {})]).assign(case_variables([case]))
+    named(name).summary(data)
+    assert all(v.level == "wrong" for v in named(name).verdicts(data))
+    assert report_html(xr.DataTree(children={name: xr.DataTree(data)}))

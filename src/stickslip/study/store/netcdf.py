@@ -107,11 +107,13 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
 
 def alike(data: xr.Dataset) -> list[list[int]]:
     """Return the cases of a dataset in groups of equal content, labels apart; a varied key need not affect every analysis."""
-    plain = data.drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
+    own = [
+        data.isel(case=i).drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
+        for i in range(data.sizes["case"])
+    ]
     groups: list[list[int]] = []
-    for i in range(data.sizes["case"]):
-        case = plain.isel(case=i)
-        twins = next((g for g in groups if plain.isel(case=g[0]).equals(case)), None)
+    for i, case in enumerate(own):
+        twins = next((g for g in groups if own[g[0]].equals(case)), None)
         if twins is None:
             groups.append([i])
         else:
