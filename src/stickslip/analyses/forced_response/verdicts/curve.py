@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -172,26 +173,33 @@ class Curve:
     data: xr.Dataset
     case: int
 
-    def read(self, kind: type[Kind]) -> Kind:
-        """Return the record of a kind of this case."""
-        return read(kind, self.data, self.case)
-
     @cached_property
+    def _records(self) -> dict[type[Any], Any]:
+        return {}
+
+    def read(self, kind: type[Kind]) -> Kind:
+        """Return the record of a kind of this case, read once."""
+        if kind not in self._records:
+            self._records[kind] = read(kind, self.data, self.case)
+        record: Kind = self._records[kind]
+        return record
+
+    @property
     def numbers(self) -> CaseNumbers:
         """Peak and work."""
         return self.read(CaseNumbers)
 
-    @cached_property
+    @property
     def points(self) -> Points:
         """The (n) points of the case."""
         return self.read(Points)
 
-    @cached_property
+    @property
     def fields(self) -> PointFields:
         """Amplitudes and harmonics of the points."""
         return self.read(PointFields)
 
-    @cached_property
+    @property
     def stability(self) -> PointStability:
         """Stability of the points."""
         return self.read(PointStability)
@@ -351,7 +359,7 @@ class Curve:
         word = self.stability.motion_stability[self.peak] if self.peak >= 0 else -1
         return next(iter(known), next((name for name, k in MOTION.items() if k == word), ""))
 
-    @property
+    @cached_property
     def rigid(self) -> bool:
         """Whether a contact is rigid."""
         return RIGID in list(self.read(ModelFacts).contact_law)
