@@ -178,7 +178,7 @@ def _as(kind: type[Any], name: str, value: Any) -> Any:
 
 
 def _missing(kind: type[Any], name: str, shape: Sequence[int] | None = None) -> Any:
-    """Return what stands for a value that a result does not hold; None: the default of the field."""
+    """Return the value of a variable that a result lacks; None: the default of the field."""
     own = _plain_type(kind, name)
     if kind.__dataclass_fields__[name].default is None:
         return None
@@ -188,7 +188,7 @@ def _missing(kind: type[Any], name: str, shape: Sequence[int] | None = None) -> 
 
 
 def _entry(array: Any) -> Any:
-    """Return what stands for a missing entry of an array, by the annotation of the array."""
+    """Return the fill value of an array from the annotation of its field."""
     (held,) = get_args(get_args(array)[-1]) or (str,)
     kind = get_origin(held) or held
     return next(value for base, value in ENTRIES.items() if issubclass(kind, base))

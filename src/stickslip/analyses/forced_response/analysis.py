@@ -122,7 +122,7 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
             points.append(lost_point(inputs.problem, error))
             yield points[-1]
     response, examined = yield from with_stability(inputs, points, notes)
-    _put_down(inputs, response, examined, notes)
+    _store_notes(inputs, response, examined, notes)
     if inputs.model.blades is not None and notes.get(BLADES) is None:
         notes.put(BLADES, of_blades(inputs, response))
     if failure is not None and response.top is None:
@@ -217,7 +217,7 @@ def _of_physics(question: Question, response: Response) -> Values:
     )
 
 
-def _put_down(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
+def _store_notes(question: Question, response: Response, examined: Sequence[Examined], notes: Notes) -> None:
     """Store all data for the dataset, once."""
     if notes.get("response") is not None:
         return

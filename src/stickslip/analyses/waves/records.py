@@ -275,7 +275,7 @@ def label(number: int, sectors: int, *, parted: bool) -> str:
 
 
 def is_parted(waves: Sequence[Wave]) -> bool:
-    """Say whether the two directions of a nodal diameter differ."""
+    """Whether the two directions of a nodal diameter differ."""
     return any(w.kind == "forward" for w in waves)
 
 
