@@ -14,7 +14,7 @@ from stickslip.analyses.columns import described, record_of, variables
 from stickslip.analyses.page import report_html
 from stickslip.analyses.resonance.table import ResonanceTable
 from stickslip.arrays import FloatArray
-from stickslip.column import column, rows
+from stickslip.column import column, columns_of, rows
 from stickslip.study.analysis import Case, Solved, named
 from stickslip.study.outcome import case_variables
 from stickslip.study.questions import ANALYSES
@@ -173,6 +173,17 @@ def test_an_older_result_without_a_variable_is_read() -> None:
     found = variables(Tree(name="a", height=1.0))
     del found["height"]
     assert np.isnan(record_of(Tree, found).height)
+
+
+@pytest.mark.parametrize("name", ANALYSES)
+def test_a_result_without_any_variable_is_read(name: str) -> None:
+    for kind in named(name).answers:
+        lengths = {dim: 3 for _, along, *_ in described(kind) for dim in along}
+        found = record_of(kind, {}, lengths)
+        for own in (n for n, c in columns_of(kind).items() if c.along and getattr(found, n) is not None):
+            values = np.ravel(getattr(found, own)).tolist()
+            missing = values in ([""] * len(values), [-1] * len(values)) or np.isnan(values).all()
+            assert missing, own
 
 
 @pytest.mark.parametrize(

@@ -9,4 +9,5 @@ FloatArray = npt.NDArray[np.floating[Any]]
 ComplexArray = npt.NDArray[np.complexfloating[Any, Any]]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+TextArray = npt.NDArray[np.str_]
 Matrix = Any  # dense ndarray or scipy.sparse.csr_array: scipy ships no types

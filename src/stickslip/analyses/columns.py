@@ -9,13 +9,15 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray, IntArray, TextArray
 from stickslip.column import Column, Rows, columns_of, rows_of
 from stickslip.study.store.netcdf import variable
 
 MISSING: Mapping[type, Any] = {float: np.nan, int: -1, str: "", bool: False}
 FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # where the records of a variable differ in length
 
-ENTRIES: Mapping[type, Any] = {np.floating: np.nan, np.integer: -1, str: ""}  # of arrays, by the class of their entries
+# of a column of several values, by the annotation as a whole: what it is made of differs from one NumPy to the next
+ENTRIES: Mapping[Any, Any] = {FloatArray: np.nan, IntArray: -1, TextArray: "", tuple[str, ...]: "", Sequence[str]: ""}
 CASE = "case"  # the dimension of cases, which a record of one case lacks
 
 
@@ -184,14 +186,7 @@ def _missing(kind: type[Any], name: str, shape: Sequence[int] | None = None) -> 
         return None
     if own in MISSING:
         return np.full(shape, MISSING[own]) if shape else MISSING[own]
-    return np.zeros(0) if shape is None else np.full(shape, _entry(own))
-
-
-def _entry(array: Any) -> Any:
-    """Return the fill value of an array from the annotation of its field."""
-    (held,) = get_args(get_args(array)[-1]) or (str,)
-    kind = get_origin(held) or held
-    return next(value for base, value in ENTRIES.items() if issubclass(kind, base))
+    return np.zeros(0) if shape is None else np.full(shape, ENTRIES[own])
 
 
 def _plain_type(kind: type[Any], name: str) -> Any:

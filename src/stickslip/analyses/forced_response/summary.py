@@ -15,7 +15,6 @@ from stickslip.analyses.forced_response.records.columns import (
     MotionsInTime,
     PointFields,
     SideBranches,
-    TextArray,
     TimeChecks,
     Verdicts,
     holds,
@@ -25,7 +24,7 @@ from stickslip.analyses.forced_response.records.columns import (
 from stickslip.analyses.forced_response.stability.stable_words import all_lines, said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.working_range import TITLE, range_lines
-from stickslip.arrays import IntArray
+from stickslip.arrays import IntArray, TextArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import LEVELS, said

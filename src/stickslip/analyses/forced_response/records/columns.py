@@ -9,18 +9,16 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, get_args
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from stickslip.analyses.columns import record_of
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray, IntArray, TextArray
 from stickslip.column import Column, column, columns_of
 from stickslip.response.forced.choices import Stage
 from stickslip.solve.status import Status
 from stickslip.study.verdict import LEVELS, POINT_LEVELS
 
 Kind = TypeVar("Kind")
-TextArray = npt.NDArray[np.str_]
 STAGES = get_args(Stage)
 MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutral": 4}  # numbers of motion_stability
 

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from stickslip.analyses.forced_response.more_harmonics import ReferenceDoubt
 from stickslip.analyses.forced_response.problem import Question
@@ -28,7 +27,7 @@ from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.analyses.forced_response.stability.stable_words import BASES
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, TextArray
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import equivalent_damping, signals
@@ -311,7 +310,7 @@ def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> C
     return out
 
 
-def texts(values: Iterable[str]) -> npt.NDArray[np.str_]:
+def texts(values: Iterable[str]) -> TextArray:
     """Return texts as an array, also for an empty list."""
     return np.array(list(values), dtype=str)
 
