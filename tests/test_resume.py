@@ -5,6 +5,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -66,13 +67,12 @@ def journalled(study: Path) -> dict[str, list[tuple[int, str, bytes]]]:
     found = {}
     for path in sorted((study.parent / "results/jobs").glob("*.*")):
         if path.suffix in (".part", ".job"):
-            db = sqlite3.connect(path)
-            # a run that is stopped as it begins a job leaves a file without tables
-            begun = db.execute("select 1 from sqlite_master where name = 'record'").fetchone()
-            if begun or path.suffix == ".job":
-                rows = db.execute("select id, arrived, payload from record order by id").fetchall()
-                found[path.stem] = rows
-            db.close()
+            with closing(sqlite3.connect(path)) as db:
+                # a run that is stopped as it begins a job leaves a file without tables
+                begun = db.execute("select 1 from sqlite_master where name = 'record'").fetchone()
+                if begun or path.suffix == ".job":
+                    rows = db.execute("select id, arrived, payload from record order by id").fetchall()
+                    found[path.stem] = rows
     return found
 
 

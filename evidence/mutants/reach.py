@@ -17,6 +17,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -267,7 +268,7 @@ class Reach:
 
     def _of_piece(self, data: Path, path: str) -> dict[int, set[str]]:
         found: dict[int, set[str]] = {}
-        with sqlite3.connect(f"file:{data}?mode=ro", uri=True) as base:
+        with closing(sqlite3.connect(f"file:{data}?mode=ro", uri=True)) as base:
             rows = base.execute(
                 "select context.context, line_bits.numbits from line_bits join file on file.id = file_id "
                 "join context on context.id = context_id where file.path like ? and context.context != ''",

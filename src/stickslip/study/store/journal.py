@@ -218,7 +218,7 @@ def _checksum(db: sqlite3.Connection) -> str:
     """Return the checksum of all records and notes, each under its number or name."""
     found = sha256()
     for rows in ("select id, payload from record order by id", "select name, payload from note order by name"):
-        for place, payload in db.execute(rows):
+        for place, payload in db.execute(rows).fetchall():  # see `_notes`
             found.update(f"{place} {len(payload)} ".encode() + payload)
     return found.hexdigest()
 
@@ -233,7 +233,8 @@ def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
 
 
 def _notes(db: sqlite3.Connection) -> dict[str, dict[str, Any]]:
-    rows = db.execute("select name, payload from note order by name")
+    # all at once: a query that an error cuts off would hold the file's lock for as long as the error lives
+    rows = db.execute("select name, payload from note order by name").fetchall()
     return {name: decode(payload) for name, payload in rows}
 
 
