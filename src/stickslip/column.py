@@ -4,8 +4,9 @@ A record is a dataclass that a solver yields or an analysis answers with. `stick
 from records, and records from the variables.
 """
 
+from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, fields
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 
 @dataclass(frozen=True)
@@ -80,3 +81,10 @@ def columns_of(kind: type[Any]) -> dict[str, Column]:
 def rows_of(kind: type[Any]) -> dict[str, Rows]:
     """Return the rows of a class of records by the names of their fields."""
     return {f.name: f.metadata["rows"] for f in fields(kind) if "rows" in f.metadata}
+
+
+def names_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
+    """Yield the names of the variables that a class of records is stored as, those of its rows included."""
+    yield from (prefix + (c.name or name) for name, c in columns_of(kind).items())
+    for name, inner in rows_of(kind).items():
+        yield from names_of(get_args(get_type_hints(kind)[name])[0], inner.prefix)

@@ -19,6 +19,7 @@ from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
 from stickslip.report.result import RESULT, open_result
 from stickslip.study.analysis import TextTable
+from stickslip.study.coordinates import selectable
 from stickslip.study.outcome import Outcome
 from stickslip.study.store.netcdf import write_tree
 from stickslip.study.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
@@ -65,7 +66,7 @@ class Result:
         return cls(*found, outcome.waits)
 
     def __getitem__(self, name: str) -> xr.Dataset:
-        """Return the dataset of an analysis.
+        """Return the dataset of an analysis; ``.sel(force_n=5)`` takes the points, or cases, with a value of a varied key.
 
         Raises
         ------
@@ -74,7 +75,7 @@ class Result:
         """
         if name not in self.data.children:
             raise input_error(f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, list(self)))
-        return self.data[name].to_dataset()
+        return selectable(self.data[name].to_dataset())
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the analyses, in the order of the file, as over the keys of a dictionary."""

@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
+from stickslip.study.coordinates import as_stored
 from stickslip.study.varied import varied_values
 
 
@@ -84,6 +85,7 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     InputError
         If there is no such variable.
     """
+    data = as_stored(data)
     names = [str(v) for v in data.data_vars]
     if of and of not in names:
         raise input_error(f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names))

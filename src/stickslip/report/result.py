@@ -11,13 +11,14 @@ import xarray as xr
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.npz import require_no_pipe
+from stickslip.study.coordinates import with_coordinates
 from stickslip.study.store.netcdf import read_tree
 
 RESULT = "result.nc"
 
 
 def open_result(path: Path) -> xr.DataTree:
-    """Read a result into memory.
+    """Read a result into memory, with the coordinates that results of earlier versions lack.
 
     Parameters
     ----------
@@ -32,7 +33,9 @@ def open_result(path: Path) -> xr.DataTree:
     if file.suffix.lower() in (".html", ".htm"):
         remedy = f"Give the folder of a run, or the {RESULT} in it."
         raise input_error(str(file), "is a page, and no result", remedy)
-    return read_tree(file)
+    tree = read_tree(file)
+    found = {name: with_coordinates(node.to_dataset(), name) for name, node in tree.children.items()}
+    return xr.DataTree.from_dict({"/": tree.to_dataset(), **found})
 
 
 def analysis(tree: xr.DataTree, name: str) -> xr.Dataset:

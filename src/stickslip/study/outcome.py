@@ -8,6 +8,7 @@ from typing import Any
 import xarray as xr
 
 from stickslip.study.analysis import Analysis, Case, Solved, TextTable
+from stickslip.study.coordinates import with_coordinates
 from stickslip.study.models.measured import MeasuredPeaks
 from stickslip.study.questions import ANALYSES
 from stickslip.study.store.journal import read_note, read_sealed
@@ -128,7 +129,7 @@ class Book:
         unsolved = sum(UNSOLVED in s.notes for s in solved)
         failed = max(int(node.attrs.get("failed", 0)), unsolved)
         own = {ATTRIBUTE: to_json(found), "failed": failed}
-        self.nodes[asked.name] = node.assign_attrs(own)
+        self.nodes[asked.name] = with_coordinates(node.assign_attrs(own), asked.name)
 
     def _put_together(self) -> None:
         """Make the nodes of the analyses with newly sealed jobs."""

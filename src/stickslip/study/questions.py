@@ -21,11 +21,14 @@ class Home:
         pydantic class of its table in a study file; empty: a study file cannot ask for it.
     page
         Its `Section` of the page; empty: it has none.
+    axes
+        Names of the variables that are coordinates of its dataset, such as the frequencies of a response.
     """
 
     analysis: str
     table: str = ""
     page: str = ""
+    axes: tuple[str, ...] = ()
 
 
 def loaded(address: str) -> Any:
@@ -34,30 +37,35 @@ def loaded(address: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def _folder(name: str, analysis: str, table: str, page: str = "page") -> Home:
+def _folder(name: str, analysis: str, table: str, page: str = "page", axes: tuple[str, ...] = ()) -> Home:
     """Return the addresses of an analysis in a folder of its own."""
     own = f"stickslip.analyses.{name}"
-    return Home(f"{own}.analysis:{analysis}", f"{own}.table:{table}", f"{own}.{page}:SECTION")
+    return Home(f"{own}.analysis:{analysis}", f"{own}.table:{table}", f"{own}.{page}:SECTION", axes)
 
 
-def _waves(name: str, table: str) -> Home:
+def _waves(name: str, table: str, axes: tuple[str, ...] = ()) -> Home:
     """Return the addresses of an analysis of small vibrations by waves."""
     own = "stickslip.analyses.waves"
-    return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION")
+    return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION", axes)
 
+
+# names of the variables that position the entries of a dataset
+_HZ = ("frequency_hz",)
+_SYNTHESIS = ("frequency_hz", "backbone_frequency_hz", "direct_frequency_hz", "passage_frequency_hz")
+_RUN_UP = ("speed_rpm", "frequency_hz", "line_speed_rpm", "static_speed_rpm", "fast_speed_rpm")
 
 ANALYSES = {
     "forced_response": _folder("forced_response", "FORCED_RESPONSE", "ForcedResponse", "page.chapter"),
-    "nonlinear_mode": _folder("nonlinear_mode", "NONLINEAR_MODE", "NonlinearModeTable"),
-    "modal_synthesis": _folder("modal_synthesis", "MODAL_SYNTHESIS", "ModalSynthesisTable"),
-    "quasi_periodic": _folder("quasi_periodic", "QUASI_PERIODIC", "QuasiPeriodicTable"),
-    "limit_cycle": _folder("limit_cycle", "LIMIT_CYCLE", "LimitCycleTable"),
-    "resonance": _folder("resonance", "RESONANCE", "ResonanceTable"),
-    "all_motions": _folder("all_motions", "ALL_MOTIONS", "AllMotionsTable"),
-    "residual_tractions": _folder("residual_tractions", "RESIDUAL_TRACTIONS", "ResidualTractionsTable"),
+    "nonlinear_mode": _folder("nonlinear_mode", "NONLINEAR_MODE", "NonlinearModeTable", axes=_HZ),
+    "modal_synthesis": _folder("modal_synthesis", "MODAL_SYNTHESIS", "ModalSynthesisTable", axes=_SYNTHESIS),
+    "quasi_periodic": _folder("quasi_periodic", "QUASI_PERIODIC", "QuasiPeriodicTable", axes=("first_hz", "second_hz")),
+    "limit_cycle": _folder("limit_cycle", "LIMIT_CYCLE", "LimitCycleTable", axes=_HZ),
+    "resonance": _folder("resonance", "RESONANCE", "ResonanceTable", axes=("value",)),
+    "all_motions": _folder("all_motions", "ALL_MOTIONS", "AllMotionsTable", axes=("frequency_hz", "searched_hz")),
+    "residual_tractions": _folder("residual_tractions", "RESIDUAL_TRACTIONS", "ResidualTractionsTable", axes=_HZ),
     "modes": _waves("modes", "ModesTable"),
-    "campbell": _waves("campbell", "CampbellTable"),
+    "campbell": _waves("campbell", "CampbellTable", axes=("speed_rpm",)),
     "flutter": _waves("flutter", "FlutterTable"),
     "safe": _waves("safe", "SafeTable"),
-    "run_up": _folder("run_up", "RUN_UP", "RunUpTable"),
+    "run_up": _folder("run_up", "RUN_UP", "RunUpTable", axes=_RUN_UP),
 }

@@ -107,10 +107,9 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
 
 def alike(data: xr.Dataset) -> list[list[int]]:
     """Return the cases of a dataset in groups of equal content, labels apart; a varied key need not affect every analysis."""
-    own = [
-        data.isel(case=i).drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
-        for i in range(data.sizes["case"])
-    ]
+    labels = [name for name in data.coords if data[name].dims == ("case",)]
+    told = ["case_label", "vary_value", "seconds", *labels]
+    own = [data.isel(case=i).drop_vars(told, errors="ignore") for i in range(data.sizes["case"])]
     groups: list[list[int]] = []
     for i, case in enumerate(own):
         twins = next((g for g in groups if own[g[0]].equals(case)), None)

@@ -1,0 +1,231 @@
+"""Coordinates of the dataset of an analysis: cases, varied keys, frequencies, speeds and outputs.
+
+They are made once, where a run puts its dataset together and where a result is opened, so results of every version have them.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from xarray.core.indexing import IndexSelResult
+
+from stickslip.arrays import BoolArray
+from stickslip.column import names_of
+from stickslip.study.analysis import named
+from stickslip.study.file.suffixes import unit_of
+from stickslip.study.questions import ANALYSES
+from stickslip.study.varied import as_number, varied_values
+
+CASE, POINT = "case", "point"  # the dimensions of cases, and of the points of all cases
+OWNER = "point_case"  # index of the case of each point where all cases share `point`
+VARIED_KEY = "varied_key"  # attribute of a coordinate that has the values of a varied key
+PLACES = ("frequency_hz", "speed_rpm")  # ends of the names of what positions a row
+LABELS = ("output_label", "output_name")  # names of the outputs where the dimension has none
+SAME = 1e-9  # relative difference below which a number that is asked for is a value of the key
+
+
+class Varied(xr.Index):
+    """Index of the varied keys along one dimension: ``data.sel(ratio=5, mu=0.3)`` takes the points, or cases, with these values.
+
+    A value, a list of values or a slice of numbers may be asked for. In a table of pandas the keys are levels of its index, after the number
+    of the point or the label of the case.
+    """
+
+    def __init__(self, dim: Hashable, values: Mapping[Hashable, xr.Variable]) -> None:
+        self.dim, self.values = dim, dict(values)
+
+    @classmethod
+    def from_variables(cls, variables: Mapping[Any, xr.Variable], *, options: Mapping[str, Any]) -> "Varied":
+        """Return the index of coordinates along one dimension."""
+        (dim,) = next(iter(variables.values())).dims
+        return cls(dim, variables)
+
+    @classmethod
+    def concat(cls, indexes: Sequence["Varied"], dim: Hashable, positions: Any = None) -> "Varied":
+        """Return the index of datasets one after the other."""
+        found = {
+            name: xr.Variable.concat([one.values[name] for one in indexes], dim, positions)  # type: ignore[no-untyped-call]
+            for name in indexes[0].values
+        }
+        return cls(dim, found)
+
+    def create_variables(self, variables: Mapping[Any, xr.Variable] | None = None) -> dict[Hashable, xr.Variable]:
+        """Return the coordinates of the index."""
+        return {name: own.copy(deep=False) for name, own in self.values.items()}
+
+    def to_pandas_index(self) -> pd.Index:
+        """Return the index of a table."""
+        names = [self.dim, *(name for name in self.values if name != self.dim)]
+        return pd.MultiIndex.from_arrays([self.values[name].values for name in names], names=names)
+
+    def isel(self, indexers: Mapping[Any, Any]) -> "Varied | None":
+        """Return the index of some positions; None for a single one, or for positions in several dimensions."""
+        found = {name: own.isel(indexers, missing_dims="ignore") for name, own in self.values.items()}
+        return type(self)(self.dim, found) if all(own.dims == (self.dim,) for own in found.values()) else None
+
+    def sel(self, labels: dict[Any, Any], method: str | None = None, tolerance: Any = None) -> IndexSelResult:
+        """Return the positions at which all keys have the values asked for.
+
+        Where each key has one value left, the keys are single coordinates of the selection, and nothing is aligned by them.
+
+        Raises
+        ------
+        KeyError
+            If a key has no such value.
+        """
+        found = [_positions(str(name), self.values[name].values, asked, method) for name, asked in labels.items()]
+        at = np.flatnonzero(np.all(found, axis=0))
+        keys = {name: own[at] for name, own in self.values.items() if name != self.dim}
+        if not at.size or any(np.any(own.values != own.values[0]) for own in keys.values()):
+            return IndexSelResult({self.dim: at})
+        if self.dim == CASE and at.size == 1 and all(np.ndim(one) == 0 for one in labels.values()):
+            return IndexSelResult({self.dim: int(at[0])})
+        single = {name: own[0] for name, own in keys.items()}
+        every = list(self.values)
+        # xarray looks at what is to be dropped only if it is given an index
+        return IndexSelResult({self.dim: at}, {self.dim: self}, single, drop_coords=[self.dim], drop_indexes=every)
+
+    def equals(self, other: xr.Index, *, exclude: Any = None) -> bool:
+        """Return whether two indexes have the same values."""
+        if not isinstance(other, Varied) or self.values.keys() != other.values.keys():
+            return False
+        return all(np.array_equal(own.values, other.values[name].values) for name, own in self.values.items())
+
+    def rename(self, name_dict: Mapping[Any, Hashable], dims_dict: Mapping[Any, Hashable]) -> "Varied":
+        """Return the index with other names."""
+        dim = dims_dict.get(self.dim, self.dim)
+        own = {name_dict.get(name, name): xr.Variable((dim,), v.values, v.attrs) for name, v in self.values.items()}
+        return type(self)(dim, own)
+
+
+def _positions(name: str, values: np.ndarray[Any, Any], asked: Any, method: str | None) -> BoolArray:
+    """Return where the values of a key are those asked for."""
+    number = values.dtype.kind in "fi"
+    if np.asarray(asked).dtype == bool:
+        return np.asarray(asked)
+    if isinstance(asked, slice):
+        low, high = asked.start, asked.stop
+        inside = np.ones(values.size, dtype=bool)
+        inside &= True if low is None else values >= low
+        return np.asarray(inside & (True if high is None else values <= high))
+    found = np.zeros(values.size, dtype=bool)
+    for one in np.ravel(asked).tolist():
+        wanted = one
+        if number and method == "nearest":
+            wanted = values[np.argmin(np.abs(values - one))]
+        here = np.isclose(values, wanted, rtol=SAME, atol=0.0) if number else values == str(one)
+        if not np.any(here):
+            known = ", ".join(f"{v:g}" if number else str(v) for v in pd.unique(values))
+            raise KeyError(f"{name} has no value {one!r}, but {known}")
+        found |= here
+    return found
+
+
+def with_coordinates(data: xr.Dataset, analysis: str) -> xr.Dataset:
+    """Return a dataset with what positions its entries as coordinates; values and their names stay as they are.
+
+    Parameters
+    ----------
+    data
+        Dataset of an analysis with ``case_label``, and with ``vary_value`` where keys are varied.
+    analysis
+        Name of the analysis, whose `Home` names the variables that are coordinates.
+
+    Returns
+    -------
+    xr.Dataset
+        It has these coordinates beside those that its `Home` names:
+
+        - ``case``: labels of the cases, where keys are varied;
+        - each varied key by the shortest end of its name that nothing else has (``force_n`` for ``load.shaker.force_n``), along the points
+          or, where there are no points of all cases in one row, along the cases; in the former case ``case_force_n`` runs over the cases;
+        - the case, frequency and speed of rows of all cases (``point_case``, ``frequency_hz``, ``attempt_frequency_hz`` ...);
+        - the names of the outputs.
+    """
+    if any(VARIED_KEY in data[name].attrs for name in data.coords):
+        return data
+    axes = ANALYSES[analysis].axes if analysis in ANALYSES else ()
+    data = data.set_coords([name for name in data.data_vars if _positions_rows(data, str(name)) or name in axes])
+    data = _with_outputs(data)
+    keys, values = varied_values(data)
+    if not any(keys) or CASE not in data.dims:
+        return data
+    if "case_label" in data and CASE not in data.variables:
+        data = data.assign_coords({CASE: data["case_label"].variable.copy()})
+    here = {str(name) for found in (data.variables, data.dims, data.attrs) for name in found}
+    possible = {name for kind in named(analysis).answers for name in names_of(kind)} if analysis in ANALYSES else set()
+    names = short_names(keys, here | possible)
+    each = {name: _of_key(key, values[:, k]) for k, (key, name) in enumerate(zip(keys, names, strict=True))}
+    if OWNER not in data:
+        return data.assign_coords(each)
+    owner = data[OWNER].variable
+    points = {name: xr.Variable(owner.dims, v.values[owner.values], v.attrs) for name, v in each.items()}
+    return data.assign_coords(points | {f"{CASE}_{name}": v for name, v in each.items()})
+
+
+def selectable(data: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which `sel` takes values of the varied keys, which `with_coordinates` made coordinates."""
+    keys = [name for name in data.coords if VARIED_KEY in data[name].attrs]
+    for dim in dict.fromkeys(data[name].dims[0] for name in keys):
+        own = {name: data[name].variable for name in keys if data[name].dims == (dim,)}
+        here = data[dim].variable if dim in data.variables else xr.Variable((dim,), np.arange(data.sizes[dim]))
+        found = {dim: here.to_base_variable(), **own}
+        index = Varied.from_variables(found, options={})
+        data = data.drop_indexes(dim, errors="ignore").assign_coords(xr.Coordinates(found, dict.fromkeys(found, index)))
+    return data
+
+
+def as_stored(data: xr.Dataset) -> xr.Dataset:
+    """Return a dataset without the coordinates of cases and varied keys; the others that `with_coordinates` made are variables again."""
+    made = [name for name in data.coords if name in (CASE, POINT) or VARIED_KEY in data[name].attrs]
+    data = data.drop_vars(made)
+    return data.reset_coords([name for name in data.coords if name not in data.dims])
+
+
+def short_names(keys: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Return for each key the shortest end that neither another key has nor is taken, with underscores for dots."""
+    ends = [[re.sub(r"\W", "_", ".".join(parts[-n:])) for n in range(1, len(parts) + 1)] for parts in _parts(keys)]
+    often = Counter(end for own in ends for end in own)
+    free = [[end for end in own if often[end] == 1 and not {end, f"{CASE}_{end}"} & set(taken)] for own in ends]
+    return [own[0] if own else f"vary_{k}" for k, own in enumerate(free)]
+
+
+def _parts(keys: Sequence[str]) -> list[list[str]]:
+    return [key.split(".") for key in keys]
+
+
+def _of_key(key: str, values: np.ndarray[Any, Any]) -> xr.Variable:
+    """Return the values of a key over the cases, as numbers if all are, with the unit that its name ends with."""
+    numbers = np.array([as_number(v) for v in values])
+    found = numbers if np.all(np.isfinite(numbers)) else np.array([str(v) for v in values])
+    return xr.Variable((CASE,), found, {"units": _unit(key), "long_name": key, VARIED_KEY: key})
+
+
+def _unit(key: str) -> str:
+    words = key.rsplit(".", 1)[-1].split("_")
+    units = (unit_of("_".join(words[n:])) for n in range(1, len(words)))
+    return next((unit.symbol for unit in units if unit is not None), "1")
+
+
+def _positions_rows(data: xr.Dataset, name: str) -> bool:
+    """Return whether a variable has the case, frequency or speed of rows in which the points of all cases stand."""
+    dims = data[name].dims
+    if len(dims) != 1 or dims == (CASE,):
+        return False
+    owners = [own for own in data.variables if str(own).endswith("_case") and data[own].dims == dims]
+    return name in owners or (bool(owners) and name.endswith(PLACES))
+
+
+def _with_outputs(data: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with the names of the outputs along their dimension, where all cases have the same."""
+    name = next((n for n in LABELS if n in data and data[n].ndim == 2), None)
+    if name is None:
+        return data
+    dim, rows = data[name].dims[1], data[name].values
+    if dim in data.variables or not (rows == rows[:1]).all() or len(set(rows[0])) < len(rows[0]):
+        return data
+    return data.assign_coords({dim: rows[0].astype(str)})
