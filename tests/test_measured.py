@@ -94,7 +94,7 @@ def test_the_result_keeps_them_with_their_source(run: tuple[Path, ss.Result]) ->
     assert data["measured_amplitude"].attrs["units"] == "m"
     assert "standard deviation" in data["measured_amplitude_error"].attrs["long_name"]
     table = result.measured
-    assert table.keys() == [
+    assert list(table) == [
         KEY,
         "excitation (N)",
         "frequency (Hz)",

@@ -231,11 +231,12 @@ def compare(
     """Hold designs against each other: peaks, responses, optimisation curves, modes and inputs on one page."""
     with _errors_as_text():
         from stickslip.api.comparison import compare as compared_designs
+        from stickslip.api.table import cells
 
         found = compared_designs(*compared, names=name or ())
         for title, table in (("Peaks", found.peaks), ("What differs", found.inputs)):
             if len(table):
-                say_columns(title, table, table.rows())
+                say_columns(title, table, cells(table))
         say_lines("Files", [str(found.report(page))])
 
 

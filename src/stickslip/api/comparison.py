@@ -6,13 +6,14 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import plotly.graph_objects as go
 
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force, read_curve
 from stickslip.analyses.compared.side_by_side import comparison_html, contents, peak_rows, unit_of
 from stickslip.api.result import Result
 from stickslip.api.study import Study
-from stickslip.api.table import Table
+from stickslip.api.table import as_text
 from stickslip.errors import did_you_mean, input_error
 from stickslip.report.frame import write_page
 from stickslip.report.plot import Plot
@@ -63,12 +64,12 @@ class Comparison:
         return self._figures[name]
 
     @property
-    def peaks(self) -> Table:
+    def peaks(self) -> pd.DataFrame:
         """One row a case and design: the peak and its difference from the first design; NaN if that lacks the case."""
         divided = per_force(self.designs, self.curves)
         found = peak_rows(self.designs, divided=divided)
         if not found:
-            return Table({})
+            return pd.DataFrame()
         columns = {
             "case": "case",
             "design": "design",
@@ -78,14 +79,14 @@ class Comparison:
             "against the first (%)": "off_percent",
             "shift (Hz)": "shift_hz",
         }
-        return Table({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})
+        return pd.DataFrame({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})
 
     @property
-    def inputs(self) -> Table:
+    def inputs(self) -> pd.DataFrame:
         """Keys of the study files that differ: one row a key, one column a design."""
         head, rows = ["key", *(d.name for d in self.designs)], differences(self.designs)
         columns = zip(*rows, strict=True) if rows else [() for _ in head]
-        return Table({n: np.array(own) for n, own in zip(head, columns, strict=True)})
+        return pd.DataFrame({n: np.array(own) for n, own in zip(head, columns, strict=True)})
 
     def report(self, path: str | Path = "comparison.html") -> Path:
         """Write the page; return its path."""
@@ -95,7 +96,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         names = ", ".join(d.name for d in self.designs)
-        return f"Comparison of {names}\n{self.peaks!r}"
+        return f"Comparison of {names}\n{as_text(self.peaks)}"
 
 
 def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:

@@ -14,7 +14,7 @@ import xarray as xr
 from stickslip.analyses.page import plots, write_report
 from stickslip.api.export import Format, Wanted, export_result
 from stickslip.api.screen import by_default
-from stickslip.api.table import Table, dataframe
+from stickslip.api.table import dataframe
 from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
 from stickslip.report.result import RESULT, open_result
@@ -216,18 +216,18 @@ class Result:
         return self._figures[name]
 
     @property
-    def peaks(self) -> Table:
-        """The peak of each case of the forced response; without one, the natural frequencies."""
+    def peaks(self) -> pd.DataFrame:
+        """The peak of each case of the forced response, a row a case; without one, the natural frequencies, a row a wave."""
         if "forced_response" in self.data.children:
             return _peaks(self.data["forced_response"].to_dataset())
         name = next((n for n in ("modes", "safe") if n in self.data.children), None)
-        return _frequencies(self.data[name].to_dataset()) if name else Table({})
+        return _frequencies(self.data[name].to_dataset()) if name else pd.DataFrame()
 
     @property
-    def measured(self) -> Table:
+    def measured(self) -> pd.DataFrame:
         """The measured peaks named by the study, in SI units and Hz; empty if the study names none."""
         name = "forced_response"
-        return _measured(self.data[name].to_dataset()) if name in self.data.children else Table({})
+        return _measured(self.data[name].to_dataset()) if name in self.data.children else pd.DataFrame()
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -265,19 +265,19 @@ class Result:
         return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
 
 
-def _peaks(data: xr.Dataset) -> Table:
+def _peaks(data: xr.Dataset) -> pd.DataFrame:
     keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else []
     found = {key: np.asarray(data["vary_value"].values[:, k]) for k, key in enumerate(keys)}
     units = {"excitation_n": "excitation (N)", "peak_frequency_hz": "frequency (Hz)", "peak_amplitude": "amplitude (m)"}
     found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
     if "case_verdict" in data:
         found["verdict"] = np.array([LEVELS[int(v)] for v in data["case_verdict"].values])
-    return Table(found)
+    return pd.DataFrame(found)
 
 
-def _measured(data: xr.Dataset) -> Table:
+def _measured(data: xr.Dataset) -> pd.DataFrame:
     if "measured_value" not in data:
-        return Table({})
+        return pd.DataFrame()
     found = {str(data.attrs["measured_key"]): np.asarray(data["measured_value"].values)}
     names = {
         "measured_others": "beside it",
@@ -292,12 +292,12 @@ def _measured(data: xr.Dataset) -> Table:
         if values.size and (any(values) if values.dtype.kind == "U" else np.isfinite(values).any()):
             told = [data[key].attrs.get(name, "") for name in ("error", "units")]
             found[text.format(*filter(None, told))] = np.asarray(values)
-    return Table(found)
+    return pd.DataFrame(found)
 
 
-def _frequencies(data: xr.Dataset) -> Table:
+def _frequencies(data: xr.Dataset) -> pd.DataFrame:
     """Return a row a wave of the first case."""
     first = data.isel(case=0) if "case" in data.dims else data
     hz = np.asarray(first["frequency_hz"].values)
     found = {name.replace("_", " "): np.asarray(first[name].values) for name in ("nodal_diameter", "wave_kind")}
-    return Table(found | {f"mode {m + 1} (Hz)": hz[:, m] for m in range(hz.shape[1])})
+    return pd.DataFrame(found | {f"mode {m + 1} (Hz)": hz[:, m] for m in range(hz.shape[1])})

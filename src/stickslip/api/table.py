@@ -1,12 +1,8 @@
-"""Tables for Python and notebooks: a small one that prints itself, and a dataset as a pandas DataFrame."""
+"""Tables for Python and notebooks: a dataset as a DataFrame of pandas, and a small DataFrame as text."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import xarray as xr
 
@@ -15,47 +11,16 @@ from stickslip.study.coordinates import as_stored
 from stickslip.study.varied import varied_values
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Columns of equal length.
+def cells(frame: pd.DataFrame) -> list[list[str]]:
+    """Return the cells of a table as text, numbers with six digits."""
+    return [[_text(v) for v in row] for row in frame.itertuples(index=False, name=None)]
 
-    Parameters
-    ----------
-    columns
-        Name -> values (n,); the unit is part of the name.
-    """
 
-    columns: Mapping[str, npt.NDArray[Any]]
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """Return a column."""
-        return self.columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names of the columns, so that ``dict(table)`` and ``pandas.DataFrame(dict(table))`` work."""
-        return iter(self.columns)
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(next(iter(self.columns.values()), ()))
-
-    def keys(self) -> list[str]:
-        """Return the names of the columns."""
-        return list(self.columns)
-
-    def rows(self) -> list[list[str]]:
-        """Return the cells as text."""
-        return [[_text(v) for v in row] for row in zip(*self.columns.values(), strict=True)]
-
-    def __repr__(self) -> str:
-        every = [self.keys(), *self.rows()]
-        widths = [max(map(len, column)) for column in zip(*every, strict=True)]
-        return "\n".join("  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in every)
-
-    def _repr_html_(self) -> str:
-        head = "".join(f"<th>{escape(name)}</th>" for name in self.columns)
-        body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self.rows())
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+def as_text(frame: pd.DataFrame) -> str:
+    """Return a table as lines of text."""
+    every = [[str(name) for name in frame.columns], *cells(frame)]
+    widths = [max(map(len, column)) for column in zip(*every, strict=True)]
+    return "\n".join("  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in every)
 
 
 def _text(value: Any) -> str:
