@@ -23,6 +23,7 @@ from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.sweep import Sweep
+from stickslip.study.analysis import Advice
 from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study
@@ -188,9 +189,11 @@ def test_odd_harmonics_alone_are_solved_and_shown(base: Study) -> None:
     assert 100 * change.max() < 3 * error.max()
 
 
-def check(study: Study) -> list[str]:
+def check(study: Study) -> Advice:
     (case,) = study.cases()
-    return list(analysis.FORCED_RESPONSE.check(case, case.build()))
+    found = analysis.FORCED_RESPONSE.check(case, case.build())
+    assert isinstance(found, Advice)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -200,11 +203,11 @@ def test_error_is_taken_where_the_study_says(base: Study, over: object) -> None:
     study = changed(base, {"alert_over": over, "alert_harmonics": [0, 1]}, "over")
     said = check(study)
     count = {"outputs": 9, "contacts": 27}.get(str(over), 3)
-    line = next(x for x in said if "its error is that of" in x)
+    line = next(x for x in said.computed if "its error is that of" in x)
     assert "harmonic 0, 1 over" in line
     assert line.count(",") == count  # one more than between the labels: that of the harmonics
-    mixed = "WARNING: harmonics.alert_over mixes rotations (damper.rx) with displacements (tip1.x, damper.z)"
-    assert any(x.startswith(mixed) for x in said) == ("damper.rx" in over)
+    mixed = "harmonics.alert_over mixes rotations (damper.rx) with displacements (tip1.x, damper.z)"
+    assert any(x.startswith(mixed) for x in said.doubts) == ("damper.rx" in over)
     (case,) = study.cases()
     model = analysis.FORCED_RESPONSE.inputs(case, case.build()).model
     labels = np.array(model.system.structure.dofs.labels)
@@ -215,25 +218,29 @@ def test_error_is_taken_where_the_study_says(base: Study, over: object) -> None:
 
 
 def test_check_tells_of_strategies_that_take_no_double_passage(base: Study) -> None:
-    said = "\n".join(check(changed(base, {"selection": "grolet"}, "grolet")))
+    said = "\n".join(check(changed(base, {"selection": "grolet"}, "grolet")).computed)
     assert "single passage: each frequency is settled before the next one" in said
     assert 'passages = "double" and alert_threshold_percent are not used' in said
 
 
 def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> None:
     said = check(base)
-    assert re.fullmatch(
-        r"estimate: about \d+ s for the parts, once, and [\d.]+ to \d+ s to solve this case "
-        r"\(the least: hardly a contact slips; the most: contacts slip at every point, H = 41 at 10 % of \d+ points\); "
-        r"stability and time integration not counted\. At most \d+ Newton steps, \d+ unknowns, [\d.]+ GB of memory\. "
-        r"limits\.work_s is held against \d+ s",
-        said[0],
+    assert said.computed[0] == "sweep: 177.60 to 179.20 Hz"
+    cost = (
+        r"estimate: about \d+ s for the parts, once, and [\d.]+ to \d+ s to solve this case",
+        r"estimate: least if hardly a contact slips, most if all slip at every point, H = 41 at 10 % of \d+ points",
+        r"estimate: at most \d+ Newton steps, \d+ unknowns, [\d.]+ GB of memory",
+        r"estimate: stability and time integration come on top; limits\.work_s is compared with \d+ s",
     )
-    assert "sweep: 177.60 to 179.20 Hz" in said
-    assert any(x.startswith("natural frequencies, contacts stuck: ") for x in said)
-    assert any(x.startswith("static equilibrium: 9 of 9 contact points are pressed") for x in said)
+    for pattern, line in zip(cost, said.computed[1:5], strict=True):
+        assert re.fullmatch(pattern, line), line
+    assert any(re.match(r"natural frequencies, contacts stuck: .* Hz (in the range|above)", x) for x in said.beside)
+    assert said.at_rest[0].startswith("static equilibrium: 9 of 9 contact points are pressed")
+    assert said.at_rest[1].startswith("contact flat: 6 of 6 points closed, ")
+    assert "damper: flat can slip to and fro: in equilibrium T/N reaches its friction coefficient 0.6" in said.at_rest
+    assert said.doubts == ()
     beside = check(changed(base, {}, "beside", frequency_hz=[20.0, 30.0]))
-    assert any("no natural frequency lies between 20.00 and 30.00 Hz" in x for x in beside)
+    assert any("no natural frequency lies between 20.00 and 30.00 Hz" in x for x in beside.doubts)
 
 
 def test_the_options_of_a_rival_reach_the_response(tmp_path: Path) -> None:

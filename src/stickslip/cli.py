@@ -129,11 +129,9 @@ def run(
 def check(study: StudyFile) -> None:
     """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
     with _errors_as_text():
-        with on_screen(Screen(console(), warnings=False)):
-            warnings = read(study).check()
-        for text in warnings:
-            say(f"DOUBTFUL: {text}")
-        say(f"{study}: good to run")
+        with on_screen(Screen(console())):
+            doubts = read(study).check()
+        say(f"{study}: good to run{f', {len(doubts)} doubtful' * bool(doubts)}")
 
 
 @app.command()

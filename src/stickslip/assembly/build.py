@@ -28,6 +28,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.modes import natural_frequencies, with_springs
+from stickslip.model.slow_steps import step
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.fixed_interface import reduce_interface
@@ -90,7 +91,8 @@ def assemble_tuned(
     more = range(model.sectors) if every_wave else ()
     linear = linear_side(model, order or 0, harmonics, what.kept, what.stay, store, more)
     system, held, load = system_of(model, linear, what)
-    gap, force = static_state(held, load.static)
+    with step(f"static equilibrium of {len(model.pairs.names)} contact points, {held.retained.size} unknowns"):
+        gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
     stiffness = system.springs.stuck_stiffness()
     compared = frequencies(model, linear, stiffness, order, store) if checked else UNKNOWN
@@ -340,7 +342,11 @@ def frequencies(model: Model, linear: Linear, springs: FloatArray, order: int | 
     count = min(MODES, moving[0], max(moving[1] - held_gaps(model, gaps), 1))
     hows: tuple[Literal["open", "stuck"], ...] = ("open", "stuck")
     full = [partial(model.at, model.speed, number, how) for how in hows]
-    found = [_lowest(model, at(), count, store) for at in full]
+    found = []
+    for how, at in zip(hows, full, strict=True):
+        told = f"{count} natural frequencies of the full model, contacts {how}, {model.places.n} dofs"
+        with step(told, model.places.n):
+            found.append(_lowest(model, at(), count, store))
     return Frequencies(found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count))
 
 

@@ -14,6 +14,7 @@ from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.part import Part
+from stickslip.model.slow_steps import step
 from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
@@ -229,7 +230,9 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
     if key not in part.memo:
 
         def make() -> ReducedPart:
-            made = _reduce(name, part, kept, spin, rest)
+            n = part.structure.n
+            with step(f"reducing part {name}: {n} dofs to {kept.size} of contacts, loads and outputs, and modes", n):
+                made = _reduce(name, part, kept, spin, rest)
             return made if whole else replace(made, structure=replace(made.structure, basis=None))
 
         if part.reduction is None or part.body is not None or whole:

@@ -170,6 +170,28 @@ class Pieces:
         self.places.clear()
 
 
+@dataclass(frozen=True)
+class Advice:
+    """Lines of ``stickslip check`` on a case, each a sentence without a full stop.
+
+    Parameters
+    ----------
+    computed
+        What will be computed, and its cost.
+    doubts
+        What is likely wrong, in whole sentences.
+    at_rest
+        What contacts and dampers do under the static loads.
+    beside
+        What stands beside the asked range: natural frequencies, and what friction can do.
+    """
+
+    computed: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    at_rest: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+
+
 def of_tables(*tables: str) -> Callable[[Case], str]:
     """Return the `key` function of an analysis whose records depend on these tables beside the model."""
     return partial(_key, tables)  # which another process can be given
@@ -213,7 +235,7 @@ class Analysis:
         adds ``case_label`` and ``vary_value``. Attributes: ``failed``, the number of points without a solution (0 if left out), and the
         verdicts.
     check
-        Returns the lines of ``stickslip check`` on a case beyond its static state and natural frequencies: choices and estimates.
+        Returns the lines of ``stickslip check`` on a case: what will be computed, its choices and its cost; or an `Advice`.
     summary
         Returns the terminal tables of a dataset.
     linear
@@ -239,7 +261,7 @@ class Analysis:
     inputs: Callable[[Case, Model], Any]
     solve: Callable[[Any, Sequence[Any], Notes], Iterator[Any]]
     dataset: Callable[[Sequence[Solved]], xr.Dataset]
-    check: Callable[[Case, Model], tuple[str, ...]]
+    check: Callable[[Case, Model], tuple[str, ...] | Advice]
     summary: Callable[[xr.Dataset], "tuple[TextTable, ...]"]
     linear: bool = False
     shared: tuple[str, ...] = ()

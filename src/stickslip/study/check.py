@@ -1,22 +1,36 @@
 """``stickslip check``: models, static state, natural frequencies, choices and cost, without a run. Nothing is written."""
 
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from stickslip.assembly.forces import first_nodes
 from stickslip.assembly.joints.unconstrained_bodies import unheld
 from stickslip.assembly.model import Model
+from stickslip.model.slow_steps import step, told_when_slow
+from stickslip.study.analysis import Advice
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.checks import sectors_of
+from stickslip.study.models.cost import SECONDS_A_NODE, SECONDS_A_WAVE, nodes_of_tables
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
-from stickslip.study.store.progress import LOG
+from stickslip.study.store.progress import LOG, tell
 from stickslip.study.verdict import together
 
-WARNING = "WARNING: "
+SECTIONS = {
+    "computed": "What will be computed",
+    "doubts": "What is likely wrong",
+    "at_rest": "What contacts hold at rest",
+    "beside": "What stands beside the range",
+}  # field of `Advice` -> heading
+DOUBTFUL = "doubtful"
+NO_DOUBT = "nothing that can be seen without solving"
 
 
 def check_study(study: Study) -> tuple[str, ...]:
-    """Build every model, refuse all that a run would refuse, log static state and frequencies, and return warnings.
+    """Build every model, refuse all that a run would refuse, log what will be computed and what is doubtful, and return the doubts.
 
     Raises
     ------
@@ -24,35 +38,83 @@ def check_study(study: Study) -> tuple[str, ...]:
         If the study cannot be run.
     """
     asked = asked_for(study)
-    told: list[str] = []
+    told = Advice()
     alike: list[str] = []
+    LOG.info(_beforehand(study))
     for case in study.cases():
-        model = case.build()
-        with of_task(study, case):
-            lines = [_size(model), *_free(model), *first_nodes(model.places, model.outputs)]
-            lines += [*(f"{WARNING}{text}" for text in model.warnings)]
-            for one in asked:
-                lines += one.check(case, model)
+        with told_when_slow(case.label), of_task(study, case):
+            with step("building the parts"):
+                model = case.build()
+            with step(f"pairing the points of {len(model.contacts)} contacts"):
+                pairs = model.pairs
+            every = [Advice(computed=(_size(model, len(pairs.names)),))]
+            every += [Advice(computed=tuple(first_nodes(model.places, model.outputs)), doubts=model.warnings)]
+            every += [_as_advice(one.check(case, model)) for one in asked]
+            every += [Advice(at_rest=tuple(_free(model)))]
         # what holds for all cases is said once
-        new = [line for line in lines if line not in told]
-        told += new
-        _tell(case.label, [line for line in new if not line.startswith(WARNING)])
-        if not new:
+        new, first = _new(every, told), told == Advice()
+        told = _joined([told, new])
+        if first and not new.doubts:
+            new = replace(new, doubts=(NO_DOUBT,))
+        if any(getattr(new, name) for name in SECTIONS):
+            _tell(case.label, new)
+        else:
             alike.append(case.label)
     measured = study.measured
     if measured is not None:
         LOG.info(measured.sentence)
     if alike:
         LOG.info(f"the same holds for: {together(alike)}")
-    return tuple(t.removeprefix(WARNING) for t in told if t.startswith(WARNING))
+    return told.doubts
 
 
-def _tell(label: str, lines: list[str]) -> None:
-    """Log lines, preceded by the label of their case if the study has several."""
-    if label and lines:
+def _beforehand(study: Study) -> str:
+    """Return the line before anything is read: sizes, from files and element sizes, and the time of the check."""
+    case, count = study.file.cases[0], len(study.file.cases)
+    nodes = nodes_of_tables(case.tables, study.file.home)
+    seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * _waves(case.tables)), 1.0)
+    cases = f"{count} cases" if count > 1 else "one case"
+    return f"checking {cases}: parts of about {max(nodes, 1.0):.2g} nodes take some {seconds:.0f} s"
+
+
+def _waves(tables: Tables) -> int:
+    """Return the number of waves of a wheel that are reduced; 0 for a single structure."""
+    asked, sectors = getattr(tables, "forced_response", None), sectors_of(tables) or 1
+    if sectors == 1:
+        return 0
+    every = asked is not None and (asked.stability != "off" or asked.bifurcations in ("all", "branches"))
+    return sectors // 2 + 1 if every else 1
+
+
+def _as_advice(said: tuple[str, ...] | Advice) -> Advice:
+    return said if isinstance(said, Advice) else Advice(computed=said)
+
+
+def _joined(every: Iterable[Advice]) -> Advice:
+    every = list(every)
+    return Advice(**{name: tuple(line for one in every for line in getattr(one, name)) for name in SECTIONS})
+
+
+def _new(every: Iterable[Advice], told: Advice) -> Advice:
+    """Return the lines that were not told before, each once."""
+    joined = _joined(every)
+    known = {name: set(getattr(told, name)) for name in SECTIONS}
+    return Advice(**{n: tuple(dict.fromkeys(t for t in getattr(joined, n) if t not in known[n])) for n in SECTIONS})
+
+
+def _tell(label: str, advice: Advice) -> None:
+    """Log the lines of a case section by section, preceded by its label if the study has several."""
+    if label:
         LOG.info(label)
-    for line in lines:
-        LOG.info(f"  {line}" if label else line)
+    for name, heading in SECTIONS.items():
+        lines = getattr(advice, name)
+        if lines:
+            LOG.info(f"{heading}:")
+        for line in lines:
+            if name == "doubts" and line != NO_DOUBT:
+                tell(DOUBTFUL, line)
+            else:
+                LOG.info(f"  {line}")
 
 
 def _free(model: Model) -> list[str]:
@@ -62,7 +124,7 @@ def _free(model: Model) -> list[str]:
     return [f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))]
 
 
-def _size(model: Model) -> str:
+def _size(model: Model, points: int) -> str:
     facts = model.facts
     wheel = f"one of {model.sectors} sectors, " if model.sectors > 1 else ""
     if model.stages is not None:
@@ -70,6 +132,4 @@ def _size(model: Model) -> str:
         wheel = f"one sector each of stages of {' and '.join(counts)}, "
     mass = f"mass {facts.mass:.6g} kg, " if math.isfinite(facts.mass) else ""
     elements = f"{facts.elements} elements, " if facts.elements else ""
-    return (
-        f"{wheel}{facts.nodes} nodes, {elements}{facts.dofs} free dofs, {mass}{len(model.pairs.names)} contact points"
-    )
+    return f"{wheel}{facts.nodes} nodes, {elements}{facts.dofs} free dofs, {mass}{points} contact points"

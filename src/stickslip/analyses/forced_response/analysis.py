@@ -6,25 +6,10 @@ from time import perf_counter
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.forced_response.estimate import estimate
+from stickslip.analyses.forced_response.advice import advice, of_pressures
 from stickslip.analyses.forced_response.more_harmonics import check_harmonics
-from stickslip.analyses.forced_response.physics.known import (
-    doubts_of_model,
-    inside,
-    known,
-    mixed_places,
-    no_resonance,
-    nothing_pressed,
-    off_engine_order,
-)
-from stickslip.analyses.forced_response.physics.limits import (
-    PHYSICS,
-    beforehand,
-    driven_line,
-    motion_at_peak,
-    of_physics,
-    physics_of,
-)
+from stickslip.analyses.forced_response.physics.known import known
+from stickslip.analyses.forced_response.physics.limits import PHYSICS, motion_at_peak, of_physics
 from stickslip.analyses.forced_response.physics.model_change import model_changes, peak_shift, stiffness_changes
 from stickslip.analyses.forced_response.problem import (
     HARMONICS,
@@ -38,7 +23,6 @@ from stickslip.analyses.forced_response.records.blades import of_blades
 from stickslip.analyses.forced_response.records.columns import KINDS, KnownVerdicts, stored
 from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
 from stickslip.analyses.forced_response.records.points import Response, lost_point
-from stickslip.analyses.forced_response.records.pressures import pressure_lines
 from stickslip.analyses.forced_response.records.values import (
     Values,
     of_checks,
@@ -48,7 +32,6 @@ from stickslip.analyses.forced_response.records.values import (
     of_response,
 )
 from stickslip.analyses.forced_response.stability.bifurcating import (
-    bifurcations_line,
     followed,
     located,
     of_bifurcations,
@@ -61,7 +44,7 @@ from stickslip.analyses.forced_response.stability.not_periodic import (
     of_answers,
     without_periodic,
 )
-from stickslip.analyses.forced_response.stability.stable import Examined, cost_line, with_motion
+from stickslip.analyses.forced_response.stability.stable import Examined, with_motion
 from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
 from stickslip.analyses.forced_response.stability.with_stability import integrated, with_stability
 from stickslip.analyses.forced_response.summary import tables
@@ -103,7 +86,7 @@ NOTES = (
 
 def _inputs(case: Case, model: Model) -> Question:
     """Return the question of a case; refuse cases that cannot be computed."""
-    for line in _of_pressures(case, model):
+    for line in of_pressures(case, model):
         LOG.info(line)
     return with_comparisons(question_of(case, model), case, model)
 
@@ -145,37 +128,6 @@ def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
     return put_together(cases, labels)
 
 
-def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Return estimated cost, expected resonances, and the selection of harmonics."""
-    question = question_of(case, model)
-    chooser, passages = question.chooser, case.settings.harmonics.passages
-    labels = question.model.error_labels
-    doubted = [text for text in doubts_of_model(question) if text not in model.warnings]
-    physics = physics_of(question)
-    known = [] if physics is None else list(beforehand(physics))
-    driven = [] if physics is None else driven_line(physics)
-    notes = [v for v in known if not v.rank]
-    doubts = [
-        *no_resonance(question),
-        *nothing_pressed(question),
-        *mixed_places(labels),
-        *(v for v in known if v.rank),
-    ]
-    return (
-        *_of_pressures(case, model),
-        str(estimate(model, question.sweep)),
-        *unreduced_line(question.model),
-        *question.orders_lines,
-        *(f"harmonics: {line}" for line in chooser.lines(passages)),
-        cost_line(question),
-        *bifurcations_line(question),
-        *inside(question),
-        *driven,
-        *(f"note: {v.why}. {v.remedy}" for v in (*off_engine_order(question), *notes)),
-        *(f"WARNING: {text}" for text in (*doubted, *(f"{v.why}. {v.remedy}" for v in doubts))),
-    )
-
-
 def _verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
     """Return the verdicts on each case and its points."""
     return verdicts(data, [str(x) for x in data["case_label"].values])
@@ -184,12 +136,6 @@ def _verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
 def _completed(data: xr.Dataset, measured: MeasuredPeaks | None) -> xr.Dataset:
     """Return the dataset with measured peaks, and with the effect of friction at the peak of each case."""
     return with_regimes(with_measured(data, measured))
-
-
-def _of_pressures(case: Case, model: Model) -> tuple[str, ...]:
-    """Return lines about pressure fields; empty for a Python model, which has no table of its loads."""
-    given = getattr(case.settings, "load", {})
-    return pressure_lines(model, {name: table.modal_forces for name, table in given.items()})
 
 
 def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
@@ -335,7 +281,7 @@ FORCED_RESPONSE = Analysis(
     inputs=_inputs,
     solve=_solve,
     dataset=_dataset,
-    check=_check,
+    check=advice,
     summary=tables,
     shared=("harmonics", "solver", "limits"),
     answers=KINDS,

@@ -113,10 +113,8 @@ class Chooser:
             of = ", ".join(map(str, self.harmonics))
             most = f"up to {self.high[-1]}" + ("" if self.high[-1] >= RUNGS[-1] else ", which the study's [limits] set")
             return [
-                (
-                    f"raised along the branch from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below "
-                    f"{self.limit}; audits at every tenth point and at the peak"
-                ),
+                f"raised from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below {self.limit}",
+                "audited at every tenth point and at the peak",
                 f"its error is that of harmonic {of} over {listed(self.over)}",
             ]
         how = (
@@ -127,8 +125,9 @@ class Chooser:
         said = [
             (
                 f"{self.name} chooses between harmonics {named(self.low)} and {named(self.high)}, "
-                f"{self.indicator} above {self.limit}; {how}"
-            )
+                f"{self.indicator} above {self.limit}"
+            ),
+            how,
         ]
         if self.is_error:
             of = ", ".join(map(str, self.harmonics))

@@ -69,15 +69,16 @@ class Estimate:
         """Time compared with ``limits.work_s``: model and largest time of the response, s."""
         return self.model_seconds + self.most_seconds
 
-    def __str__(self) -> str:
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The estimate in sentences, one a line."""
         least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))
-        solving = f"{least} to {most} s"
-        many = f"contacts slip at every point, {self.most}" if self.most else "contacts slip at every point"
-        meant = f" (the least: hardly a contact slips; the most: {many})"
+        many = f", {self.most}" if self.most else ""
         return (
-            f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {solving} to solve this case{meant}; stability and time "
-            f"integration not counted. At most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of "
-            f"memory. limits.work_s is held against {self.seconds:.0f} s"
+            f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {least} to {most} s to solve this case",
+            f"estimate: least if hardly a contact slips, most if all slip at every point{many}",
+            f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
+            f"estimate: stability and time integration come on top; limits.work_s is compared with {self.seconds:.0f} s",
         )
 
 

@@ -33,7 +33,7 @@ def _check(case: Case, model: Model) -> tuple[str, ...]:
     refuse_whole("run_up", model)
     table: RunUpTable = case.settings.run_up
     count = len(table.engine_orders or [0])
-    return (f"run-up: {count} engine orders, each {estimate(model, sweep_along(case.settings, 1))}",)
+    return (f"run-up: {count} engine orders, each as follows", *estimate(model, sweep_along(case.settings, 1)).lines)
 
 
 RUN_UP = Analysis(

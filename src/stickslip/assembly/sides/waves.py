@@ -36,6 +36,7 @@ from stickslip.assembly.sides.wheel import (
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
+from stickslip.model.slow_steps import step
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.cache import content_hash
@@ -148,7 +149,8 @@ def sector_waves(
     at, here = model.coordinates, model.neighbours
     assert here is not None
     spin = model.spin(model.speed)
-    structure, steady = _sector_at_speed(model, spin)
+    with step(f"stiffening by rotation of a sector with {model.places.n} dofs"):
+        structure, steady = _sector_at_speed(model, spin)
     sector = here.sector(at.tied(structure), at)
     reduction, damping, whole = _reduction(model)
     needed = np.unique(np.concatenate([kept, whole]))
@@ -181,7 +183,10 @@ def sector_waves(
         key = f"{content} {reduction} {k}{more}"
         how, known = (reduction, damping), partial(others, k, reduction)
         make = partial(_kept, sector, kept, k, how, columns, (key, store), known)
-        return _remembered(memo, key, store, make)
+        with step(
+            f"reducing wave {k} of a sector: {model.places.n} dofs to {kept.size} of contacts, loads and outputs, and modes"
+        ):
+            return _remembered(memo, key, store, make)
 
     def wave(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         if 2 * k <= sector.sectors or not mirrored:

@@ -18,6 +18,7 @@ BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, me
 BYTES_OF_MATRICES, BYTES_OF_FACTORS = 20e3, 2700.0
 BASE_GB = 0.35  # interpreter and libraries
 SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
+SECONDS_A_WAVE = 1e-3  # reduction of one wave, for each node: 0.9 to 1.1 ms at 1548 and 1767 nodes
 NODES_A_CUBE = 8.0  # nodes of second-order tetrahedra in a cube of one element size, measured at 600 to 35000 nodes
 OF_A_MESH, OF_MATRICES = 95.0, 4000.0  # bytes of a file for each node
 PACKED = 3.5  # times smaller is a file with the ending .gz
@@ -37,10 +38,15 @@ def waves_gb(nodes: float) -> float:
 
 def too_large(tables: Tables, home: Path) -> InputError | None:
     """Return the error about parts above the limits of the study; None if there is none."""
-    nodes = sum(_nodes(table, home) for table in tables.part.values())
+    nodes = nodes_of_tables(tables, home)
     what = f"the parts, some {max(round(nodes), 1):.2g} nodes, are estimated"
     memory = max(memory_gb(nodes), waves_gb(nodes) if _asks_for_waves(tables) else 0.0)
     return above(tables.limits, what, memory, nodes * SECONDS_A_NODE)
+
+
+def nodes_of_tables(tables: Tables, home: Path) -> float:
+    """Estimate the number of nodes of all parts, from sizes of files and elements."""
+    return sum(_nodes(table, home) for table in tables.part.values())
 
 
 def _asks_for_waves(tables: Tables) -> bool:

@@ -58,28 +58,6 @@ def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
     return (Verdict("doubtful", why=why, remedy="Name one kind only."),)
 
 
-def inside(question: Question) -> list[str]:
-    """Return the natural frequencies near the range of the sweep, and the normal forces at rest."""
-    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
-    known, normal = question.model.frequencies, -question.model.static_force[:, 2]
-    told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
-    times, highest = question.driven[0], question.driven[0] * highest
-    if times > 1:
-        told.append(f"{question.driven_names[0]}, whose frequencies follow, acts at {times} times these frequencies")
-    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
-        rigid = int(np.count_nonzero(hertz < RIGID))
-        near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
-        near = [f"{rigid} of rigid motions"] * bool(rigid) + near
-        beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
-        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)
-    if np.any(normal):
-        pressed = np.count_nonzero(normal > 0)
-        told.append(
-            f"static equilibrium: {pressed} of {normal.size} contact points are pressed, normal forces up to {normal.max():.3g} N"
-        )
-    return told
-
-
 def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
     """Doubt a model whose friction contacts carry no normal force in the static state."""
     laws, normal = question.model.contacts.laws, -question.model.static_force[:, 2]

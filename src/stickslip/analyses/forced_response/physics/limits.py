@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stickslip.analyses.forced_response.physics.statics import of_statics
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import MotionAtPeak, PhysicsVerdicts, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
@@ -142,6 +143,7 @@ def afterwards(question: Question, physics: Physics, response: Response) -> Iter
     yield from _of_bounds(physics)
     yield from _of_bodies(physics)
     yield from _of_dampers(physics, _loads_move(question, response), response.peak_hz)
+    yield from of_statics(question.model)
 
 
 def of_physics(question: Question, response: Response) -> Values:

@@ -271,28 +271,30 @@ def unexaminable(question: Question) -> str:
     return why
 
 
-def cost_line(question: Question) -> str:
-    """Return the line of ``stickslip check`` about the examination."""
+def cost_lines(question: Question) -> tuple[str, ...]:
+    """Return the lines of ``stickslip check`` about the examination."""
     if question.examine == "off":
-        return 'stability: not examined, forced_response.stability is "off"'
+        return ('stability: not examined, forced_response.stability is "off"',)
     why = why_not(question)
     if why:
-        return f"stability: not examined, {why}"
+        first, *more = why.split(": ")
+        return (f"stability: not examined, {first}", *(f"stability: {text}" for text in more))
     if by_hill(question.model.system):
         system = question.model.system
         waves = "" if system.structure.wheel is None else " against every wave, one sector at a time"
         most = max(1.0, hill_work(system) / FLOPS)
-        return f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s"
+        return (f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s",)
     points = {
         "all": "every point",
         "peak": "the peak",
-        "auto": "the peak, and other points as far as the work of the solutions goes, all of them where matrices are small,",
+        "auto": "the peak, and other points for as long as solving takes",
     }[question.examine]
     seconds = seconds_in_time(question.model.system)
     motion = (
-        f"up to {seconds:.1f} s of integration in time"
+        f"is integrated in time, up to {seconds:.1f} s"
         if seconds < MOST_IN_TIME
-        else f"it stays undecided without --verify (about {seconds:.0f} s)"
+        else f"stays so without --verify (about {seconds:.0f} s)"
     )
-    which = "the peak" if question.examine == "peak" else "one"
-    return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where {which} is undecided, {motion}"
+    which = "peak" if question.examine == "peak" else "point"
+    each = f"about {examination_work(question.model.system) / FLOPS:.1g} s each"
+    return (f"stability: {points}, {each}", f"stability: an undecided {which} {motion}")

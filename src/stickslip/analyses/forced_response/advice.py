@@ -1,0 +1,213 @@
+"""What ``stickslip check`` says on a case: the computation and its cost, doubts, contacts at rest, and what stands beside the range."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.analyses.forced_response.estimate import estimate
+from stickslip.analyses.forced_response.physics.known import (
+    LISTED,
+    RIGID,
+    doubts_of_model,
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+    off_engine_order,
+)
+from stickslip.analyses.forced_response.physics.limits import NAMED_MODES, Physics, beforehand, driven_line, physics_of
+from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
+from stickslip.analyses.forced_response.problem import Question, question_of
+from stickslip.analyses.forced_response.records.pressures import pressure_lines
+from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
+from stickslip.analyses.forced_response.stability.stable import cost_lines
+from stickslip.arrays import FloatArray
+from stickslip.assembly.model import Model
+from stickslip.assembly.sides.unreduced import unreduced_line
+from stickslip.model.facts import facts_of_part
+from stickslip.model.slow_steps import step
+from stickslip.study.analysis import Advice, Case
+from stickslip.units import HZ
+
+NAMED_POINTS = 4  # open contact points that a line names
+APPROACH_M = 2e-4  # elastic approach of two bodies at rest: pressed metal surfaces approach by micrometres
+HEAVY = 0.3  # mass of a rigid body over that of all other parts: dampers weigh a few per cent of a blade
+FAR_OFF = 20.0  # frequencies off by this factor point to units
+_ENDS_OF_SENTENCES = re.compile(r"(?<=[^.0-9])\. (?=[A-Z0-9a-z])|; |: ")
+
+
+def advice(case: Case, model: Model) -> Advice:
+    """Return what is known of a case before its solution."""
+    question = question_of(case, model)
+    with step(
+        f"modes of {question.model.system.structure.n} coordinates in the range, and how far friction damps them"
+    ):
+        physics = physics_of(question)
+    with step("statics of the dampers at other platform angles"):
+        statics = statics_of_dampers(question.model)
+    known = [] if physics is None else list(beforehand(physics))
+    doubted = [text for text in doubts_of_model(question) if text not in model.warnings]
+    doubts = [
+        *no_resonance(question),
+        *nothing_pressed(question),
+        *mixed_places(question.model.error_labels),
+        *(v for v in known if v.rank),
+    ]
+    return Advice(
+        computed=_computed(case, model, question),
+        doubts=(*doubted, *(f"{v.why}. {v.remedy}" for v in doubts), *units_in_doubt(question, model)),
+        at_rest=(*contacts_at_rest(question), *damper_lines(statics)),
+        beside=(
+            *beside_the_range(question),
+            *([] if physics is None else driven_line(physics)),
+            *_of_friction(physics),
+            *_notes(question),
+        ),
+    )
+
+
+def _computed(case: Case, model: Model, question: Question) -> tuple[str, ...]:
+    """Return lines on the computation and its cost."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    return (
+        f"sweep: {lowest:.2f} to {highest:.2f} Hz",
+        *of_pressures(case, model),
+        *estimate(model, question.sweep).lines,
+        *unreduced_line(question.model),
+        *question.orders_lines,
+        *(f"harmonics: {line}" for line in question.chooser.lines(case.settings.harmonics.passages)),
+        *cost_lines(question),
+        *bifurcations_line(question),
+    )
+
+
+def of_pressures(case: Case, model: Model) -> tuple[str, ...]:
+    """Return lines about pressure fields; empty for a Python model, which has no table of its loads."""
+    given = getattr(case.settings, "load", {})
+    return pressure_lines(model, {name: table.modal_forces for name, table in given.items()})
+
+
+def beside_the_range(question: Question) -> list[str]:
+    """Return the natural frequencies below, in and above the range of the sweep, contacts open and stuck."""
+    times = question.driven[0]
+    lowest, highest = (times * omega / HZ for omega in question.sweep.omega_range)
+    known, told = question.model.frequencies, []
+    if times > 1:
+        told.append(
+            f"{question.driven_names[0]} acts at {times} times the swept frequencies: {lowest:.2f} to {highest:.2f} Hz"
+        )
+    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
+        rigid = int(np.count_nonzero(hertz < RIGID))
+        elastic = hertz[rigid:]
+        pieces = [f"{rigid} of rigid motions"] * bool(rigid)
+        pieces += _listed(elastic[elastic < lowest][-1:], "below")
+        pieces += _listed(elastic[(elastic >= lowest) & (elastic <= highest)][:LISTED], "in the range") or [
+            "none in the range"
+        ]
+        pieces += _listed(elastic[elastic > highest][:1], "above")
+        told += [f"natural frequencies, contacts {state}: {', '.join(pieces)}"] * bool(hertz.size)
+    return told
+
+
+def _listed(hertz: FloatArray, where: str) -> list[str]:
+    return [f"{' and '.join(f'{f:.2f}' for f in hertz)} Hz {where}"] if hertz.size else []
+
+
+def contacts_at_rest(question: Question) -> list[str]:
+    """Return the static forces of all contacts, then of each: closed and open points, normal forces, T/N."""
+    model = question.model
+    normal, along = -model.static_force[:, 2], np.abs(model.static_force[:, :2])
+    if not np.any(normal):
+        return []
+    pressed = np.count_nonzero(normal > 0)
+    told = [
+        f"static equilibrium: {pressed} of {normal.size} contact points are pressed, normal forces up to {normal.max():.3g} N"
+    ]
+    mu = np.array([getattr(law, "mu", np.nan) for law in model.system.interface.laws])
+    groups = np.array(model.contacts.groups)
+    for name in dict.fromkeys(model.contacts.groups):
+        own = groups == name
+        told.append(_of_contact(name, normal[own], along[own], mu[own]))
+        opened = [p for p, at, n in zip(model.contacts.names, own, normal, strict=True) if at and n <= 0]
+        if 0 < len(opened) < np.count_nonzero(own):
+            more = f" and {len(opened) - NAMED_POINTS} more" if len(opened) > NAMED_POINTS else ""
+            told.append(f"contact {name}: open are {', '.join(opened[:NAMED_POINTS])}{more}")
+    return told
+
+
+def _of_contact(name: str, normal: FloatArray, along: FloatArray, mu: FloatArray) -> str:
+    closed = normal > 0
+    if not closed.any():
+        return f"contact {name}: all {normal.size} points are open, or their law has no normal force"
+    total, least, most = normal[closed].sum(), normal[closed].min(), normal[closed].max()
+    each = f"{least:.3g} to {most:.3g} N each" if closed.sum() > 1 else "at one point"
+    ratio = along[closed].sum(axis=0).max() / total  # elastic_coulomb bounds each direction by itself
+    friction = f", T/N {ratio:.2g} of at most {np.mean(mu[closed]):.2g}" if np.all(np.isfinite(mu[closed])) else ""
+    return f"contact {name}: {closed.sum()} of {normal.size} points closed, {total:.3g} N in all, {each}{friction}"
+
+
+def units_in_doubt(question: Question, model: Model) -> Iterator[str]:
+    """Yield doubts that point to wrong units: frequencies far off the range, soft contacts, heavy dampers."""
+    yield from _frequencies_far_off(question)
+    at = np.isfinite(question.model.contacts.position).all(axis=1) & (question.model.static_force[:, 2] < 0.0)
+    approach = -question.model.static_gap[at, 2]
+    if approach.size and approach.max() > APPROACH_M:
+        group = question.model.contacts.groups[int(np.flatnonzero(at)[np.argmax(approach)])]
+        yield (
+            f"at rest contact {group} is pressed together by {1e3 * approach.max():.2g} mm, and metal surfaces approach by micrometres. "
+            f"Check the units of its stiffness (N/m) and of the static load (N)."
+        )
+    mass = {name: facts_of_part(part).mass for name, part in model.parts.items()}
+    for name, part in model.parts.items():
+        others = sum(m for other, m in mass.items() if other != name and np.isfinite(m))
+        if part.body is not None and others > 0.0 and mass[name] > HEAVY * others:
+            yield (
+                f"{name} weighs {mass[name]:.3g} kg beside {others:.3g} kg of all other parts, and dampers weigh a few per cent of a blade. "
+                "Check the units of its mass and sizes (kg, m)."
+            )
+
+
+def _frequencies_far_off(question: Question) -> Iterator[str]:
+    """Yield the doubt about a range that lies far from all natural frequencies."""
+    if len(question.driven) > 1:
+        return
+    lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
+    known = question.model.frequencies
+    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    every = every[every > RIGID]
+    if not every.size:
+        return
+    factor = max(every.min() / highest, lowest / every.max())
+    if factor < FAR_OFF:
+        return
+    which, where = (every.min(), "above") if every.min() > highest else (every.max(), "below")
+    yield (
+        f"the nearest natural frequency, {which:.4g} Hz, lies {factor:.3g} times {where} the range. Check the units: lengths in mm instead of "
+        "m shift frequencies 1000 times, a mass or stiffness a thousand times off 31.6 times."
+    )
+
+
+def _of_friction(physics: Physics | None) -> Iterator[str]:
+    """Yield the estimate of the damping by friction, mode by mode."""
+    damped = [] if physics is None else physics.damped[:NAMED_MODES]
+    for mode in damped:
+        stuck, best, ends = (omega / HZ for omega in (mode.stuck, mode.best, mode.ends))
+        yield (
+            f"friction damps the mode at {stuck:.2f} Hz by up to {100 * mode.ratio:.2g} % of critical, at {best:.2f} Hz; sliding freely, it "
+            f"is at {ends:.2f} Hz"
+        )
+    if damped:
+        yield "this estimate holds within a factor of 1.5, for steady normal forces, at the one best amplitude"
+
+
+def _notes(question: Question) -> Iterator[str]:
+    """Yield notes on the range, each sentence a line."""
+    for note in off_engine_order(question):
+        yield from sentences(f"note: {note.why}. {note.remedy}")
+
+
+def sentences(text: str) -> Sequence[str]:
+    """Return the sentences and clauses of a text, one a line, those after the first indented."""
+    head, _, rest = text.partition(": ")
+    first, *others = _ENDS_OF_SENTENCES.split(rest.removesuffix("."))
+    return [f"{head}: {first}", *(f"  {other}" for other in others)]
