@@ -1,6 +1,6 @@
 """Write the parts of the documentation that are made from the code.
 
-``python docs/generate.py`` writes the tables that lie in the repository: keys of study files, variables of results, public names.
+``python docs/generate.py`` writes what lies in the repository: tables of keys, variables and public names, and the typed keys of methods.
 The build of the documentation adds what it alone can show: the full text of every name, comparisons, computed tables, a drawing.
 """
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import interface_by_task
+import typed_keys
 
 from stickslip.study.questions import ANALYSES
 
@@ -276,3 +277,4 @@ if __name__ == "__main__":
     for path, text in kept().items():
         (HERE / path).parent.mkdir(exist_ok=True)
         (HERE / path).write_text(text, encoding="utf-8")
+    typed_keys.FILE.write_text(typed_keys.module(), encoding="utf-8")

@@ -4,12 +4,16 @@ import importlib
 import json
 import re
 import sys
+from inspect import Parameter, signature
 from pathlib import Path
 from types import ModuleType
+from typing import get_args
 
 import pytest
 
+import stickslip
 from stickslip.study.file.tables import json_schema
+from stickslip.study.questions import ANALYSES
 
 DOCS = Path(__file__).parents[1] / "docs"
 NO_TABLES = {"schema_version", "title", "vary"}  # at the top of the file
@@ -31,6 +35,21 @@ def test_pages_in_the_repository_are_what_the_code_says(generate: ModuleType) ->
     assert there | {"api.md"} == set(pages)
     old = [p for p, text in pages.items() if (DOCS / p).read_text(encoding="utf-8") != text]
     assert old == [], "run `python docs/generate.py`"
+
+
+def test_the_typed_keys_of_methods_are_those_of_their_tables(generate: ModuleType) -> None:
+    made = generate.typed_keys
+    assert made.FILE.read_text(encoding="utf-8") == made.module(), "run `python docs/generate.py`"
+    for name in ANALYSES:
+        method = getattr(stickslip.Model, name)
+        (typed,) = get_args(method.__annotations__["keys"])
+        assert typed.__name__ == made.class_name(name)
+        own = method.__code__.co_varnames[: method.__code__.co_argcount + method.__code__.co_kwonlyargcount]
+        shown = {key for key, p in signature(method).parameters.items() if key not in own}
+        assert typed.__annotations__.keys() == shown  # what `help` shows, and what is accepted
+        assert typed.__required_keys__ == {
+            key for key in shown if signature(method).parameters[key].default is Parameter.empty
+        }
 
 
 def test_every_table_of_a_study_has_its_keys_on_a_page(generate: ModuleType) -> None:

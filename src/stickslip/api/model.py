@@ -6,12 +6,27 @@ from html import escape
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from pydantic import ValidationError
 
 from stickslip.api.as_tables import as_tables
+from stickslip.api.keys import (
+    AllMotionsKeys,
+    CampbellKeys,
+    FlutterKeys,
+    ForcedResponseKeys,
+    LimitCycleKeys,
+    ModalSynthesisKeys,
+    ModesKeys,
+    NonlinearModeKeys,
+    QuasiPeriodicKeys,
+    ResidualTractionsKeys,
+    ResonanceKeys,
+    RunUpKeys,
+    SafeKeys,
+)
 from stickslip.api.result import Result
 from stickslip.api.screen import by_default
 from stickslip.assembly.assembled import Assembled
@@ -30,7 +45,7 @@ from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer
 from stickslip.units import RPM
 
-_OF_THE_MODEL = ("alert_over",)  # keys of tables that a model has itself
+OF_THE_MODEL = ("alert_over",)  # keys of tables that a model has itself
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -38,7 +53,8 @@ class Model(Assembly):
     """Parts, contacts and loads, and the questions that can be asked of them.
 
     Every key of a study's table is an argument of the method of that name (`forced_response` takes those of [harmonics], [solver]
-    and [limits], too), with the same meaning, unit and default. Numbers are the same as those of a study.
+    and [limits], too), with the same meaning, unit and default. Editors complete the keys, and type checkers compare them. Numbers are
+    the same as those of a study.
     """
 
     def assembled(self, harmonics: int, *, every_wave: bool = False) -> Assembled:
@@ -52,7 +68,7 @@ class Model(Assembly):
         verify: bool = False,
         verify_harmonics: bool = False,
         folder: str | Path | None = None,
-        **keys: Any,
+        **keys: Unpack[ForcedResponseKeys],
     ) -> Result:
         """Compute the steady vibration under the harmonic loads.
 
@@ -72,30 +88,33 @@ class Model(Assembly):
         InputError
             If a key is unknown, or the model does not allow the analysis.
         """
+        given: dict[str, Any] = {**keys}
         if hz is not None:
             own = [float(f) for f in hz]
-            keys["frequency_hz" if len(own) == 2 else "frequencies_hz"] = own
+            given["frequency_hz" if len(own) == 2 else "frequencies_hz"] = own
         asked = {"verify": verify, "verify_harmonics": verify_harmonics}
         checks = frozenset(name for name, wanted in asked.items() if wanted)
-        return self._answer("forced_response", keys, folder, checks)
+        return self._answer("forced_response", given, folder, checks)
 
-    def modes(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def modes(self, *, folder: str | Path | None = None, **keys: Unpack[ModesKeys]) -> Result:
         """Find natural frequencies and mode shapes; keys such as ``number=6, contacts="stuck"``."""
         return self._answer("modes", keys, folder)
 
-    def campbell(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def campbell(self, *, folder: str | Path | None = None, **keys: Unpack[CampbellKeys]) -> Result:
         """Follow frequencies over speed; keys such as ``speeds_rpm=(0, 9000), engine_orders=[4, 20]``."""
         return self._answer("campbell", keys, folder)
 
-    def flutter(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def flutter(self, *, folder: str | Path | None = None, **keys: Unpack[FlutterKeys]) -> Result:
         """Find the aerodynamic damping of every wave; keys such as ``number=2, contacts="open"``. The model needs `aerodynamics`."""
         return self._answer("flutter", keys, folder)
 
-    def safe(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def safe(self, *, folder: str | Path | None = None, **keys: Unpack[SafeKeys]) -> Result:
         """Find the modes that engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
         return self._answer("safe", keys, folder)
 
-    def limit_cycle(self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any) -> Result:
+    def limit_cycle(
+        self, *, verify: bool = False, folder: str | Path | None = None, **keys: Unpack[LimitCycleKeys]
+    ) -> Result:
         """Find self-excited motions; keys such as ``wave_numbers=[3], points=40, in_time=True``.
 
         Parameters
@@ -115,12 +134,16 @@ class Model(Assembly):
         checks = frozenset({"verify"} if verify else ())
         return self._answer("limit_cycle", keys, folder, checks)
 
-    def nonlinear_mode(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def nonlinear_mode(self, *, folder: str | Path | None = None, **keys: Unpack[NonlinearModeKeys]) -> Result:
         """Follow modes over their amplitude; keys such as ``modes=[1, 2], amplitude_mm=(1e-3, 1.0), points=40``."""
         return self._answer("nonlinear_mode", keys, folder)
 
     def resonance(
-        self, of: Callable[[float], Assembly] | None = None, *, folder: str | Path | None = None, **keys: Any
+        self,
+        of: Callable[[float], Assembly] | None = None,
+        *,
+        folder: str | Path | None = None,
+        **keys: Unpack[ResonanceKeys],
     ) -> Result:
         """Follow resonance peaks over a design parameter.
 
@@ -142,19 +165,19 @@ class Model(Assembly):
         at = None if of is None else lambda _, value: of(value)
         return self._answer("resonance", {"parameter": "value", **keys}, folder, at=at)
 
-    def residual_tractions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def residual_tractions(self, *, folder: str | Path | None = None, **keys: Unpack[ResidualTractionsKeys]) -> Result:
         """Bound the response over all possible residual tractions of sticking contacts; keys such as ``frequency_hz=(150, 170), points=25``."""
         return self._answer("residual_tractions", keys, folder)
 
-    def modal_synthesis(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def modal_synthesis(self, *, folder: str | Path | None = None, **keys: Unpack[ModalSynthesisKeys]) -> Result:
         """Find forced responses at many levels from one nonlinear mode; keys such as ``levels=[0.5, 1, 2], mode=1, direct=True``."""
         return self._answer("modal_synthesis", keys, folder)
 
-    def all_motions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def all_motions(self, *, folder: str | Path | None = None, **keys: Unpack[AllMotionsKeys]) -> Result:
         """Search for motions that the sweep misses; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, solves=2000``."""
         return self._answer("all_motions", keys, folder)
 
-    def quasi_periodic(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def quasi_periodic(self, *, folder: str | Path | None = None, **keys: Unpack[QuasiPeriodicKeys]) -> Result:
         """Compute motions with two frequencies; keys such as ``frequencies_hz=[150.0, 160.0], second_hz=212.0, accuracy_percent=0.5``.
 
         A load with a frequency of its own (`Load.omega`, `Load.omega_ratio`) gives the second frequency. Without one, a self-excited second
@@ -162,7 +185,7 @@ class Model(Assembly):
         """
         return self._answer("quasi_periodic", keys, folder)
 
-    def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+    def run_up(self, *, folder: str | Path | None = None, **keys: Unpack[RunUpKeys]) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""
         return self._answer("run_up", keys, folder)
 
@@ -229,7 +252,7 @@ def _with_keys(name: str) -> Signature:
         key: f
         for section in _sections(name).values()
         for key, f in section.model_fields.items()
-        if key not in _OF_THE_MODEL and key not in own.parameters
+        if key not in OF_THE_MODEL and key not in own.parameters
     }
     return own.replace(
         parameters=[
@@ -270,8 +293,8 @@ def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
     home = {key: table for table, own in sections.items() for key in own.model_fields}
     values: dict[str, dict[str, Any]] = {table: {} for table in sections}
     for key, value in keys.items():
-        if key not in home or key in _OF_THE_MODEL:
-            known = [k for k in home if k not in _OF_THE_MODEL]
+        if key not in home or key in OF_THE_MODEL:
+            known = [k for k in home if k not in OF_THE_MODEL]
             raise input_error(f"{name}: {key}", "is no key of this question", nearest_key(key, known, value))
         values[home[key]][key] = _plain(value)
     return {table: _validated(own, values[table], name) for table, own in sections.items()}

@@ -25,7 +25,7 @@ OWNER = "point_case"  # index of the case of each point where all cases share `p
 VARIED_KEY = "varied_key"  # attribute of a coordinate that has the values of a varied key
 PLACES = ("frequency_hz", "speed_rpm")  # ends of the names of what positions a row
 LABELS = ("output_label", "output_name")  # names of the outputs where the dimension has none
-SAME = 1e-9  # relative difference below which a number that is asked for is a value of the key
+RELATIVE_ERROR_OF_VALUES = 1e-9  # relative difference below which a number that is asked for is a value of the key
 
 
 class Varied(xr.Index):
@@ -117,7 +117,7 @@ def _positions(name: str, values: np.ndarray[Any, Any], asked: Any, method: str 
         wanted = one
         if number and method == "nearest":
             wanted = values[np.argmin(np.abs(values - one))]
-        here = np.isclose(values, wanted, rtol=SAME, atol=0.0) if number else values == str(one)
+        here = np.isclose(values, wanted, rtol=RELATIVE_ERROR_OF_VALUES, atol=0.0) if number else values == str(one)
         if not np.any(here):
             known = ", ".join(f"{v:g}" if number else str(v) for v in pd.unique(values))
             raise KeyError(f"{name} has no value {one!r}, but {known}")
