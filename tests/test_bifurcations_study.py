@@ -94,7 +94,7 @@ def test_structural_damping_is_located_by_hill(tmp_path, monkeypatch):
     found = located(asked, response, Kept())
     assert [b.kind for b in found.found] == ["period doubling"]
     assert found.found[0].omega / (2 * np.pi) == pytest.approx(37.57, abs=0.05)
-    assert "those of Hill's method" in " ".join(limits(asked, found))
+    assert "they come from Hill's method" in " ".join(limits(asked, found))
 
 
 def test_what_is_refused_is_told_and_not_taken_for_none(monkeypatch):

@@ -128,7 +128,7 @@ def test_a_range_without_width_is_told_as_such(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("package", "lacking", "said"),
     [
-        ("pyyeti", "pyyeti", r"pyyeti: not installed. Use: pip install 'stickslip\[readers\]'"),
+        ("pyyeti", "pyyeti", r"pyyeti is not installed. Use pip install 'stickslip\[readers\]'"),
         ("pyyeti", "matplotlib.pyplot", r"pyyeti: is installed, but it imports matplotlib, which"),
         ("scikit-fem", "skfem", r"scikit-fem: not installed"),
     ],

@@ -97,7 +97,7 @@ def test_remedies_are_options_and_keys_not_arguments(tmp_path: Path) -> None:
     deck = write_deck(tmp_path / "deck.inp")
     deck.write_text(deck.read_text() + "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n")
     said = refused("check", str(file_study(tmp_path)))
-    assert "*EQUATION changes the model and is not read. Let the solver write its matrices and read those." in said
+    assert "*EQUATION changes the model and is not read. Let the solver write its matrices and read these." in said
     assert "ignore" not in said + refused("inspect", str(deck))
     (tmp_path / "job.sti").write_text("1 1 1.0\n")
     (tmp_path / "job.dof").write_text("1.1\n")
@@ -124,7 +124,7 @@ def test_matrices_with_the_mesh_of_another_job(tmp_path: Path, *, plausible: boo
     (tmp_path / "other.csv").write_text("\n".join(["node,x,y,z", *rows]) + "\n")
     words = ("--mesh", str(tmp_path / "other.csv"), "--units", "mm-t-s", "--frequencies", "0")
     said = done("inspect", str(tmp_path / "brick_matrix.sti.gz"), *words)
-    assert "they are probably those of another mesh" in said
+    assert "they probably belong to another mesh" in said
     more = f'mesh = "other.csv"\nplausible = {str(plausible).lower()}'
     study = file_study(tmp_path, more, "brick_matrix.sti.gz", "mm-t-s")
     if plausible:

@@ -307,7 +307,7 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match="does not say where the scheduler is"):
         check_kind("dask")
     monkeypatch.setattr("stickslip.study.store.workers.find_spec", lambda _name: None)
-    with pytest.raises(StickslipError, match=r"distributed: not installed\. Use: pip install 'stickslip\[cluster\]'"):
+    with pytest.raises(StickslipError, match=r"distributed is not installed\. Use pip install 'stickslip\[cluster\]'"):
         run_study(study, kind="dask=tcp://127.0.0.1:1")
     with pytest.raises(StickslipError, match="executorlib: not installed"):
         run_study(study, kind="slurm")

@@ -525,7 +525,7 @@ def test_archive_written_here(tmp_path):
         ("NBLOCK", "NBLOK", "no block of nodes"),
         ("(3i9,6e21.13e3)", "(3i9 6e21)", r"line 3: '\(3i9 6e21\)' is no format"),
         ("         8,         8\n(3i9", "         8,         9\n(3i9", "block of nodes ends after 8 of 9"),
-        ("0.0000000000000E+00", "0.00000o0000000E+00", r"line 4: .* something else than numbers"),
+        ("0.0000000000000E+00", "0.00000o0000000E+00", r"line 4: .* does not hold numbers only"),
         ("EBLOCK,19,SOLID", "EBLOCK,19,", "without the word SOLID"),
         ("       80\n", "\n", "an element has 7 of its 8 nodes"),
         ("       -1\nMP", "MP", "has no end"),

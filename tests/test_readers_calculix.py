@@ -509,7 +509,7 @@ def test_positions_of_another_mesh_are_refused():
         read_calculix_matrices(DATA / "brick_matrix", units=MM, mesh=other_mesh(deck))
     taken = read_calculix_matrices(DATA / "brick_matrix", units=MM, mesh=other_mesh(deck), plausible=False)
     remarks = model_summary(taken, n_modes=0).remarks
-    assert any("probably those of another mesh" in text for text in remarks)
+    assert any("probably belong to another mesh" in text for text in remarks)
 
 
 @needs_reference

@@ -70,7 +70,7 @@ def test_peaks_of_another_python_are_compared():
 
 def test_the_journey_takes_only_a_refusal_that_names_the_extra():
     wrong = script("wheel_journey").not_refused
-    refusal = "gmsh: not installed. Use: pip install 'stickslip[fe]'"
+    refusal = "gmsh is not installed. Use pip install 'stickslip[fe]'"
     assert wrong(1, refusal, "gmsh") == ""
     assert "ended with 0" in wrong(0, refusal, "gmsh")
     assert wrong(1, refusal, "scikit-fem")

@@ -63,7 +63,7 @@ def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
     assert case["time_amplitude"].values == pytest.approx([low, high], rel=0.02)
     told = [v for v in outcome.verdicts if "residual tractions" in v.why]
     assert len(told) == 3
-    assert "answer of forced_response may be off" in told[1].why
+    assert "from the model's own start may be off by" in told[1].why
     assert not told[1].warns
     figures = plots(outcome.tree)
     names = [trace.name for trace in figures["response"].data]

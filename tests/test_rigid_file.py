@@ -60,7 +60,7 @@ def test_rigid_friction_is_the_limit_of_stiff_springs(chain, tmp_path):
     # no error is predicted where a contact is rigid, and the peak stands at the end of the sweep
     unexamined, end, *_ = stored(data.attrs)
     assert (unexamined.level, end.level) == ("doubtful", "doubtful")
-    assert "A contact is rigid, of which no error is predicted" in unexamined.remedy
+    assert "no error is predicted for rigid contacts" in unexamined.remedy
     assert "at the end of the sweep" in end.why
     assert str(data["contact_law"].values[0]) == "rigid_coulomb"
     force = data["peak_force"].values[0, 0, 0]

@@ -383,7 +383,7 @@ WRONG = [
     ),
     (
         {"forced_response.stability": '"yes"'},
-        "forced_response.stability: is not known, got 'yes'. Known: all, auto, off, peak. It means: whether a disturbance dies",
+        "forced_response.stability: is not known, got 'yes'. Known: all, auto, off, peak. It means: where stability is examined",
     ),
     (
         {"harmonics.alert_over": '"contact"'},

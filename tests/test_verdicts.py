@@ -151,7 +151,7 @@ def test_records_of_a_result_have_the_rows_of_one_case_and_missing_values_for_wh
 
 def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     """As a terminal has them."""
-    fold = "whether it is stable: undecided, modulus {}"
+    fold = "stability undecided, modulus {}"
     given = [
         Verdict("trusted", "k = 1", 10.0, "peak with H = 1"),
         Verdict("doubtful", "k = 2", 11.0, fold.format(0.99), "Ask at 11 Hz."),
@@ -208,7 +208,7 @@ def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> 
 
 # changes of a good response, the level of the case, those of the points that are not trusted, and words of its verdict
 RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
-    "not converged": ({"status": values(1, 1, 0)}, "doubtful", {1: "wrong"}, "a larger one may stand among them"),
+    "not converged": ({"status": values(1, 1, 0)}, "doubtful", {1: "wrong"}, "one of these points may be larger"),
     "none converged": ({"status": np.ones(6, dtype=int), "peak_point": [-1]}, "wrong", {}, "there is no peak"),
     "own error at the peak": (
         {"own_error_percent": values(TOP, 7.0, 1.0)},
@@ -336,7 +336,7 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
         examined("undecided"),
         "doubtful",
         {TOP: "doubtful"},
-        "whether it is stable: undecided: the multiplier",
+        "stability undecided: the multiplier",
     ),
     "stable": (examined("stable"), "trusted", {}, "peak with H = 1, stable, predicted error 1 %"),
     "stability not examined": (examined("not examined"), "trusted", {}, f"{NO_STABILITY[2:]} (the multiplier is 1.2)"),
@@ -538,7 +538,7 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
     errors = np.array([30.0, 1.0, 6.0, 7.0, 8.0, 1.0])
     (found,) = (v for v in verdicts(response(own_error_percent=errors), [""]) if v.rank)
     assert found.frequency_hz == 13.0
-    assert "by 7 %; the same is said of 4 of 6 points, 10.00 to 14.00 Hz, the most at 10.00 Hz (30 %)" in found.why
+    assert "by 7 %; this concerns 4 of 6 points, 10.00 to 14.00 Hz, the most at 10.00 Hz (30 %)" in found.why
     (found,) = (v for v in verdicts(response(own_error_percent=values(0, 30.0, 1.0)), [""]) if v.rank)
     assert found.frequency_hz == 10.0
     assert "the like" not in found.why
@@ -556,8 +556,8 @@ def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
 @pytest.mark.parametrize(
     ("cap", "said"),
     [
-        (41, "Give more forced_response.points"),
-        (5, "raise limits.work_s or limits.memory_gb"),
+        (41, "Give more forced_response.points, or a narrower range. The search"),
+        (5, "Raise limits.work_s or limits.memory_gb"),
         (None, 'Give harmonics.high = "auto"'),
     ],
 )
@@ -568,7 +568,7 @@ def test_remedies_name_what_kept_a_point_from_more_harmonics(cap: int | None, sa
     assert said in found.remedy
     quiet = response(auto, harmonic_kept=many((TOP,)), **checked(difference_percent=3.0))
     (found,) = (v for v in judged(quiet)[0] if v.rank)
-    assert ("lower that" in found.remedy) is (cap is not None)
+    assert ("Lower harmonics.alert_threshold_percent" in found.remedy) is (cap is not None)
 
 
 def test_a_frequency_alone_is_no_end_of_a_sweep() -> None:
@@ -580,7 +580,7 @@ def test_remedies_fit_rigid_contacts() -> None:
     data = response(own_error_percent=np.full(6, np.nan))
     assert "--verify-harmonics predicts" in verdicts(data, [""])[0].remedy
     data["contact_law"] = "contact", ["rigid_coulomb"]
-    assert "A contact is rigid" in verdicts(data, [""])[0].remedy
+    assert "no error is predicted for rigid contacts" in verdicts(data, [""])[0].remedy
 
 
 def test_verdicts_are_ordered_and_go_to_json_and_back() -> None:

@@ -162,7 +162,7 @@ def test_engine_orders_above_the_computed_modes_are_not_called_clear(tmp_path: P
     made = study(tmp_path, {"safe.engine_orders": "[2, 14]"})
     outcome = done(made, "safe")
     said = outcome.verdicts[0].sentence
-    assert "Engine orders 14 are not judged: they excite nodal diameters 2 at 1400 Hz" in said
+    assert "Engine orders 14 are not judged; with the margin they excite nodal diameters 2 at 1400 Hz" in said
     assert "Raise safe.modes, now 2, to" in said
     data = outcome.tree["safe"]
     order = data.pair_engine_order.values

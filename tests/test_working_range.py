@@ -126,7 +126,7 @@ def test_the_run_says_where_friction_works(brake: ss.Result, tmp_path: Path) -> 
     stuck, works, gone = range_lines(data)
     assert stuck.startswith(f"At {KEY} = {own.peaks[0].value:g}, the first value, all contacts stick")
     (only,) = own.of("works")
-    assert works.startswith(f"Friction works at {KEY} = {only.value:g}: there the peak per unit")
+    assert works.startswith(f"Friction works at {KEY} = {only.value:g}: the peak per unit")
     assert gone.startswith(f"Out of the working range above {KEY} = {only.value:g}: ")
     assert "no contact sticks throughout the cycle" in gone
     flags = data["friction_regime"]
@@ -150,7 +150,7 @@ def test_a_damper_that_never_takes_the_peak_down_hardly_damps() -> None:
     assert own is not None
     assert own.regimes == ("stuck", "stiffens", "stiffens")
     assert range_sentences(own)[-1] == (
-        "Down to  = 5 the peak per unit of force stays within 20 % of that of the stuck system: the contacts stiffen but hardly damp."
+        "Down to  = 5 the peak per unit of force stays within 20 % of the stuck system's: the contacts stiffen but hardly damp."
     )
 
 
@@ -160,7 +160,7 @@ def test_without_a_stuck_case_the_range_is_that_around_the_smallest_peak() -> No
     assert own is not None
     assert own.regimes == ("stiffens", "works", "works", "works")
     stuck, works, other = range_sentences(own)
-    assert stuck.startswith("At no value do all contacts stick at the peak: ")
+    assert stuck.startswith("At no value do all contacts stick at the peak; ")
     assert "within 3 dB of the smallest one, at 10" in works
     assert other.startswith("The other end was not reached: at load.shaker.ratio = 5, the last value, ")
 
@@ -188,8 +188,8 @@ def test_a_peak_that_never_falls_but_rises_is_not_said_to_stay_near() -> None:
     own = working_range(curve((250, 1.0, STICKS), (100, 0.8, SLIPS), (50, 2.5, SLIDES), (20, 3.2, SLIDES)))
     assert own is not None
     assert range_sentences(own)[-1] == (
-        "At no value does friction take the peak per unit of force 3 dB below that of the stuck system: it is smallest at 100, 80 % of the "
-        "stuck one, and largest at 20, 320 %."
+        "Friction never takes the peak per unit of force 3 dB below the stuck system. It is smallest at 100, 80 % of the stuck system's, "
+        "and largest at 20, 320 %."
     )
 
 

@@ -39,14 +39,15 @@ StudyKind = Annotated[
     Kind,
     typer.Option(
         "--kind",
-        help="blades: two blades and a damper; sector: a meshed bladed disk with shrouds; wheel: a blisk of masses with a friction ring, by nodal diameters; file: one from a finite-element program; "
-        "masses: four masses on springs, the smallest study.",
+        help="blades (two blades and a damper), sector (a meshed bladed disk with shrouds), wheel (a blisk of masses with a friction ring, by nodal diameters), file (your finite-element model) or masses (four masses on springs, the smallest study).",
     ),
 ]
 OtherMachines = Annotated[
     str, typer.Option(metavar="KIND", help="dask=ADDRESS, slurm, flux or executorlib: docs/cluster.md.")
 ]
-Share = Annotated[str | None, typer.Option(metavar="I/N", help="Do a share of the jobs; the last to end joins all.")]
+Share = Annotated[
+    str | None, typer.Option(metavar="I/N", help="Do one share of the jobs; the last share to end joins the results.")
+]
 
 
 def main() -> None:
@@ -87,15 +88,15 @@ def run(
     ] = False,
     fresh: Annotated[
         bool,
-        typer.Option("--fresh", help="Start over: remove what runs wrote into the results folder, and no other file."),
+        typer.Option("--fresh", help="Delete earlier results and start again; other files in the folder stay."),
     ] = False,
     results: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the results; left out: that of the study.")
+        Path | None, typer.Option(metavar="DIR", help="Folder of the results; by default beside the study.")
     ] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
     verbose: Annotated[
         bool,
-        typer.Option("--verbose", "-v", help="Say what jobs say on their way, points and checks, and every verdict."),
+        typer.Option("--verbose", "-v", help="Show progress of every point and check, and every verdict."),
     ] = False,
 ) -> None:
     """Run the analyses of a study; an interrupted run continues where it stopped."""
@@ -127,7 +128,7 @@ def run(
 
 @app.command()
 def check(study: StudyFile) -> None:
-    """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
+    """Prepare a study without solving it: read, mesh, reduce, static state, natural frequencies."""
     with _errors_as_text():
         with on_screen(Screen(console())):
             doubts = read(study).check()
@@ -170,21 +171,24 @@ def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")],
     *,
     to: Annotated[
-        Literal["vtu", "frd", "uff"], typer.Option(help="vtu: ParaView; frd: CalculiX's viewer; uff: test software.")
+        Literal["vtu", "frd", "uff"],
+        typer.Option(help="vtu for ParaView, frd for CalculiX's viewer, uff for test software."),
     ] = "vtu",
-    case: Annotated[int, typer.Option(min=0, help="Which case of \\[vary], from 0.")] = 0,
-    hz: Annotated[float | None, typer.Option(help="The point nearest to this frequency; left out: the peak.")] = None,
+    case: Annotated[int, typer.Option(min=0, help="Number of the case of \\[vary], from 0.")] = 0,
+    hz: Annotated[
+        float | None, typer.Option(help="The point nearest to this frequency, Hz; by default the peak.")
+    ] = None,
     steps: Annotated[int, typer.Option(min=1, max=1000, help="Instants of the period (vtu).")] = 24,
     wheel: Annotated[bool, typer.Option("--wheel", help="Write all sectors, not one.")] = False,
-    out: Annotated[Path | None, typer.Option(help="The folder; left out: beside the file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The folder; by default beside the file.")] = None,
     units: Annotated[str, typer.Option(help="Unit system of an frd file, such as mm-t-s.")] = "SI",
-    of: Annotated[Path | None, typer.Option(help="Folder of the study, where the result was moved away.")] = None,
+    of: Annotated[Path | None, typer.Option(help="Folder of the study, if the result was moved.")] = None,
     analysis: Annotated[
-        str, typer.Option(help="forced_response, nonlinear_mode or limit_cycle; left out: the first.")
+        str, typer.Option(help="forced_response, nonlinear_mode or limit_cycle; by default the first.")
     ] = "",
-    number: Annotated[int, typer.Option(min=0, help="Which mode or limit cycle, from 0.")] = 0,
+    number: Annotated[int, typer.Option(min=0, help="Number of the mode or limit cycle, from 0.")] = 0,
     amplitude_mm: Annotated[
-        float | None, typer.Option(help="Of a nonlinear mode; left out: the most damped motion.")
+        float | None, typer.Option(help="Amplitude on a nonlinear mode, mm; by default the most damped motion.")
     ] = None,
 ) -> None:
     """Write how every node and contact moves, for ParaView and other programs."""
@@ -222,11 +226,11 @@ def compare(
     *,
     name: Annotated[
         list[str] | None,
-        typer.Option("--name", help="What to call each, in the same order; left out: by folders and files."),
+        typer.Option("--name", help="A name for each, in the same order; by default folder and file names."),
     ] = None,
     page: Annotated[Path, typer.Option(help="The page to write.")] = Path("comparison.html"),
 ) -> None:
-    """Hold designs against each other: peaks, responses, optimisation curves, modes and inputs on one page."""
+    """Compare designs on one page: peaks, responses, optimisation curves, modes and inputs."""
     with _errors_as_text():
         from stickslip.api.comparison import compare as compared_designs
         from stickslip.api.table import cells
@@ -244,7 +248,7 @@ def inspect(
     *,
     units: Annotated[str, typer.Option(help="Its unit system: SI, mm-t-s, mm-kg-s, mm-kg-ms, inch-lbf-s, ...")] = "SI",
     frequencies: Annotated[int, typer.Option(min=0, max=200, help="Natural frequencies to compute.")] = 10,
-    mesh: Annotated[Path | None, typer.Option(help="Where the nodes lie, beside matrices that do not say.")] = None,
+    mesh: Annotated[Path | None, typer.Option(help="File with node positions, for matrices without them.")] = None,
 ) -> None:
     """Show the content of a finite-element model file: dofs, sets, mass, size, first frequencies."""
     with _errors_as_text():
@@ -263,18 +267,19 @@ def fit(
     ],
     *,
     normal_load: Annotated[
-        float | None, typer.Option(metavar="N", help="Constant normal force; left out: not known.")
+        float | None, typer.Option(metavar="N", help="Constant normal force; by default not known.")
     ] = None,
     normal_load_deviation: Annotated[float, typer.Option(metavar="N", help="Its standard deviation.")] = 0.0,
     machine_stiffness: Annotated[
-        float | None, typer.Option(metavar="N/m", help="What lies in series with the contact; left out: rigid.")
+        float | None,
+        typer.Option(metavar="N/m", help="Stiffness of the machine in series with the contact; by default rigid."),
     ] = None,
     offset: Annotated[
         bool, typer.Option("--offset/--no-offset", help="Whether the force may have an unknown offset.")
     ] = True,
     drift: Annotated[bool, typer.Option("--drift", help="Let the force drift, linearly in time.")] = False,
     page: Annotated[
-        Path | None, typer.Option(help="The page to write; left out: LOOPS.fit.html beside the file.")
+        Path | None, typer.Option(help="The page to write; by default LOOPS.fit.html beside the file.")
     ] = None,
 ) -> None:
     """Fit friction coefficient and tangential stiffness to measured hysteresis loops."""
@@ -297,14 +302,14 @@ def fit(
         write_loop_page(found, loops, target, told, lines)
         for line in told:
             say(line)
-        say_lines("What the loops cannot tell, and what is doubtful", [f"{n}." for n in found.notes])
+        say_lines("Not identified by these loops, or doubtful", [f"{n}." for n in found.notes])
         say_lines("For the table of a contact in the study file", lines)
         say_lines("Files", [str(target)])
 
 
 @app.command(name="compile")
 def compile_() -> None:
-    """Compile contact laws and time steps, once an installation; otherwise the first runs do, for a minute or two."""
+    """Compile contact laws and time steps once after installing; without it the first run takes a minute or two more."""
     with _errors_as_text():
         from stickslip.response.precompile import compile_ahead
         from stickslip.study.store.threads import one_blas_thread
@@ -320,7 +325,7 @@ def keys(
         str,
         typer.Argument(
             metavar="TABLE",
-            help="Such as forced_response, or a kind of one: contact.elastic_coulomb. Left out: which tables there are.",
+            help="For example forced_response or contact.elastic_coulomb. Without it all tables are listed.",
         ),
     ] = "",
 ) -> None:

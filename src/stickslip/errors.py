@@ -191,4 +191,4 @@ def missing_package(package: str, error: Exception, extra: str) -> StickslipErro
         return StickslipError(
             f"{package}: is installed, but it imports {lacking}, which is not. Use: pip install {lacking}"
         )
-    return StickslipError(f"{package}: not installed. Use: pip install 'stickslip[{extra}]'")
+    return StickslipError(f"{package} is not installed. Use pip install 'stickslip[{extra}]'")

@@ -221,9 +221,7 @@ def _names(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
     points, labels = loads | dict(_table(output, "points")), node.labels("output")
     wanted = node.text("report_output")
     rows = [[label, _meaning(label, points) + "; **its peak counts**" * (label == wanted)] for label in labels]
-    text = (
-        "Amplitudes are those of the harmonic that the load drives: half of peak to peak, where nothing else vibrates. "
-    )
+    text = "Amplitudes are given in the harmonic that the load drives. Where nothing else vibrates, this is half of peak to peak. "
     text += "On a set of several nodes an output is the first of them, and 'stickslip check' says where that lies."
     shown = sorted(rows, key=lambda row: row[0] != wanted)[:_MOST_NAMES]
     more = [f"{len(rows) - len(shown)} more of the same kind."] if len(rows) > len(shown) else []

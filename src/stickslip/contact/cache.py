@@ -17,7 +17,7 @@ from stickslip.contact.cache_files import CheckedCache, tell_uncached
 
 LOG = logging.getLogger("stickslip")
 QUIET_SECONDS = 3.0  # seconds after which compiling is worth a line
-LINE = "compiling contact laws or their time steps, once an installation; this may take a minute or two"
+LINE = "compiling contact laws or time steps; needed once after installing, a minute or two"
 
 
 class _Compiling(event.Listener):

@@ -336,8 +336,7 @@ def _of_setup(load: float | None, machine: float | None, found: _Found) -> list[
         told.append("The normal load is not given: the limit force is told, the friction coefficient is not")
     if machine is None and math.isfinite(found.stiffness):
         told.append(
-            "The stiffness is that of everything between the two places whose relative displacement was measured: a loop cannot tell "
-            "the contact from the machine in series with it"
+            "The stiffness includes everything between the two places whose relative displacement was measured. A loop cannot separate the contact from the machine in series with it"
         )
     return told
 
@@ -417,8 +416,7 @@ def _correlated(model: LoopModel, away: FloatArray) -> list[str]:
     if away.size < MANY or correlation < FOLLOWS:
         return []
     told = (
-        f"Neighbouring residuals follow each other (correlation {correlation:.2f}): the law is not quite that of the loop, or the force "
-        f"was filtered. The standard deviations are too small by a factor of about {_inflation(correlation):.1f}, and say nothing of "
+        f"Neighbouring residuals follow each other (correlation {correlation:.2f}): the law does not quite fit the loop, or the force was filtered. The standard deviations are too small by a factor of about {_inflation(correlation):.1f}, and say nothing of "
         "what the law leaves out"
     )
     return [told]

@@ -68,7 +68,7 @@ def write_loop_page(fit: LoopFit, source: Path, target: Path, estimates: Sequenc
         Estimates, and lines for a study file, as shown on the terminal.
     """
     n = counted(sum(x.size for x, _ in fit.loops), "sample")
-    caption = f"Left: the measured loop and the law walked along its displacements. Right: what is left, {number(fit.residual)} N as a standard deviation over {n}."
+    caption = f"Left are the measured loop and the law along its displacements. Right are the residuals, with a standard deviation of {number(fit.residual)} N over {n}."
     placing = Placing()
 
     def own(key: str, title: str, content: Content) -> Chapter:
@@ -81,6 +81,6 @@ def write_loop_page(fit: LoopFit, source: Path, target: Path, estimates: Sequenc
     ]
     if fit.notes:
         notes = Words(items=[f"{note}." for note in fit.notes])
-        chapters.append(own("notes", "What the loops cannot tell, and what is doubtful", notes))
+        chapters.append(own("notes", "Not identified by these loops, or doubtful", notes))
     chapters.append(own("study", "For the study file", Words(preformatted="\n".join(lines))))
     write_page(page_html("Friction contact from measured loops", source.name, chapters), target)

@@ -30,8 +30,7 @@ _ADVICE = {
     Status.CONVERGED: "converged",
     Status.TOO_MANY_ITERATIONS: "Newton used all its iterations; a smaller frequency step usually helps",
     Status.STALLED: "no step reduced the residual; contact states switch here, use more samples or a smaller step",
-    Status.SINGULAR: "the Jacobian is singular: a rigid body is held by no contact, give it a retention stiffness; "
-    "or, with very many contacts, the Krylov method found no step: take more products or a shorter continuation step",
+    Status.SINGULAR: "the Jacobian is singular. If no contact holds a rigid body, give it a retention stiffness. With very many contacts the Krylov method found no step; take more products or a shorter continuation step",
     Status.NOT_FINITE: "the iteration left the finite numbers; check loads and stiffnesses",
     Status.STEP_TOO_SMALL: "the continuation step shrank below its smallest value",
     Status.LOCAL_MINIMUM: "the residual has a minimum that is not zero; start nearer to the solution",

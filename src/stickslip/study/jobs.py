@@ -168,7 +168,7 @@ def _submitted(pool: Executor, order: Order, *others: Any) -> Future[Answer]:
 
 def _gone(why: str) -> StickslipError:
     return StickslipError(
-        f"the executor takes no more jobs: {why}. What is finished is kept: the same command goes on from there."
+        f"the executor takes no more jobs ({why}). Finished jobs are kept, and the same command continues."
     )
 
 

@@ -60,11 +60,11 @@ def branches(view: Motions) -> Plot:
     figure.update_yaxes(title_text=f"amplitude of {found.output} ({scale.unit})", rangemode="tozero")
     spent = " The budget ended the search before all was tried." * bool(found.spent)
     caption = (
-        f"{_several(len(found.branches), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
+        f"{_several(len(found.branches), 'branch', 'branches')}; a sweep by arc length meets the first. At "
         f"{_several(len(found.places), 'frequency', 'frequencies')} (marks) other motions were searched by "
         f"{found.tries} deflated solves and from {found.starts} random states in time, "
-        f"{found.solves} solves of a budget of {found.budget}; what was new was followed.{spent} "
-        "Stability is examined at the marks alone: the lines between them are thin, for nobody knows whether a motion there lasts. "
+        f"{found.solves} solves of a budget of {found.budget}. New motions were followed.{spent} "
+        "Stability is examined at the marks alone; thin lines between them are not examined. "
         "Nothing proves that there is no other motion."
     )
     return Plot(f"all_motions{view.key}", "All motions that were found", caption, figure)
@@ -122,10 +122,7 @@ def basin_table(view: Motions) -> Table | Words:
         "change by more harmonics",
         "starts that end on it (95 %)",
     ]
-    said = (
-        "Starts are drawn in the lowest modes about the mean of the known motions, with sliders that never moved: shares are those of "
-        "such starts, with the binomial interval of Clopper and Pearson."
-    )
+    said = "Random starts lie in the lowest modes about the mean of the known motions, with sliders that never moved. Shares count these starts, with the binomial interval of Clopper and Pearson."
     return Table(head, rows, "Motions and their basins", (said,))
 
 

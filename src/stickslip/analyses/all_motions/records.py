@@ -60,11 +60,11 @@ class SearchedFrequency:
 
     hertz: float = column("Hz", "frequencies that were searched", "searched_hz")
     starts: int = column("1", "random states that were integrated in time")
-    aperiodic: int = column("1", "those that end on no motion of the load's period, or on none in the periods allowed")
-    diverged: int = column("1", "those that grow without bound")
+    aperiodic: int = column("1", "starts that end on no motion of the load's period, or on none in the periods allowed")
+    diverged: int = column("1", "starts that grow without bound")
     tries: int = column("1", "deflated solves at the frequency", "searched_tries")
     spent: bool = column("1", "1: the budget ended the deflation or the starts there", "searched_spent")
-    unsolved: int = column("1", "those that end on a periodic motion which is no solution with the harmonics kept")
+    unsolved: int = column("1", "starts that end on a periodic motion which is no solution with the harmonics kept")
     motions: tuple[FoundMotion, ...] = rows("motion", "motion_", beside=True)
 
 

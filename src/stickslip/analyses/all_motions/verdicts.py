@@ -114,7 +114,7 @@ def _basins(label: str, found: FoundMotions, place: SearchedFrequency) -> Iterat
             f"most starts end on a branch that no sweep meets: {100 * most.share:.3g} % ({100 * most.share_low:.3g} to "
             f"{100 * most.share_high:.3g} %), amplitude {millimetres(most.amplitude)}"
         )
-        remedy = "The branch of the sweep is not what the machine is most likely to do."
+        remedy = "From a random start the machine is more likely to end on that branch than on the sweep's."
         yield Verdict("trusted", label, hertz, why, remedy, warns=True)
 
 

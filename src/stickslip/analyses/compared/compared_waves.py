@@ -118,7 +118,7 @@ def flutter(designs: Sequence[Design]) -> list[Content]:
     styled(figure, 440)
     figure.update_xaxes(title_text="inter-blade phase angle (degrees)", dtick=45)
     figure.update_yaxes(title_text="damping ratio (%)")
-    caption = "Damping in the flow with that of the structure, at the waves that the wheels have."
+    caption = "Total damping, of flow and structure, at the waves that the wheels have."
     plot = Plot("compared_flutter", "Flutter margins over each other", caption, figure)
     return [plot, *stacked(views, margins)]
 

@@ -195,7 +195,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
     lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])
-    caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
+    caption = f"Peak and its frequency over {key}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
 

@@ -247,7 +247,7 @@ def _compile(question: Question) -> None:
         return  # the response says what is wrong
     seconds = perf_counter() - start
     if seconds > COMPILED:
-        LOG.info(f"compiled the contact laws in {seconds:.0f} s, once an installation")
+        LOG.info(f"compiled the contact laws in {seconds:.0f} s; needed once after installing")
 
 
 def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:

@@ -104,7 +104,7 @@ def orders_sentence(data: xr.Dataset) -> str:
     """State the meaning of the frequency if several engine orders act at once."""
     base = int(data.attrs["engine_order"])
     acts = [f"engine order {m} at {m // base} times that" for m in several_orders(data)]
-    return f"Frequencies are those of engine order {base}, the common divisor: {', '.join(acts)}."
+    return f"Frequencies belong to engine order {base}, the common divisor: {', '.join(acts)}."
 
 
 def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:

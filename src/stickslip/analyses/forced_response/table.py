@@ -20,8 +20,7 @@ class ForcedResponse(Section):
     )
     over: Literal["frequency", "speed"] = Field(
         "frequency",
-        description="frequency: at the one speed of [rotation]; speed: along speed_rpm, the frequency being the engine order times "
-        "the speed, matrices and static loads those of [rotation]",
+        description="frequency: at the one speed of [rotation]; speed: along speed_rpm, at the engine order times the speed, with matrices and static loads from [rotation]",
     )
     speed_rpm: Range | None = Field(
         None, description='the range [lowest, highest] of speeds in rpm, for over = "speed"'
@@ -41,9 +40,7 @@ class ForcedResponse(Section):
     )
     stability: Literal["auto", "peak", "off", "all"] = Field(
         "auto",
-        description="whether a disturbance dies, by Floquet multipliers. auto: at the peak, the ends, beside folds, where the list of "
-        "transitions in the cycle changes, and between these, at all points where matrices have at most 500 rows, else as far as the "
-        "work of the solutions goes; peak: at the peak alone; all: at every point; off: nowhere",
+        description="where stability is examined, by Floquet multipliers. auto: at the peak, the ends, beside folds and where the transitions of the cycle change, then at all other points up to 500 rows of the matrices, for larger ones within the work of the solutions; peak: at the peak alone; all: at every point; off: nowhere",
     )
     bifurcations: Literal["off", "folds", "all", "branches"] = Field(
         "off",
@@ -53,8 +50,7 @@ class ForcedResponse(Section):
 
     not_periodic: Literal["in_time", "off"] = Field(
         "in_time",
-        description="where no periodic motion is found, or an unstable one: in_time: envelope, statistics and spectrum of the motion in time, at the "
-        "peak or the nearest such points to it; off: nothing",
+        description="what to do where no stable periodic motion is found. in_time: give envelope, statistics and spectrum of the motion in time, at the peak or the nearest such points; off: nothing",
     )
     not_periodic_s: Positive = Field(
         5.0,
@@ -71,9 +67,7 @@ class ForcedResponse(Section):
         None,
         gt=0,
         le=1,
-        description="static state first, then frozen sliders: share of the friction coefficients, above 0 to 1, that may carry the static "
-        "load before every slider stays where that has left it, the rest is for the vibration; left out: springs start "
-        "unstretched, static and dynamic part are found together",
+        description="share of the friction coefficients, above 0 to 1, that carries the static load in a static solution first; sliders then stay there, and the rest is left for the vibration. Left out: springs start unstretched, and static and dynamic part are found together",
     )
 
     @property

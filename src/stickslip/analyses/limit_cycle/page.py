@@ -19,11 +19,7 @@ from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
-_READING = (
-    "Damping ratio of the motion of each amplitude: below zero it grows, above it decays, and where the curve crosses the line it "
-    "goes on by itself. Crossings upward attract motions of the same wave, crossings downward repel them: beyond these friction "
-    "cannot bound the motion."
-)
+_READING = "The curve gives the damping ratio of the motion at each amplitude. Below zero the motion grows, above zero it decays. Where the curve crosses zero the motion is a limit cycle. Upward crossings attract motions of the same wave. Downward crossings repel them, and friction cannot bound the motion beyond."
 _JOINED = (
     "Straight lines join the amplitudes that were looked at and the limit cycles, which lie between these and have harmonics enough of "
     "their own."
@@ -82,7 +78,7 @@ def frequencies(view: Cycles) -> Plot | None:
     _mark(found, figure, [cycle.omega / HZ for _, cycle in found.cycles])
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = (
-        "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction. Limit cycles are "
+        "As the amplitude grows, the frequency goes from the stuck mode's towards the frequency without friction. Limit cycles are "
         f"marked as above. {_JOINED}"
     )
     return Plot(f"limit_cycle_frequency{view.key}", "Frequency over the amplitude", caption, figure)

@@ -17,8 +17,7 @@ class LimitCycleTable(Section):
         None,
         min_length=1,
         max_length=200,
-        description="wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: those "
-        "that are unstable with contacts stuck",
+        description="wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: waves that are unstable with contacts stuck",
     )
     modes: list[Annotated[int, Field(ge=1, le=999)]] | None = Field(
         None,
@@ -49,8 +48,7 @@ class LimitCycleTable(Section):
     )
     in_time: bool = Field(
         False,
-        description="whether stable limit cycles are compared with time integration, and that of all unstable waves together says which "
-        "one wins; --verify does the same",
+        description="compare stable limit cycles with time integration, and integrate all unstable waves together to see which one wins; --verify does the same",
     )
     periods: int = Field(400, ge=50, le=100_000, description="most periods of a time integration, 50 to 100000")
 

@@ -76,7 +76,7 @@ def _of_branch(label: str, found: LimitCycles, branch: CycleBranch) -> list[Verd
         verdicts.append(Verdict("doubtful", label, None, why, "Raise limit_cycle.points or limit_cycle.harmonics."))
     if branch.unbounded:
         why = (
-            f"{branch.name}: friction cannot bound it: its damping ratio is {100 * branch.ratio:.3g} % with contacts stuck and "
+            f"{branch.name}: friction cannot bound it; its damping ratio is {100 * branch.ratio:.3g} % with contacts stuck and "
             f"{100 * branch.largest_damping_ratio:.3g} % at most over the amplitudes looked at"
         )
         remedy = "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm)."

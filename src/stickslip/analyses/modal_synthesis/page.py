@@ -124,11 +124,7 @@ def responses(view: Synthesised) -> Plot | None:
         title_text=f"amplitude of {found.output} ({scale.unit})",
         **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]),
     )
-    caption = (
-        "Each curve is the response at a level of the loads, from the nonlinear mode, the other modes added as linear ones. The answer of a level, trusted "
-        "(dot) or doubtful (diamond), is that of its peak. Thin and dashed: something slips and the other modes move by more than 5 % of the mode, or change "
-        "the amplitude by more than that; the curve may be far off there. Dotted: unstable in the mode's own amplitude and phase."
-    )
+    caption = "Each curve is the response at a level of the loads, from the nonlinear mode, the other modes added as linear ones. A dot (trusted) or a diamond (doubtful) marks the peak of each level. Curves are thin and dashed where contacts slip and the other modes exceed 5 % of the mode, or change the amplitude by more; they may be far off there. Dotted curves are unstable in the mode's own amplitude and phase."
     caption += f" Rings are solved directly.{_along(view)}" if direct else ""
     left = view.answered("refused", "beyond")
     caption += f" {counted(len(left), 'level')} not shown: see the table." if left else ""
@@ -216,7 +212,7 @@ def peaks(view: Synthesised) -> Plot | None:
     if view.found.homogeneous:
         caption += (
             " All contact laws here are homogeneous, so that this is also the optimisation curve of the static loads: with static loads s times as large "
-            "the peak under the same vibration loads is that of the level 1/s, s times as large."
+            "the peak under the same vibration loads is s times the peak of the level 1/s."
         )
     return Plot(f"modal_synthesis_peaks{view.key}", "Peak per load over the level", caption, figure)
 
@@ -261,10 +257,7 @@ def table(view: Synthesised) -> Table | None:
         "why",
     ]
     rows = [_row(one) for one in view.found.levels]
-    said = (
-        "Predicted and found errors, and the answer, are those of the peak. **Alone**: from where to where around the peak nothing slips, or the "
-        "other modes move by at most 5 % of the mode and change the amplitude by at most that."
-    )
+    said = "Predicted and found errors, and the answer, refer to the peak. **Alone** is the range around the peak where nothing slips, or where the other modes stay within 5 % of the mode and change the amplitude by at most as much."
     return Table(head, rows, "Levels", (said,), worded=True, items=_cycles(view))
 
 

@@ -30,7 +30,9 @@ class SynthesisLevel:
     )
     detached_peak_omega: float = column("Hz", "its frequency", "detached_peak_frequency_hz", per=HZ)
     foreign: float = column("1", "relative error of the peak that the other modes make, about")
-    output: float = column("1", "motion of the other modes over that of the mode, at the output", "others_in_output")
+    output: float = column(
+        "1", "motion of the other modes over the motion of the mode, at the output", "others_in_output"
+    )
     gaps: float = column("1", "the same in the gaps of the contacts", "others_in_gaps")
     distance: float = column("1", "relative distance of the next frequency", "next_frequency")
     overlap: float = column("1", "damping ratio over that distance")
@@ -50,7 +52,7 @@ class SynthesisLevel:
     curve: IntArray = column("1", "0: hangs together with small amplitudes; others are detached", along="point")
     stable: IntArray = column("1", "1 where slow changes of this mode die out", along="point")
     others: FloatArray = column(
-        "1", "motion of the other modes over that of the mode, at the output or in the gaps", along="point"
+        "1", "motion of the other modes over the motion of the mode, at the output or in the gaps", along="point"
     )
     alone: IntArray = column(
         "1",

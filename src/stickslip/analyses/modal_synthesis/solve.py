@@ -211,7 +211,7 @@ def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tup
     if not curve.place.size:
         return "beyond", "the nonlinear mode begins with more than the level reaches"
     if not curve.peaks or float(curve.place.max()) >= shared.oscillator.ends[1]:
-        return "beyond", "the nonlinear mode ends before it needs so much of the load"
+        return "beyond", "the nonlinear mode ends before it needs this level of the load"
     answer, why = judged(alone, *errors)
     if answer in ("trusted", "doubtful") and not curve.resonances[0].top:
         return (

@@ -162,7 +162,7 @@ def _table(case: ModalSynthesis, head: str) -> TextTable:
         rows.append(tuple(row))
     beside = ("direct mm", "error %", "along %") if direct else ()
     lines = [
-        f"others: motion of the other modes over that of the mode, at the peak; predicted error: that of the peak; alone: where around the peak the others stay below {percent(ALONE)}"
+        f"others: motion of the other modes over the motion of the mode, at the peak; predicted error: at the peak; alone: range around the peak where the others stay below {percent(ALONE)}"
     ]
     if direct:
         lines.append(

@@ -19,12 +19,9 @@ from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 NAME = "nonlinear_mode"
-_READING = (
-    "The damping ratio is that at which a free motion of each amplitude decays, all damping of the model included; below zero it grows. "
-    "The curve is that of the motion with its mean and its harmonics, in the order in which it was followed: it turns back where it folds."
-)
+_READING = "A free motion of each amplitude decays with this damping ratio, which includes all damping of the model. Below zero the motion grows. The curve includes the mean and all harmonics, and turns back at folds."
 
-_ENERGY = "The energy is twice the mean kinetic energy of all harmonics, of a wheel that of one sector; where all springs are linear it is the whole."
+_ENERGY = "The energy is twice the mean kinetic energy of all harmonics, per sector on a wheel. With linear springs it is the total energy."
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +41,7 @@ def frequencies(view: Modes) -> Plot | None:
     if figure is None:
         return None
     figure.update_yaxes(title_text="frequency (Hz)")
-    caption = "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction."
+    caption = "As the amplitude grows, the frequency goes from the stuck mode's towards the frequency without friction."
     return Plot(f"nonlinear_mode_frequency{view.key}", "Frequency over the amplitude", caption, figure)
 
 

@@ -178,7 +178,7 @@ class ModeBranch:
     open_for: FloatArray = column("1", "largest share of the period for which a contact point is open", along="point")
     change: FloatArray = column(
         "1",
-        "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone",
+        "relative change of frequency or damping ratio predicted for more harmonics; with the most harmonics, the change from fewer; NaN with one set alone",
         along="point",
     )
     motions: FloatArray = field(default_factory=lambda: np.zeros((0, 1, 0, 2)))

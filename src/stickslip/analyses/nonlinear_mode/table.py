@@ -21,8 +21,7 @@ class NonlinearModeTable(Section):
         None,
         min_length=1,
         max_length=200,
-        description="wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: that "
-        "of the engine order of the loads, without loads all",
+        description="wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: the wave of the loads' engine order, without loads all",
     )
     amplitude_mm: list[Positive] | None = Field(
         None,
@@ -48,8 +47,7 @@ class NonlinearModeTable(Section):
     )
     concept: Literal["periodic", "decaying"] = Field(
         "periodic",
-        description="what motions a mode is made of: periodic ones that a damping in proportion to the mass keeps going (Krack 2015), or those that are "
-        "decaying as they are (Laxalde and Thouverez 2009); both agree where damping is small",
+        description="definition of the mode, by periodic motions sustained by mass-proportional negative damping (Krack 2015) or by decaying motions (Laxalde and Thouverez 2009); both agree for small damping",
     )
 
     @model_validator(mode="after")

@@ -82,10 +82,7 @@ def envelopes(view: TwoTonesView) -> Plot | None:
     styled(figure, 440)
     figure.update_xaxes(title_text="first frequency (Hz)")
     figure.update_yaxes(title_text=f"{view.name} ({scale.unit})", rangemode="tozero")
-    caption = (
-        "The amplitude, half of peak to peak in a period of the first frequency, goes up and down between its least and its largest value "
-        "as the phases drift past each other. Where there is no second tone both are one."
-    )
+    caption = "The amplitude is half of peak to peak in a period of the first frequency. It varies between the two curves as the phases drift past each other. Without a second tone both curves coincide."
     return Plot(f"two_frequencies{view.key}", "Envelope over the first frequency", caption, figure)
 
 

@@ -29,9 +29,7 @@ class TwoFrequencies:
     second: float = column("Hz", "second frequency; NaN where there is none", "second_hz", per=HZ)
     kind: str = column("1", "two loads, second tone, no second tone or not found")
     why: str = column("1", "what that rests on")
-    unknown: str = column(
-        "1", "where there is no second tone: why it is not known that nothing else grows; empty where it is"
-    )
+    unknown: str = column("1", "reason why other tones may grow where no second tone was found; empty where none can")
     combined: int = column("1", "combined frequencies that are kept")
     left_out: float = column(
         "1",
@@ -58,7 +56,7 @@ class TwoFrequencies:
     time_least: FloatArray | None = column("m", "least amplitude in time", along="output", default=None)
     time_off: float | None = column(
         "1",
-        "difference of the motion in time from the balance, root mean square over that of the motion; of two loads",
+        "difference of the motion in time from the balance, root mean square over the motion's; of two loads",
         default=None,
     )
     unknowns: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 2)))

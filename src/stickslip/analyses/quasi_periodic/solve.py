@@ -231,9 +231,9 @@ def _nothing(question: Question, omega: float, why: str) -> TwoFrequencies:
 def _told(one: TwoFrequencies) -> str:
     head = f"{NAME}: {hertz(one.first)}"
     if not one.solved:
-        return f"{head}: no motion found: {one.why}"
+        return f"{head}: no motion found ({one.why})"
     if one.kind == "no second tone":
-        return f"{head}: no second tone: {one.why}"
+        return f"{head}: no second tone ({one.why})"
     return (
         f"{head} and {hertz(one.second)} ({one.kind}): amplitude {millimetres_between(one.least[0], one.largest[0])}, "
         f"{one.combined} combined frequencies, {100 * one.left_out:.2g} % left out"

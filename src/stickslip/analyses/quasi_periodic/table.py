@@ -16,7 +16,7 @@ class QuasiPeriodicTable(Section):
 
     frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
         None,
-        description="the range [lowest, highest] in Hz of the first frequency, that of the loads without one of their own",
+        description="the range [lowest, highest] in Hz of the first frequency, the frequency of all loads without their own",
     )
     frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=1000)] | None = Field(
         None, description="first frequencies of your own in Hz instead of a range, growing"
@@ -24,11 +24,13 @@ class QuasiPeriodicTable(Section):
     points: int = Field(10, ge=2, le=1000, description="first frequencies in the range, 2 to 1000")
     second_hz: Positive | None = Field(
         None,
-        description="where no load has a frequency of its own: near which frequency in Hz a second tone is looked for; left out: near modes that grow "
-        "with contacts stuck, and what multipliers of the forced motion say",
+        description="frequency in Hz near which a second tone is sought where no load has its own frequency; left out: near modes that grow with contacts stuck and near the multipliers of the forced motion",
     )
     second_wave: int | None = Field(
-        None, ge=0, le=999, description="of a tuned wheel: wave number of that tone; left out: the wave that grows most"
+        None,
+        ge=0,
+        le=999,
+        description="wave number of the second tone on a tuned wheel; left out: the wave that grows most",
     )
     harmonics: int = Field(
         3,

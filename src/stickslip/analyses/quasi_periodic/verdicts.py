@@ -76,7 +76,7 @@ def _left_out(label: str, hz: float, share: float, asked: float) -> list[Verdict
 def _without(label: str, hz: float, why: str, unknown: str) -> Verdict:
     if not unknown:
         return Verdict("trusted", label, hz, f"there is no second tone: {why}")
-    told = f"no second tone was found: {why}; whether anything else grows is not known: {unknown.removesuffix('.')}"
+    told = f"no second tone was found: {why}; other tones may grow ({unknown.removesuffix('.')})"
     remedy = "Give quasi_periodic.second_hz, or see forced_response --verify."
     return Verdict("doubtful", label, hz, told, remedy)
 

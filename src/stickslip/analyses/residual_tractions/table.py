@@ -22,7 +22,7 @@ class ResidualTractionsTable(Section):
         4,
         ge=0,
         le=10_000,
-        description="random starts of the search at each frequency, beside those that are always taken, 0 to 10000",
+        description="random starts of the search at each frequency, beside its fixed starts, 0 to 10000",
     )
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of the random starts")
     in_time: bool = Field(

@@ -45,11 +45,7 @@ def _of_width(label: str, found: ResidualTractions) -> Verdict:
             f"residual tractions leave the resonance as it is, {millimetres(own)} at {hertz[0]:.5g} Hz: {because}{also}"
         )
         return Verdict("trusted", label, None, why)
-    why = (
-        f"the resonance is {millimetres(own)} from the model's own start, and by residual tractions alone anywhere from {millimetres(least)} at "
-        f"{hertz[1]:.5g} Hz to {millimetres(most)} at {hertz[2]:.5g} Hz ({100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %): so far "
-        "the answer of forced_response may be off because of them"
-    )
+    why = f"residual tractions can put the resonance anywhere from {millimetres(least)} at {hertz[1]:.5g} Hz to {millimetres(most)} at {hertz[2]:.5g} Hz. The {millimetres(own)} from the model's own start may be off by {100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %"
     return Verdict("trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least)
 
 
@@ -59,7 +55,7 @@ def _of_harmonics(label: str, bounds: ResidualTractions) -> list[Verdict]:
     error = np.array([top.harmonics_error for top in bounds.resonances])
     found = []
     if np.isnan(error).any():
-        why = f"harmonics were not examined: nothing says how wrong H = {kept} is"
+        why = f"the error of H = {kept} is not known, as harmonics were not examined"
         found.append(Verdict("doubtful", label, None, why, remedy))
     if (worst := np.flatnonzero(error > FEW)).size:
         k = int(worst[np.argmax(error[worst])])
@@ -87,10 +83,7 @@ def _of_branches(label: str, bounds: ResidualTractions) -> list[Verdict]:
         if hertz.size == 1
         else f"at {hertz.size} frequencies from {hertz.min():.5g} to {hertz.max():.5g} Hz"
     )
-    why = (
-        f"{where} the model's own start has several motions, up to {most}: the bounds hold all that sweeps up and "
-        "down met, so that they are wide for another reason than residual tractions, and a detached motion may lie outside"
-    )
+    why = f"{where} the model's own start has several motions, up to {most}. The bounds contain every motion met by sweeps up and down, so they are wider than residual tractions alone explain. A detached motion may lie outside"
     return [
         Verdict(
             "doubtful",

@@ -97,7 +97,7 @@ def energies(view: Peaks) -> Plot:
             )
         )
     figure.update_yaxes(title_text=f"energy of a period ({scale.unit})", rangemode="tozero")
-    caption = "Work of the loads over a period of the first harmonic, which is what is dissipated; dotted, the part that the contacts take."
+    caption = "Solid lines show the work of the loads in a period of the first harmonic, which equals the dissipation. Dotted lines show the contacts' share."
     return Plot(f"resonance_energy{view.key}", "Dissipated energy", caption, figure)
 
 

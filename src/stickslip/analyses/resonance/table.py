@@ -30,8 +30,7 @@ class ResonanceTable(Section):
         None,
         min_length=2,
         max_length=2,
-        description="in place of values: first and last value of the parameter; the curve is followed by arc length, round folds, over a key of the model "
-        "for minutes where a contact begins to slip at the peak",
+        description="first and last value of the parameter, in place of values; the curve is followed by arc length round folds, which takes minutes over a key of the model where a contact begins to slip at the peak",
     )
     points: int = Field(30, ge=2, le=1000, description="least number of points of a span, 2 to 1000")
     by: Literal["horizontal_tangent", "phase_quadrature", "variable_phase"] = Field(

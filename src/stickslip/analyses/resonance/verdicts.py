@@ -123,7 +123,7 @@ def _of_harmonics(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
 
 
 def _of_overtaking(label: str, case: Resonances) -> list[Verdict]:
-    remedy = "Beyond, the highest amplitude is that of another resonance."
+    remedy = "Beyond, another resonance is higher."
     each = [f"peak {met.after + 1} overtakes peak {met.before + 1} at {met.value:.4g}" for met in case.overtakings]
     return [Verdict("trusted", label, None, why, remedy, warns=True) for why in each]
 

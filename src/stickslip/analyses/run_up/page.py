@@ -119,7 +119,7 @@ def campbell_with_response(view: RunUpView) -> Plot:
     )
     figure.update_yaxes(title_text="frequency (Hz), rotating frame", range=[max(span[0] - pad, 0.0), span[1] + pad])
     caption = (
-        f"Amplitude of {view.output_name} along {counted(len(found.lines), 'engine order')}: size and colour of the circles, the largest "
+        f"Amplitude of {view.output_name} along {counted(len(found.lines), 'engine order')}: size and colour of the circles; the largest is "
         f"{quantity(top, 'm')}. Each point has the stiffness, the contact state and the static preload of its own speed. Lines: natural "
         "frequencies of the waves that the engine orders excite, with all contacts stuck (solid) and open (dotted)."
     )
@@ -182,10 +182,7 @@ def fast(view: RunUpView) -> Plot | None:
     figure.update_yaxes(title_text=f"amplitude of {view.output_name} ({scale.unit})", rangemode="tozero")
     known = [one.ratio for one in found.fast if np.isfinite(one.ratio)]
     told = f": the smallest peak is {number(100 * min(known), 4)} % of the steady one" if known else ""
-    caption = (
-        f"Amplitude while the speed changes at a constant rate, beside that of the steady motion{told}. Contact forces are those of the "
-        "momentary amplitude; beats behind a peak are less certain than the peak."
-    )
+    caption = f"Amplitude while the speed changes at a constant rate, beside the steady motion{told}. Contact forces follow the momentary amplitude. Beats behind a peak are less certain than the peak."
     return Plot(f"run_up_fast{view.key}", "Fast run-up", caption, figure)
 
 

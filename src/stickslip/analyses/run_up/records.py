@@ -39,7 +39,7 @@ class Line:
     )
     common_modes: bool = column(
         "1",
-        "1 where what the modes of three speeds span is kept at all, because at some speed another mode would take the place of one kept",
+        "1 where the span of the modes of three speeds is kept at all speeds, because modes change places between speeds",
     )
     open_hz: FloatArray = column(
         "Hz",
@@ -80,8 +80,8 @@ class FastRunUp:
     rate: float = column("rpm/s", "rate of the speed of a fast run-up", "rate_rpm_per_s")
     peak_amplitude: float = column("m", "largest amplitude of the reported output in a fast run-up")
     peak_speed_rpm: float = column("rpm", "speed at which it is reached")
-    ratio: float = column("1", "largest amplitude over that of the steady motion")
-    shift_rpm: float = column("rpm", "speed of the largest amplitude less that of the steady motion")
+    ratio: float = column("1", "largest amplitude over the largest steady amplitude")
+    shift_rpm: float = column("rpm", "speed of the largest amplitude less the speed of the largest steady amplitude")
     harmonic: int = column("1", "highest harmonic kept")
     finished: bool = column("1", "1 if the fast run-up was followed to its end")
     neglected: float = column(

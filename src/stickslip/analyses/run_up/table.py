@@ -19,8 +19,7 @@ class RunUpTable(Section):
         None,
         min_length=1,
         max_length=100,
-        description="engine orders, a list of whole numbers from 1; each is that of all harmonic loads in turn. Left out: the loads "
-        "act together, with their own",
+        description="engine orders, a list of whole numbers from 1; all harmonic loads take each in turn. Left out: the loads act together, with their own orders",
     )
     points: int = Field(40, ge=2, le=10_000, description="smallest number of points of each engine order, 2 to 10000")
     peak_points: int = Field(8, ge=0, le=100, description="most points added to resolve the peak of each, 0 to 100")

@@ -146,7 +146,7 @@ class WaveFlutter(Wave):
     by_eigenvalue: FloatArray = column(
         "1", "aerodynamic damping ratio of the eigenvalue", "damping_by_eigenvalue", along="mode"
     )
-    damping: FloatArray = column("1", "damping ratio of the eigenvalue, with that of the structure", along="mode")
+    damping: FloatArray = column("1", "damping ratio of the eigenvalue, structural damping included", along="mode")
     in_flow_hz: FloatArray = column(
         "Hz", "frequency of the eigenvalue, with that damping", "frequency_in_flow_hz", along="mode"
     )

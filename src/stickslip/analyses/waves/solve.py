@@ -36,7 +36,7 @@ from stickslip.units import HZ, RPM
 
 STATIC = ("static_rpm", "static_displacement_m", "static_strain", "static_rotation_rad")
 FLUID = "the aerodynamic coefficients play no part: frequencies are those in still fluid"
-ALIKE = "mistuning plays no part: frequencies are those of the wheel with all sectors alike"
+ALIKE = "mistuning plays no part; the frequencies belong to the wheel with all sectors alike"
 
 
 def in_still_fluid(model: Model) -> tuple[Model, tuple[Verdict, ...]]:

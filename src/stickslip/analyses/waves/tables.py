@@ -62,7 +62,10 @@ class CampbellTable(WaveTable):
     )
     modes: int = Field(4, ge=1, le=100, description="number of modes that are followed, 1 to 100")
     nodal_diameters: list[Diameter] | None = Field(
-        None, min_length=1, max_length=501, description="nodal diameters; left out: those that the engine orders excite"
+        None,
+        min_length=1,
+        max_length=501,
+        description="nodal diameters; left out: the ones that the engine orders excite",
     )
 
     @model_validator(mode="after")
@@ -81,7 +84,7 @@ class CampbellTable(WaveTable):
 class SafeTable(WaveTable):
     """Which modes engine orders can excite at one speed (SAFE, interference diagram)."""
 
-    speed_rpm: Speed | None = Field(None, description="speed in rpm, above zero; left out: that of [rotation]")
+    speed_rpm: Speed | None = Field(None, description="speed in rpm, above zero; left out: as in [rotation]")
     engine_orders: list[Order] = Field(
         min_length=1, max_length=200, description="engine orders, a list of whole numbers from 1"
     )
@@ -118,7 +121,7 @@ class FlutterTable(WaveTable):
         0.0,
         ge=-100,
         le=100,
-        description="damping ratio in % that every wave must have, that of the structure with it; 0: none may grow",
+        description="damping ratio in % that every wave must have, structural damping included; 0: none may grow",
     )
 
     @model_validator(mode="after")

@@ -61,13 +61,8 @@ def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple
     """Doubt centrifugal displacements too large for linear statics; those restrained by `contacts` are included."""
     if state is None or not state.too_large:
         return ()
-    alone = ", without what contacts hold back," if contacts else ""
-    why = (
-        f"the static displacement at {state.speed / RPM:g} rpm{alone} is too large for linear statics: up to {millimetres(state.displacement)} "
-        f"at a radius of {millimetres(state.radius)}, strains up to {100 * state.strain:.3g} %, rotations up to "
-        f"{state.rotation:.3g} rad (the limits are {100 * MOST_DISPLACEMENT:g} % of the radius, {100 * MOST_STRAIN:g} %, "
-        f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt"
-    )
+    alone = ", without the restraint of contacts," if contacts else ""
+    why = f"frequencies at {state.speed / RPM:g} rpm are in doubt, as the static displacement{alone} is too large for linear statics: up to {millimetres(state.displacement)} at a radius of {millimetres(state.radius)} (limit {100 * MOST_DISPLACEMENT:g} % of the radius), strains up to {100 * state.strain:.3g} % (limit {100 * MOST_STRAIN:g} %), rotations up to {state.rotation:.3g} rad (limit {MOST_ROTATION:g} rad)"
     remedy = "Check the speed (rpm), the material (Young's modulus in Pa, density in kg/m3) and the supports."
     return (Verdict("doubtful", why=why, remedy=remedy),)
 
@@ -83,11 +78,7 @@ def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
     ratio = max(m * per_order * (1 + found.allowed) / max(highest[m], 1e-300) for m in orders)
     diameters = {min(m % sectors, -m % sectors) for m in orders}
     excited = [m * per_order for m in orders]
-    why = (
-        f"engine orders {in_ranges(orders)} are not judged: they excite nodal diameters {in_ranges(diameters)} at "
-        f"{_span(excited)} Hz, and with the margin that lies above the highest computed modes ({_span(list(highest.values()))} "
-        "Hz), where other modes may be near"
-    )
+    why = f"engine orders {in_ranges(orders)} are not judged; with the margin they excite nodal diameters {in_ranges(diameters)} at {_span(excited)} Hz, above the highest computed modes ({_span(list(highest.values()))} Hz)"
     remedy = f"Raise safe.modes, now {n_modes}, to {_more(n_modes, ratio)} or more."
     return (Verdict("doubtful", why=why, remedy=remedy),)
 

@@ -165,7 +165,7 @@ def put_on(given: PressureField, surface: Surface, name: str) -> Projected:
             given.source,
             f"has a point {given.points[farthest].tolist()} m that is {offset[farthest]:.3g} m away from {name!r}, "
             f"which is {size:.3g} m large",
-            "Check the unit and the axes of its points: they are those of the sector.",
+            "Check the unit and the axes of its points; the sector's axes hold.",
         )
     if given.area is None:
         facet, reference, at, forces, bare = _integrated(given, surface, feet)
@@ -337,7 +337,7 @@ def on_sides(
         raise input_error(
             source,
             f"has normals that are not those of {name!r} there: {np.degrees(np.arccos(np.median(turned))):.0f}° off in the median",
-            "Check the axes of its normals: they are those of the sector, as for its points.",
+            "Check the axes of its normals; the sector's axes hold, as for its points.",
         )
     if min(one, other) < CLEAR * max(one, other):
         return chosen, ()

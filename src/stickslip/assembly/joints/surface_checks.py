@@ -164,10 +164,7 @@ def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]
     rigid = isinstance(law, Rigid)
     if abs(operator[2::3]).max() > FLAT or not (rigid or law.stuck_stiffness()[2] > 0):
         return ()
-    text = (
-        f"{key}: no point of it can move along the normal; its normal force stays that at rest, and its normal stiffness "
-        "does nothing. Let the part move so (a beam: axial = true), or give another normal."
-    )
+    text = f"{key}: no point of it can move along the normal; its normal force stays constant, and its normal stiffness does nothing. Let the part move so (a beam: axial = true), or give another normal."
     return (text,)
 
 

@@ -258,7 +258,7 @@ def refuse_pulled(model: Model, static: Mapping[str, FloatArray]) -> None:
     named = " and ".join(f"part.{name}" for name in parts)
     raise input_error(
         worst,
-        f"pulls {named} off: the contacts only press, and nothing else holds {'it' if len(parts) == 1 else 'them'} against the load",
+        f"pulls {named} off; contacts only press, and nothing else holds {'it' if len(parts) == 1 else 'them'} against the load",
         "Turn the load so that it presses the contacts, or hold the part by a support, a join or a spring to the ground.",
     )
 

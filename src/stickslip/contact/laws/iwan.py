@@ -90,7 +90,7 @@ class FourParameter:
     """
 
     chi: float = quantity("exponent of the distribution", above=-1, most=0)
-    beta: float = quantity("stiffness of the last sliders over that of all others", least=0)
+    beta: float = quantity("stiffness of the last sliders over the stiffness of all others", least=0)
     n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
 
     def __post_init__(self) -> None:

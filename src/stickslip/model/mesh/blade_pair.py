@@ -135,7 +135,7 @@ class BladePair:
                 "foot_width",
                 f"the foot ({self.foot_width} × {self.foot_depth} m) is smaller than the shank "
                 f"({self.shank_thickness} × {self.platform_depth} m)",
-                "Make the foot at least as large as what it carries.",
+                "Make the foot at least as large as the blade on it.",
             )
         if self.foot_width >= self.pitch:
             raise _bad("foot_width", f"{self.foot_width} m: the feet overlap", "Lower it.")

@@ -108,7 +108,7 @@ def _read_entries(path: Path) -> tuple[IntArray, FloatArray]:
         raise input_error(
             f"{path}: entry {internal[0] + 1}",
             f"names the internal node {nodes[internal[0]].min()}",
-            "Abaqus numbers what it adds (Lagrange multipliers, incompatible modes) so: use elements without.",
+            "Abaqus gives such numbers to dofs that it adds (Lagrange multipliers, incompatible modes). Use elements without them.",
         )
     other = np.flatnonzero((directions < 1).any(axis=1) | (directions > DIRECTIONS).any(axis=1))
     if other.size:

@@ -170,7 +170,7 @@ def _fields(path: Path, lines: list[str], first: int, width: int, kind: Callable
             table.append([kind(field) if field.strip() else 0 for field in row])
         except ValueError as error:
             raise input_error(
-                f"{path}: line {number}", f"{line[:60]!r} holds something else than numbers", CUT_SHORT
+                f"{path}: line {number}", f"{line[:60]!r} does not hold numbers only", CUT_SHORT
             ) from error
     return table
 

@@ -97,7 +97,7 @@ def unread(block: Block, problem: str) -> InputError:
     return input_error(
         block.place,
         problem,
-        "Let the solver write its matrices and read those$ignore.",
+        "Let the solver write its matrices and read these$ignore.",
         ignore=f", or pass ignore=({block.keyword!r},) to go on without",
     )
 
@@ -119,7 +119,7 @@ def _refused(block: Block) -> InputError:
     return input_error(
         block.place,
         f"*{word} is not known, and may change the model",
-        f"{hint}Take it out where the model is the same without it, else let the solver write its matrices and read those$ignore.",
+        f"{hint}Remove it if the model stays the same without it. Otherwise let the solver write its matrices, and read these$ignore.",
         ignore=f", or pass ignore=({word!r},)",
     )
 

@@ -169,7 +169,7 @@ def structure_summary(structure: Structure, *, n_modes: int = 10, units: Units =
         remarks.append(f"Units: {doubt}.")
     doubt = doubt_about_positions(structure)
     if doubt:
-        remarks.append(f"Positions: {doubt}: they are probably those of another mesh.")
+        remarks.append(f"Positions: {doubt}; they probably belong to another mesh.")
     rank, said = _rank_of_mass(structure)
     remarks += said
     finite = dofs.position[np.isfinite(dofs.position).all(axis=1)]

@@ -71,7 +71,7 @@ class WedgeDamper:
 
     left_angle: float = quantity("inclination of the left side from x", "deg", above=0, most=90)
     right_angle: float | None = quantity(
-        "inclination of the right side from x; left out: that of the left one", "deg", default=None, above=0, most=90
+        "inclination of the right side from x (left out: as the left side)", "deg", default=None, above=0, most=90
     )
     top_width: float = metres("width of the section's outer end; 0: it is sharp", least=0)
     height: float = metres("extent of the section along z")
@@ -175,7 +175,7 @@ class CylinderDamper:
         "inclination from x of the underside that it touches on the left", "deg", above=0, below=90
     )
     right_angle: float | None = quantity(
-        "the same on the right; left out: that of the left one", "deg", default=None, above=0, below=90
+        "the same on the right (left out: as on the left)", "deg", default=None, above=0, below=90
     )
     mass: float | None = _own_mass()
     density: float | None = _density()

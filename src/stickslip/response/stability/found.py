@@ -150,16 +150,13 @@ class Stability:
                 "tangents that are not finite"
             )
         if not np.isfinite(error):
-            return (
-                f"as it was solved the motion has a largest multiplier of modulus {size:.4g}; what more harmonics would change in it "
-                "is not known, no motion with more was found nearby"
-            )
+            return f"the largest multiplier has the modulus {size:.4g} with the harmonics solved; its error is not known, as no motion with more harmonics was found nearby"
         said = modulus_text(size, error)
         return {
-            "unstable": f"a multiplier of modulus {said} lies outside the unit circle: a disturbance grows by as much in a period",
-            "stable": f"the largest multiplier that is not neutral has the modulus {said}: disturbances die",
-            "neutral": f"a multiplier of modulus {said} lies on the unit circle: a disturbance neither grows nor dies",
-            "undecided": f"a multiplier of modulus {said} may lie on either side of the unit circle",
+            "unstable": f"a multiplier of modulus {said} lies outside the unit circle, so a disturbance grows by this factor in a period",
+            "stable": f"the largest multiplier that is not neutral has the modulus {said}, so disturbances die",
+            "neutral": f"a multiplier of modulus {said} lies on the unit circle, so a disturbance neither grows nor dies",
+            "undecided": f"a multiplier of modulus {said} may lie inside or outside the unit circle",
         }[self.verdict]
 
     @property

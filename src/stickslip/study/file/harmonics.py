@@ -28,13 +28,11 @@ class Harmonics(Section):
 
     low: Kept = Field(
         1,
-        description=f"harmonics of the first passage: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3]; left out: those that "
-        "loads drive, which is 1 but for loads with a harmonic or several engine orders",
+        description=f"harmonics of the first passage, as the highest of all, 1 to {HIGHEST}, or as a list such as [1, 3]; left out: the harmonics that loads drive, which is 1 except for loads with a harmonic or several engine orders",
     )
     high: Literal["auto"] | Kept = Field(
         "auto",
-        description=f"auto: harmonics are raised ({', '.join(map(str, RUNGS))}) until the judgement of each point is quiet, and audited; or those beyond "
-        f"which none is kept, as published: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3, 5]",
+        description=f"auto: harmonics are raised ({', '.join(map(str, RUNGS))}) until the judgement of each point is quiet, and audited. A number, 1 to {HIGHEST}, or a list such as [1, 3, 5] sets the highest harmonics kept, as published",
     )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     selection: Selection = Field(
@@ -43,7 +41,7 @@ class Harmonics(Section):
     passages: Passages = Field(
         "double",
         description="double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency "
-        "before the next one, as selections that foretell the next frequency always do",
+        "before the next one, as selections that predict the next frequency always do",
     )
     alert_threshold_percent: Positive = Field(
         5.0,
@@ -52,26 +50,26 @@ class Harmonics(Section):
     )
     strategy_threshold: Positive | None = Field(
         None,
-        description="threshold of a selection whose indicator is no error, greater than zero; left out: that of its source",
+        description="threshold of a selection whose indicator is no error, greater than zero; left out: as in its source",
     )
     per_dof: bool = Field(
         False,
-        description="harmonics of each retained coordinate by itself, as their sources have it (for maple and grolet)",
+        description="harmonics chosen for each retained coordinate by itself, as in the sources (for maple and grolet)",
     )
     repeats: bool = Field(
         False,
-        description="solve a frequency again until it has the harmonics that it foretells (for grolet, laxalde, suess_spectral and suess_jacobian)",
+        description="solve a frequency again until it has the harmonics predicted for it (for grolet, laxalde, suess_spectral and suess_jacobian)",
     )
     alert_over: Literal["answer", "along", "outputs", "contacts"] | list[str] = Field(
         "answer",
-        description="where the error is taken: answer (every output, as a vector, relative to itself or to 1 % of the largest of its unit); or as "
-        "published, each harmonic and dof by itself: along (the outputs' motion along the excitation), outputs (all of it), contacts "
-        '(of the second surfaces at the contact points) or a list of labels such as ["tip1.x", "L1.1.z", "damper.x"]',
+        description="where the error is taken. answer: every output, as a vector, relative to itself or to 1 % of the largest of its unit. As "
+        "published, by harmonic and dof, it is taken along (outputs along the excitation), outputs (in all directions), contacts (second "
+        'surfaces at the contact points) or at labels such as ["tip1.x", "L1.1.z", "damper.x"]',
     )
     alert_harmonics: list[Annotated[int, Field(ge=0, le=HIGHEST)]] | None = Field(
         None,
         min_length=1,
-        description="harmonics of which the error is taken, 0 for the static part; left out: those that the excitation drives",
+        description="harmonics whose error is taken, 0 for the static part; left out: the harmonics that the excitation drives",
     )
 
     @field_validator("low", "high", mode="before")

@@ -83,7 +83,7 @@ def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
     of_laws = {key for own in every.values() for key in own}
     rows = [row for row in _rows(node) if row[0] not in of_laws]
     if not law:
-        told = f"'stickslip keys contact.LAW' adds those of a law: {', '.join(every)}"
+        told = f"'stickslip keys contact.LAW' adds the keys of a law ({', '.join(every)})"
         return Keys(f"[{title}]: keys of all laws; {told}", tuple(rows))
     per_area = keys_of(law, per_area=True).keys() - keys_of(law, per_area=False).keys()
     for key, default, meaning in _rows(node):

@@ -61,9 +61,7 @@ class Solver(Section):
     )
     rescue: Rescue = Field(
         "all",
-        description="of [forced_response]. all: a frequency that does not converge is looked for by homotopies and other globalisations, up to 300 "
-        "Newton steps at a point of 60 unknowns, then from the motion in time, if that repeats itself; in_time: by the corrector, from several starts, and from the "
-        "motion in time, listed frequencies by no branch in between: for strong lift-off of many contacts; off: by the corrector alone",
+        description="what follows where a frequency of [forced_response] does not converge. all: homotopies and other globalisations, up to 300 Newton steps at a point of 60 unknowns, then a start from a periodic motion in time; in_time: the corrector from several starts and from the motion in time, without a branch between listed frequencies, for strong lift-off of many contacts; off: nothing more than the corrector",
     )
 
 

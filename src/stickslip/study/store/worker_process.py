@@ -260,8 +260,7 @@ def _prepared(told: dict[str, Any], modules: tuple[str, ...]) -> StickslipError 
             import_module(name)
     except BaseException as error:  # noqa: BLE001  the script may do anything
         return StickslipError(
-            f"a worker process cannot import {told.get('init_main_from_path', 'the script')} ({error}). Put what it does below "
-            "the line: if __name__ == '__main__':"
+            f"a worker process cannot import {told.get('init_main_from_path', 'the script')} ({error}). Put its code below the line if __name__ == '__main__':"
         )
     return None
 

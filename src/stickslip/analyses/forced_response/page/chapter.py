@@ -255,10 +255,7 @@ def peaks(response: Response) -> Table:
 def _damping_sentence(zeta: FloatArray) -> list[str]:
     if not np.isfinite(zeta).any():
         return []
-    text = (
-        "The damping ratio is that of a linear oscillator which loses as much at the peak: the work of the load in a cycle over 4π "
-        "times the largest energy that structure and contacts store. The quality factor is half its inverse."
-    )
+    text = "The equivalent damping ratio is the work of the load in a cycle over 4π times the largest energy stored in structure and contacts. The quality factor is half its inverse."
     return [text]
 
 

@@ -39,10 +39,7 @@ def stability(response: Response) -> list[Table | Words]:
         ]
         for case, own in found
     ]
-    text = (
-        "Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
-        "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does."
-    )
+    text = "Does a small disturbance of the motion die? In each period it is multiplied by the largest multiplier. Above 1 by more than its error, the machine leaves the motion. If the error bar contains 1, time integration decides, or stability stays undecided."
     head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
     told = any(str(own.stability_sentence) for _, own in found)
     lines = all_lines(response.data, [c.label for c in response.cases]) if told else ()
@@ -89,10 +86,7 @@ def amplitudes_in_time(response: Response) -> Plot | None:
     styled(figure, 380)
     figure.update_xaxes(title_text="period")
     figure.update_yaxes(title_text=f"half of peak to peak ({scale.unit})", rangemode="tozero")
-    caption = (
-        "Where no periodic motion was found, or one that disturbances leave, this is the motion in time: the amplitude of each of its last "
-        "periods, half of peak to peak. It is time integration from the motion of the nearest point that was found, no balance itself; another start may end elsewhere."
-    )
+    caption = "Where no stable periodic motion was found, the motion was integrated in time from the nearest solution. The figure shows half of peak to peak in each of its last periods. Another start may end elsewhere."
     return Plot("not_periodic", "What is not periodic, in time", caption, figure)
 
 

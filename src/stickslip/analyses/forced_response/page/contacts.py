@@ -115,8 +115,7 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
     own = response.periods[case.index]
     stroke, span = (float(np.ptp(of[widest, direction])) for of in (own.peak_gap, own.peak_force))
     return (
-        f"The widest loop is that of {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke "
-        f"of {quantity(stroke, 'm')} and a force range of {quantity(span, 'N')}; "
+        f"The widest loop belongs to {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke of {quantity(stroke, 'm')} and a force range of {quantity(span, 'N')}; "
         f"{int((area > 0.01 * area.max()).sum())} of {counted(len(names), 'point')} enclose more than a hundredth of "
         "its area."
     )
@@ -173,7 +172,7 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
     )
     if drawn < len(names):
         caption += (
-            f" {drawn} of {len(names)} points are drawn: those that carry a force along {direction} and lose most."
+            f" {drawn} of {len(names)} points are drawn: the points with a force along {direction} that dissipate most."
         )
     captions = {c.index: _loop_caption(response, c, column) for c in cases}
     title = f"Hysteresis loops at the peak, direction {direction}"
@@ -297,11 +296,8 @@ def surface_map(response: Response) -> Plot | None:
     figure.update_layout(
         showlegend=False, coloraxis={"colorscale": _SLIP_SCALE, "cmin": 0, "cmax": 100, "colorbar": bar}
     )
-    patched = "what belongs to them, as far as their areas go, " if any(rims.values()) else ""
-    caption = (
-        f"Contact points at their places, {patched}seen along the normal; colours tell for which share of the cycle at the peak a "
-        "point slips in either direction. A dark rim marks points that lift off in the cycle."
-    )
+    patched = "with the areas they stand for, " if any(rims.values()) else ""
+    caption = f"The figure shows the contact points, {patched}along the contact normal. Colours give the share of the cycle at the peak in which a point slips in either direction. A dark rim marks points that lift off."
     captions = {c.index: _surface_caption(response, c, surfaces) for c in cases}
     return Plot("surface", "Where the contacts slip", caption, figure, captions, response.chosen)
 

@@ -273,7 +273,7 @@ def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) ->
             hz = number(float(response.hz[both[worst]]), 5)
             parts.append(f"{percent(100 * float(off[worst]))} at {hz} Hz{case.where}")
     return (
-        f"Solid: accepted; dashed: H = {response.low_name} alone, where that was solved. The largest difference of the "
+        f"Solid lines are accepted, dashed lines have H = {response.low_name} alone. The largest difference of the "
         f"low-order amplitude is {joined(parts)}."
     )
 

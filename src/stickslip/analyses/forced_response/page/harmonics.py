@@ -194,7 +194,7 @@ def _auto_text(response: Response) -> str:
     return (
         f"Harmonics are raised along the branch, from H = {response.low_name} up to {response.high_harmonics[-1]}, until "
         f"`{response.selection}` predicts that more would change the motion of {over} by well below "
-        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, to compare: audits. {_REASON}"
+        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, as audits. {_REASON}"
     )
 
 

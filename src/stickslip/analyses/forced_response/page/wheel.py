@@ -217,7 +217,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
     )
     figure.update_xaxes(title_text="wave number", col=2)
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", col=2)
-    text = "All blades at the peak, the lowest harmonic that is driven. Left: amplitudes around the wheel. Right: the waves they are the sum of."
+    text = "The figure shows all blades at the peak, in the lowest harmonic that is driven. Left are the amplitudes around the wheel, right the waves that add up to them."
     return Plot("wheel", "The wheel at the peak", text, figure, said, response.chosen)
 
 

@@ -87,7 +87,7 @@ def off_engine_order(question: Question) -> tuple[Verdict, ...]:
     ranges = " and ".join(f"{h * lowest:.6g} to {h * highest:.6g} Hz" for h in harmonics)
     speeds = " to ".join(f"{f * HZ / RPM / order:.0f}" for f in (lowest, highest))
     why = (
-        f"at {rpm:.6g} rpm {names} excite{'s' * (len(harmonics) == 1)} at {excited} Hz, outside {ranges}: the response is that of the "
+        f"at {rpm:.6g} rpm {names} excite{'s' * (len(harmonics) == 1)} at {excited} Hz, outside {ranges}; the response shows the "
         f"wheel at {rpm:.6g} rpm shaken at another frequency"
     )
     remedy = (

@@ -82,7 +82,7 @@ class Points:
     status: IntArray = column("1", "how the solver ended", along="point")
     indicator: FloatArray = column(
         "1",
-        "what the strategy compared with its threshold; of an error: at the first solution, else at the accepted one",
+        "indicator that the strategy compared with its threshold: an error at the first solution, other indicators at the accepted one",
         along="point",
     )
     predicted_error_percent: FloatArray = column(
@@ -101,7 +101,7 @@ class Points:
         along="point",
     )
     audit_error_of: TextArray = column(
-        "1", "the output or dof that differs so much, empty where no audit was made", along="point"
+        "1", "output or dof with this difference, empty where no audit was made", along="point"
     )
     real_error_percent: FloatArray = column(
         "percent",
@@ -251,7 +251,7 @@ class ExaminedRows:
         "1", "modulus of the multiplier that decides, the largest as a rule; NaN where none is known", along="examined"
     )
     stability_multiplier_error: FloatArray = column(
-        "1", "how far it may be from that of the motion with all harmonics", along="examined"
+        "1", "bound of its difference from the motion with all harmonics", along="examined"
     )
     stability_sentence: TextArray = column("1", "what was found and why, in words", along="examined")
 
@@ -261,13 +261,13 @@ class OtherMotions:
     """Motions beside the response, at the same frequencies."""
 
     another_case: IntArray | None = column(
-        "1", "case of a motion beside that of the response", along="another", default=None
+        "1", "case of another motion beside the response", along="another", default=None
     )
     another_frequency_hz: FloatArray = column("Hz", "where it was found", along="another")
     another_amplitude: FloatArray = column("m", "its amplitude", along="another")
     another_known: FloatArray = column("m", "amplitude of the response there", along="another")
     another_start: TextArray = column(
-        "1", "what it was found from: vibration with contacts stuck or open, or rest", along="another"
+        "1", "start that led to it: vibration with contacts stuck or open, or rest", along="another"
     )
     another_stability: TextArray = column("1", "whether it is stable, in words", along="another")
 
@@ -331,7 +331,7 @@ class BifurcationRows:
         "1", "fold, period doubling, Neimark-Sacker, branch point, or jump of multipliers", along="bifurcation"
     )
     bifurcation_multiplier_error: FloatArray = column(
-        "1", "how far the multiplier may be from that of the motion with all harmonics", along="bifurcation"
+        "1", "bound of its difference from the multiplier of the motion with all harmonics", along="bifurcation"
     )
     bifurcation_certain: IntArray = column(
         "1",
@@ -477,7 +477,7 @@ class StiffnessChange:
 
     stiffness_peak_slope: float = column(
         "1",
-        "relative change of the peak amplitude over that of the stiffness of all contacts, by one linear solution at the peak; at listed frequencies and at an end of the range at that frequency; NaN where no contact has a stiffness, or one is rigid",
+        "relative change of the peak amplitude per relative change of all contact stiffnesses, by one linear solution at the peak; at listed frequencies and at an end of the range at that frequency; NaN where no contact has a stiffness, or one is rigid",
         along="case",
     )
     stiffness_frequency_slope_hz: float = column(
@@ -495,7 +495,7 @@ class Blades:
     tuned_peak_amplitude: float = column("m", "largest amplitude of the wheel with all sectors alike", along="case")
     tuned_peak_hz: float = column("Hz", "frequency of that peak", along="case")
     amplification: float = column(
-        "1", "largest amplitude of any blade over that of the wheel with all sectors alike", along="case"
+        "1", "largest amplitude of any blade over the amplitude of the wheel with all sectors alike", along="case"
     )
     whitehead: float = column(
         "1",

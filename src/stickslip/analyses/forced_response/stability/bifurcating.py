@@ -165,7 +165,7 @@ def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
     why = why_not(question) if question.bifurcations != "folds" else ""
     alone = [f"folds alone were looked for: {why}"] * bool(why)
     hill = by_hill(question.model.system)
-    way = ["they are those of Hill's method"] * bool(hill and found.examined)
+    way = ["they come from Hill's method"] * bool(hill and found.examined)
     count = len([b for b in found.found if b.kind in LEAVES][_most_followed(question) :])
     more = [f"branches of {count} bifurcations were not followed"] * bool(count and question.bifurcations == "branches")
     return (*found.none_met, *alone, *found.limits, *way, *more)

@@ -27,8 +27,8 @@ STEPS = 1024  # of a period
 
 Motion = Literal["attained", "left", "not periodic", "not settled"]
 TOLD: dict[str, str] = {
-    "attained": "attained: the motion in time stays with that of the balance",
-    "left": "left: the motion in time goes away from that of the balance",
+    "attained": "attained: the motion in time stays on the balanced motion",
+    "left": "left: the motion in time leaves the balanced motion",
     "not periodic": "the motion in time does not repeat with the period of the load",
     "not settled": "where the motion in time goes is not known yet",
 }

@@ -97,7 +97,7 @@ class Examined:
         told = f"{self.omega / HZ:.3f} Hz: {self.verdict}"
         if self.verdict == "undecided" and not self.motion:
             if self.large:
-                return f"{told}: {self.reason}; not integrated in time: {self.large}"
+                return f"{told}: {self.reason}; not integrated in time ({self.large})"
             return f"{told}: {self.reason}; an integration in time (--verify) tells more"
         if not self.motion:
             return f"{told}: {self.reason}"

@@ -87,7 +87,7 @@ class Judged:
         told = ""
         if most.value and most is not first:
             told = f", the most at {self.case.hz[most.points[0]]:.2f} Hz ({most.value})"
-        return f"; the same is said of {count}, {hz.min():.2f} to {hz.max():.2f} Hz{told}"
+        return f"; this concerns {count}, {hz.min():.2f} to {hz.max():.2f} Hz{told}"
 
 
 def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:

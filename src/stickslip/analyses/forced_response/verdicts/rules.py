@@ -79,8 +79,8 @@ LEFT = "unstable: a machine does not stay there"
 LEAVING = dict.fromkeys(
     ("period doubling", "branch point"), 'forced_response.bifurcations = "branches" follows what leaves there.'
 )
-FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
-OPEN = "No more time helps, and no fewer modes: it stays open. More harmonics make the errors of multipliers smaller."
+FEWER = f"More time does not help. Fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates. Otherwise stability stays undecided."
+OPEN = "Neither more time nor fewer modes help. More harmonics make the errors of multipliers smaller."
 IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
 
 
@@ -97,7 +97,7 @@ def stability(case: Curve) -> Iterator[Finding]:
             remedy = "Damping decides whether a machine keeps this motion: give [damping], or a contact that slips."
             yield Finding("trusted", f"the peak is {why}", remedy, (point,))
         elif word == "undecided" and not case.attained[point] and point not in case.known:
-            why = f"whether it is stable: {why}"
+            why = f"stability {why}"
             told = [why, *map(str, case.read(MotionsInTime).not_periodic_sentence)]
             known = next(filter(None, map(fewer, told)), "")
             remedy = known or f"{in_time_there(case, point)}, and sees whether the motion stays."
@@ -217,7 +217,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
         word = str(said.another_stability)
         state = {
             "stable": ", which is stable",
-            "undecided": ", of which nobody knows whether it is stable",
+            "undecided": ", whose stability is undecided",
             "neutral": ", which is neutral",
         }.get(word, ", whose stability was not examined")
         why = (
@@ -273,7 +273,7 @@ def unsolved(case: Curve) -> Iterator[Finding]:
     """Mark unconverged points as wrong, and doubt a peak found among the remaining points."""
     lost = np.flatnonzero(~case.converged)
     if lost.size == case.hz.size:
-        remedy = "See run.log for what stopped them, and the size of the loads."
+        remedy = "See run.log for the causes, and check the size of the loads."
         yield Finding("wrong", "no point converged: there is no peak", remedy)
         return
     for i in lost:
@@ -283,11 +283,11 @@ def unsolved(case: Curve) -> Iterator[Finding]:
         remedy = f"A smaller step ({case.nearer}) finds most such points."
         if status == Status.NOT_PERIODIC:
             why = f"attains no periodic motion ({'; '.join(advice)})"
-            remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points says at how many such points."
+            remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points sets the number of such points."
         yield Finding("wrong", why, remedy, (int(i),))
     if lost.size:
-        why = f"{lost.size} points did not converge; the peak is the largest of the others, and a larger one may stand among them"
-        remedy = f"Take {case.nearer}, or narrow the range to theirs."
+        why = f"{lost.size} points did not converge; the peak is the largest of the others, and one of these points may be larger"
+        remedy = f"Take {case.nearer}, or narrow the range to these points."
         yield Finding("doubtful", why, remedy)
 
 
@@ -302,7 +302,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(own), error_text(own))
         elif np.isnan([own, case.reference[i], case.integrated[i]]).all():
-            why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
+            why = f"the error of H = {case.kept[i]} is not known, as its harmonics were not examined"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
 
 
@@ -311,17 +311,12 @@ def _more(case: Curve, point: int) -> str:
     if not case.auto:
         return _of_selection(str(case.data.attrs.get("selection", "")))
     if case.own_error[point] <= case.limit:
-        return "Its own error was predicted below harmonics.alert_threshold_percent: lower that, and more harmonics are kept"
+        return "Lower harmonics.alert_threshold_percent to keep more harmonics; the predicted error is below it"
     if case.supports[point][-1] < case.cap:
-        return (
-            f"Give {case.nearer}, or a narrower range: the search for up to {case.cap} harmonics ended before, by its share of work or because "
-            "no solution was near"
-        )
+        return f"Give {case.nearer}, or a narrower range. The search for up to {case.cap} harmonics used up its share of work, or found no solution nearby"
     if case.cap < RUNGS[-1]:
-        return (
-            f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
-        )
-    return f"There are no more than {case.cap} harmonics to be had"
+        return f"Raise limits.work_s or limits.memory_gb, which allow {case.cap} harmonics at most"
+    return f"No study keeps more than {case.cap} harmonics"
 
 
 def _of_selection(selection: str) -> str:
@@ -335,9 +330,7 @@ def _of_selection(selection: str) -> str:
 
 def _examination(case: Curve) -> str:
     if case.rigid:
-        return (
-            "A contact is rigid, of which no error is predicted: compare with a larger harmonics.high, or see --verify"
-        )
+        return "Compare with a larger harmonics.high; no error is predicted for rigid contacts"
     return "--verify-harmonics predicts at every point what more would change, --verify integrates in time at the peak"
 
 
@@ -360,10 +353,7 @@ def not_audited(case: Curve) -> Iterator[Finding]:
     if np.isnan(case.reference[few]).any():
         at_peak = case.peak >= 0 and bool(few[case.peak])
         where = ", the peak among them" if at_peak else ""
-        why = (
-            f"H = {case.low} was accepted at {few.sum()} point{'s' * int(few.sum() != 1)} by predictions alone{where}: none of them "
-            "was solved with more to compare"
-        )
+        why = f"H = {case.low} was accepted at {few.sum()} point{'s' * int(few.sum() != 1)} by predictions alone{where}; none was solved with more harmonics"
         audits = "" if case.auto else 'harmonics.high = "auto" audits some; '
         remedy = f"{audits}{_examination(case)}."
         yield Finding("doubtful" if at_peak else "trusted", why, remedy)
@@ -392,10 +382,7 @@ def on_other_motions(case: Curve) -> Iterator[Finding]:
         kept = case.kept[i], case.kept[j]
         sure = case.peak not in (i, j) and case.sure[i] and case.sure[j]
         unlike = "" if sure or kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
-        why = (
-            f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): more than one periodic motion "
-            f"exists near there, and which one a machine takes depends on its history{unlike}"
-        )
+        why = f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): a machine takes one of several periodic motions, depending on its history{unlike}"
         remedy = f'Take {case.nearer} there, and sweep both ways (direction = "down").'
         yield Finding("trusted" if sure else "doubtful", why, remedy, (i, j), jump.size)
 
@@ -411,8 +398,8 @@ def folds(case: Curve) -> Iterator[Finding]:
     doubted = inside and case.peak_stability not in ("stable", "neutral")
     digits = next((d for d in range(2, 6) if round(low, d) != round(high, d)), 6)
     why = (
-        f"the response folds between {low:.{digits}f} and {high:.{digits}f} Hz: more than one periodic motion was found there, as a rule one "
-        "of them unstable" + (", and the peak stands among them" if inside else "")
+        f"the response folds between {low:.{digits}f} and {high:.{digits}f} Hz: several periodic motions exist there, and as a rule one is unstable"
+        + (", and the peak stands among them" if inside else "")
     )
     remedy = "Points outside the asked range belong to the fold."
     if inside:
@@ -428,7 +415,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             why = (
                 f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
             )
-            yield Finding("doubtful", why, "Believe the amplitude to as much.", (point,))
+            yield Finding("doubtful", why, "The amplitude is uncertain by this much.", (point,))
         elif point in case.unstable and point != case.peak:
             continue  # an answer: `unstable_stretches` tells of it
         elif motion in ("left", "not periodic"):
@@ -438,7 +425,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("wrong", why, remedy, (point,))
         elif motion == "not settled":
             why = "a time integration did not settle to a periodic motion"
-            remedy = "See the table of checks: it says what drifts or rings on."
+            remedy = "The table of checks says what drifts or rings on."
             yield Finding("doubtful", why, remedy, (point,))
         elif not abs(off) <= (allowed := case.allowed_in_time(point)):
             why = f"time integration and harmonic balance differ by {_difference_text(off)}, more than {allowed:g} %"
@@ -463,11 +450,8 @@ def beside_the_amplitude(case: Curve) -> Iterator[Finding]:
     harmonic, share, whole = case.left_out
     if share > case.limit:
         own = case.amplitude[case.peak]
-        why = (
-            f"half of peak to peak is {millimetres(whole)} at {case.output}, {100 * (whole / own - 1):+.2g} % from the amplitude that is told: "
-            f"harmonic {harmonic}, which that leaves out, holds {error_text(share)}"
-        )
-        remedy = 'output.measure = "half_peak_to_peak" tells extreme values.'
+        why = f"half of peak to peak is {millimetres(whole)} at {case.output}, {100 * (whole / own - 1):+.2g} % from the amplitude reported; harmonic {harmonic}, which the amplitude leaves out, holds {error_text(share)}"
+        remedy = 'output.measure = "half_peak_to_peak" reports extreme values.'
         yield Finding("trusted", why, remedy, (case.peak,))
 
 

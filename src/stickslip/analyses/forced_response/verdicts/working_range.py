@@ -324,10 +324,7 @@ def range_sentences(own: WorkingRange) -> tuple[str, ...]:
 
 
 def _unknown(own: WorkingRange) -> str:
-    return (
-        f"Where friction works cannot be told from these values of {own.key}: at neither end do all contacts stick, and their states "
-        "do not tell which end is nearer to it. Add values beyond both ends."
-    )
+    return f"Where friction works cannot be told from these values of {own.key}: all contacts stick at neither end, and their states do not show which end is nearer to full stick. Add values beyond both ends."
 
 
 def _of(own: WorkingRange, peak: CurvePeak) -> str:
@@ -341,16 +338,13 @@ def _size(own: WorkingRange) -> str:
 def _stuck_end(own: WorkingRange) -> str:
     if own.stuck is None:
         side = "above" if own.falling else "below"
-        return f"At no value do all contacts stick at the peak: that end of the curve lies {side} {_of(own, own.peaks[0])}."
+        return f"At no value do all contacts stick at the peak; the stuck end of the curve lies {side} {_of(own, own.peaks[0])}."
     side = "up" if own.falling else "down"
     shut = all(p.contacts.sticking == 1.0 for p in own.of("stuck"))
     still = "all contacts stick" if shut else "no contact slips, opens or closes"
     first = own.stuck is own.peaks[0]
     where = f"At {_of(own, own.stuck)}, the first value," if first else f"From {_of(own, own.stuck)} {side}"
-    return (
-        f"{where} {still} at the peak: friction dissipates nothing, and the resonance is that of the stuck "
-        f"system, at {own.stuck.hertz:.5g} Hz."
-    )
+    return f"{where} {still} at the peak: friction dissipates nothing, and the stuck system resonates at {own.stuck.hertz:.5g} Hz."
 
 
 def _middle(own: WorkingRange) -> str:
@@ -362,10 +356,7 @@ def _middle(own: WorkingRange) -> str:
         return (
             f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {best.value:g}."
         )
-    return (
-        f"Friction works {where}: there the {_size(own)} lies 3 dB or more below that of the stuck system. It is smallest at "
-        f"{best.value:g}, {_percent(best.size / stuck.size)} of the stuck one, at {best.hertz:.5g} Hz."
-    )
+    return f"Friction works {where}: the {_size(own)} lies 3 dB or more below the stuck system there. It is smallest at {best.value:g}: {_percent(best.size / stuck.size)} of the stuck system's, at {best.hertz:.5g} Hz."
 
 
 def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
@@ -381,15 +372,9 @@ def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
     off = [p.size / stuck.size - 1 for p in own.peaks]
     if max(off) > 1 / HALF_POWER - 1:
         best, worst = own.smallest, max(own.peaks, key=lambda p: p.size)
-        return (
-            f"At no value does friction take the {_size(own)} 3 dB below that of the stuck system: it is smallest at {best.value:g}, "
-            f"{_percent(best.size / stuck.size)} of the stuck one, and largest at {worst.value:g}, {_percent(worst.size / stuck.size)}."
-        )
+        return f"Friction never takes the {_size(own)} 3 dB below the stuck system. It is smallest at {best.value:g}, {_percent(best.size / stuck.size)} of the stuck system's, and largest at {worst.value:g}, {_percent(worst.size / stuck.size)}."
     word = "Down" if own.falling else "Up"
-    return (
-        f"{word} to {_of(own, own.peaks[-1])} the {_size(own)} stays within {_percent(max(map(abs, off)))} of that of the stuck system: "
-        "the contacts stiffen but hardly damp."
-    )
+    return f"{word} to {_of(own, own.peaks[-1])} the {_size(own)} stays within {_percent(max(map(abs, off)))} of the stuck system's: the contacts stiffen but hardly damp."
 
 
 def _loose_end(own: WorkingRange) -> str:
@@ -408,7 +393,7 @@ def _gone(own: WorkingRange, gone: Sequence[CurvePeak]) -> str:
     worst, best = gone[-1], own.smallest
     risen = f"the {_size(own)} has risen again, to {worst.size / best.size:.3g} times the smallest at {worst.value:g}"
     if own.stuck is not None:
-        risen += f" ({_percent(worst.size / own.stuck.size)} of the stuck one)"
+        risen += f" ({_percent(worst.size / own.stuck.size)} of the stuck system's)"
     risen += f", at {worst.hertz:.5g} Hz"
     if not any(p.contacts.holding for p in gone):
         return f"{risen}, and no contact sticks throughout the cycle"

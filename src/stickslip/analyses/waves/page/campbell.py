@@ -139,8 +139,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, in the frame that turns with the wheel. "
-        f"Lines are labelled with wave and mode. Thin and dashed: engine orders. Circles: {found}; only those where the engine "
-        f"order excites the nodal diameter of the mode.{_not_shown(view, top)}"
+        f"Lines are labelled with wave and mode. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 

@@ -124,9 +124,8 @@ def mistuned(view: Waves[Flutter]) -> Words | None:
     tuned = _PERCENT * float(view.found.damping.min())
     grows = sum(mode.damping < 0 for mode in modes)
     told = (
-        f"No wave is a mode then. The least damped mode of the wheel has "
-        f"{number(_PERCENT * modes[0].damping, 4)} % at {number(modes[0].frequency_hz, 6)} Hz, where the least stable wave of the tuned wheel has "
-        f"{number(tuned, 4)} %; {grows} of {len(modes)} modes grow. The coefficients are those of the reference frequency."
+        f"With mistuning no wave is a mode. The least damped mode of the wheel has "
+        f"{number(_PERCENT * modes[0].damping, 4)} % at {number(modes[0].frequency_hz, 6)} Hz; the least stable wave of the tuned wheel has {number(tuned, 4)} %. Of {len(modes)} modes {grows} grow. The coefficients belong to the reference frequency."
     )
     return Words((told,), "With the sectors as they differ")
 

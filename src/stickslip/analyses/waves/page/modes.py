@@ -163,10 +163,7 @@ def stage_shares(view: Waves[Modes]) -> Plot | None:
     figure.update_xaxes(title_text="mode", tickangle=0)
     figure.update_yaxes(title_text="share of the kinetic energy (%)", range=[0, 100])
     waves = "; ".join(f"{name}: {text}" for name, text in zip(view.waves, view.found.stage_waves, strict=True))
-    caption = (
-        "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
-        f"exist in the assembly only. Waves that the flanges let vibrate together: {waves}. All else of the flanges moves freely."
-    )
+    caption = f"A mode with nearly all its energy in one stage belongs to that wheel alone. Modes shared by two stages exist in the assembly only. The flanges couple these waves: {waves}. They leave all other waves free."
     return Plot(f"stages{view.key}", "Which stage vibrates", caption, figure)
 
 

@@ -74,8 +74,7 @@ def safe_diagram(view: Waves[Interference]) -> Plot:
     )
     caption = (
         f"At {number(view.rpm, 5)} rpm engine order m excites at m times the speed, and only the nodal diameter "
-        f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}. Margins are those of the speed at which "
-        "order and mode meet, with the frequency's change over the speed."
+        f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}. Margins refer to the speed at which order and mode meet, with the frequency's change over the speed."
     )
     if unjudged:
         caption += (

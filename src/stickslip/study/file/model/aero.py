@@ -32,7 +32,7 @@ class AeroTable(Section):
         "phase_angle_deg, and columns such as real_per_s2 and imag_per_s2"
     )
     reference_hz: Positive = Field(
-        description="frequency in Hz at which the force is exact where matrices stand for it, greater than zero: that of the vibration"
+        description="frequency of the vibration in Hz, greater than zero; the force is exact there where matrices represent it"
     )
     mode: int = Field(
         1,
@@ -42,8 +42,7 @@ class AeroTable(Section):
     )
     shapes: Literal["wave", "nodal_diameter", "blade_alone"] = Field(
         "wave",
-        description="whose modes: wave (each wave has its own), nodal_diameter (those of one, in all waves) or blade_alone (those of a "
-        "part with its root and its cyclic faces held)",
+        description="modes of the coefficients: wave (each wave has its own), nodal_diameter (modes of one nodal diameter, in all waves) or blade_alone (modes of a part with root and cyclic faces held)",
     )
     nodal_diameter: int | None = Field(None, ge=0, le=1000, description="of shapes = 'nodal_diameter': a whole number")
     clamped: Name | None = Field(

@@ -74,7 +74,7 @@ Steps = Annotated[list[Placed], BeforeValidator(_steps), Field(min_length=1, max
 def _placed() -> tuple[Any, Any]:
     return Steps | None, Field(
         None,
-        description="the table placed, or a list of such tables, one step after the other; left out: its axes are those of the model",
+        description="the table placed, or a list of such tables, one step after the other; left out: as the model's axes",
     )
 
 

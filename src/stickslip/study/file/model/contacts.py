@@ -51,8 +51,7 @@ class Pair(Section):
     )
     tolerance_m: Positive | None = Field(
         None,
-        description="distance of partners node to node, reach of a segment, in m; a node may stand a tenth of it beyond the rim of a "
-        "segment; left out: that of the pairing, and nothing beyond the rim",
+        description="distance of partners node to node, reach of a segment, in m; a node may stand a tenth of it beyond the rim of a segment; left out: as the pairing has it, and nothing beyond the rim",
     )
 
     @field_validator("between")
@@ -107,12 +106,11 @@ class ContactBase(Pair):
     )
     tangent: Triple | None = Field(
         None,
-        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: that of the surface, which will not do where the law is not the same along t and w",
+        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: the surface's, allowed where the law is the same along t and w",
     )
     normal: Triple | None = Field(
         None,
-        description="direction [x, y, z] out of the first surface where it is nodes that span no facet, such as the tip of a beam; "
-        "left out: that of the surfaces",
+        description="direction [x, y, z] out of the first surface if its nodes span no facet, such as the tip of a beam; left out: the surface normals",
     )
     acts: Literal["tangential", "normal"] | None = Field(
         None,

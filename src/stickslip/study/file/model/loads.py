@@ -34,7 +34,7 @@ class LoadTable(Section):
     """A static or harmonic force."""
 
     on: Name = Field(
-        description='what it acts on: a rigid part ("damper", at its centre of mass), a node set ("blade.tip", shared equally '
+        description='a rigid part ("damper", at its centre of mass), a node set ("blade.tip", shared equally '
         'among its nodes), a node ("blade.node12") or a dof ("chain.m1")'
     )
     force_n: float | None = Field(
@@ -53,7 +53,7 @@ class LoadTable(Section):
         None, description='another load, such as "load.pull", of which this one is a fraction'
     )
     ratio: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
-        None, description="the force of ratio_of over that of this load, greater than zero"
+        None, description="the force of ratio_of over the force of this load, greater than zero"
     )
     direction: Annotated[Triple | None, BeforeValidator(unit_direction)] = Field(
         None, description='"x", "y", "z", "-x" ... or a vector [x, y, z]; left out for single dofs'
@@ -64,12 +64,12 @@ class LoadTable(Section):
         None,
         ge=0,
         le=HIGHEST_ORDER,
-        description="on a wheel: number of periods of the force around the circumference; left out: not a wheel",
+        description="number of periods of the force around the circumference of a wheel; left out: not a wheel",
     )
 
     frequency_hz: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
         None,
-        description="frequency of its own that it acts with, in Hz, for [quasi_periodic]; left out: that of the response",
+        description="frequency of this load in Hz, for [quasi_periodic]; left out: the frequency of the response",
     )
     frequency_ratio: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
         None, description="the same as a multiple of the frequency of the other loads"
@@ -146,7 +146,7 @@ class Output(Section):
         description='names of points and where they are: tip = "blade.tip", or {on = "blade", near_m = [x, y, z]}',
     )
     directions: list[Component] | None = Field(
-        None, min_length=1, description="of x, y, z, rx, ry, rz; left out: those that a point has"
+        None, min_length=1, description="of x, y, z, rx, ry, rz; left out: all that a point has"
     )
     peak: str = Field(
         "", max_length=100, description="label whose peak is resolved, such as tip.x; left out: the first"

@@ -72,7 +72,7 @@ class ReductionTable(Section):
         "are kept",
     )
     factor: Annotated[float, Field(ge=1, le=20)] | None = Field(
-        None, description="with up_to_hz: modes up to factor times it are kept, 1 to 20; left out: 1.5"
+        None, description="factor on up_to_hz up to which modes are kept, 1 to 20; left out: 1.5"
     )
     frequency_error: Annotated[float, Field(gt=0, lt=0.5)] | None = Field(
         None,
@@ -124,8 +124,7 @@ class StudyReduction(ReductionTable):
 
     interface_modes: Annotated[int, Field(ge=1, le=2000)] | None = Field(
         None,
-        description="of a single structure with joins, in the forced response: number of characteristic shapes that stand for the "
-        "nodes of joined surfaces, 1 to 2000; nodes of contacts, loads and outputs stay; left out: all nodes stay",
+        description="number of characteristic shapes that replace the nodes of joined surfaces in the forced response of a single structure, 1 to 2000. Nodes of contacts, loads and outputs stay; left out: all nodes stay",
     )
 
 

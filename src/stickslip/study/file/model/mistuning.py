@@ -34,7 +34,7 @@ class MistuningTable(Section):
     )
     beyond_radius_m: Positive | None = Field(
         None,
-        description="of blades: only what lies farther than that from the axis of rotation in m, greater than zero; left out: all",
+        description="distance from the axis of rotation in m, greater than zero, beyond which blades are mistuned; left out: everywhere",
     )
     contact: Name | None = Field(None, description="name of the contact that differs")
     part: Name | None = Field(None, description="part that is another one in a single sector")

@@ -127,7 +127,7 @@ class Lumped(PartTable):
         default_factory=list,
         max_length=100_000,
         description='springs [end, end, stiffness in N/m]; ends are "ground", names of masses or their numbers from 1, and on a wheel '
-        'those of the next sector, such as "next.m1"',
+        'masses of the next sector, such as "next.m1"',
     )
     dashpots_n_s_per_m: list[Link] = Field(
         default_factory=list,
@@ -176,7 +176,7 @@ class FileModel(PartTable):
         "or matrices (.sti, .full, .npz, .mtx and others, see 'bring your model')"
     )
     units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s", "foot-slug-s"] = Field(
-        description="the file's unit system: SI, mm-t-s (mm, tonne, s: N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"
+        description="the file's unit system, one of SI, mm-t-s (mm, tonne, s; N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"
     )
     plausible: bool = Field(
         True,
@@ -186,8 +186,7 @@ class FileModel(PartTable):
         None,
         ge=1,
         le=1000,
-        description="number of equal sectors that make the wheel; left out: that of the deck's cyclic symmetry, else 1 for "
-        "the whole structure",
+        description="number of equal sectors of the wheel; left out: as in the deck's cyclic symmetry, or 1 for the whole structure",
     )
     low_face: Name | None = Field(
         None,
@@ -196,9 +195,7 @@ class FileModel(PartTable):
     high_face: Name | None = Field(None, description="name of the node set of the cyclic face at the higher angle")
     cyclic: Literal["node_to_node", "segment_to_segment", "none"] = Field(
         "node_to_node",
-        description="how the cyclic faces are tied: node_to_node where their meshes match, or segment_to_segment, in the mean, where "
-        "they do not; then the high face follows the low one; none: the part has no such faces, and only contacts and joins lead "
-        "to its neighbours, as those of a damper between blades",
+        description="how the cyclic faces are tied. node_to_node: meshes match; segment_to_segment: meshes do not match, and the high face follows the low one in the mean; none: the part has no such faces, and only contacts and joins connect it to its neighbours, as a damper between blades",
     )
     clamped: list[Name] = Field(
         default_factory=list,
@@ -206,7 +203,8 @@ class FileModel(PartTable):
         description="names of the node sets of a mesh that are held in all directions, beside what a deck holds itself",
     )
     axis_direction: Triple | None = Field(
-        None, description="direction [x, y, z] of the axis of rotation; left out: that of the deck, else the z axis"
+        None,
+        description="direction [x, y, z] of the axis of rotation; left out: as in the deck, or the z axis",
     )
     axis_origin_m: Triple = Field(
         [0.0, 0.0, 0.0],
@@ -225,9 +223,9 @@ class FileModel(PartTable):
         description="beside matrices without coordinates: the mesh file with the nodes and their sets (.inp for CalculiX's .sti)",
     )
     mass: FilePath | None = Field(
-        None, description="with matrices in separate files: that of the mass; file is the stiffness"
+        None, description="mass matrix, if matrices are in separate files; file is then the stiffness"
     )
-    damping_matrix: FilePath | None = Field(None, description="with matrices in separate files: that of the damping")
+    damping_matrix: FilePath | None = Field(None, description="damping matrix, if matrices are in separate files")
     nodes: FilePath | None = Field(
         None, description="with matrices in separate files: CSV of node, component, x, y, z of every row"
     )
