@@ -44,6 +44,7 @@ MADE = "Made from the code by `python docs/generate.py`."
 def write_all(folder: Path) -> None:
     """Write what only a build shows into `folder`."""
     from alert_numbers import alert_tables
+    from glossary_drawing import draw_glossary
     from sector_drawing import draw_sector
 
     folder.mkdir(exist_ok=True)
@@ -52,6 +53,7 @@ def write_all(folder: Path) -> None:
     for name, table in alert_tables().items():
         (folder / name).write_text(table, encoding="utf-8")
     draw_sector(folder / "sector.svg")
+    draw_glossary(folder)
 
 
 def kept() -> dict[str, str]:
