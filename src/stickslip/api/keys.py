@@ -13,9 +13,9 @@ class HarmonicsKeys(TypedDict, total=False):
     """Keys of [harmonics]."""
 
     low: int | Sequence[int] | IntArray
-    """harmonics of the first passage: the highest of all, 1 to 200, or a list such as [1, 3]; left out: those that loads drive, which is 1 but for loads with a harmonic or several engine orders; default 1"""
+    """harmonics of the first passage, as the highest of all, 1 to 200, or as a list such as [1, 3]; left out: the harmonics that loads drive, which is 1 except for loads with a harmonic or several engine orders; default 1"""
     high: Literal["auto"] | int | Sequence[int] | IntArray
-    """auto: harmonics are raised (5, 9, 15, 25, 41) until the judgement of each point is quiet, and audited; or those beyond which none is kept, as published: the highest of all, 1 to 200, or a list such as [1, 3, 5]; default 'auto'"""
+    """auto: harmonics are raised (5, 9, 15, 25, 41) until the judgement of each point is quiet, and audited. A number, 1 to 200, or a list such as [1, 3, 5] sets the highest harmonics kept, as published; default 'auto'"""
     samples: int
     """time samples of a period, 16 to 8192; default 256"""
     selection: Literal[
@@ -33,17 +33,17 @@ class HarmonicsKeys(TypedDict, total=False):
     ]
     """what chooses the harmonics of a frequency: jacobian_alert, guarded_alert, goal_oriented, grolet, jaumouille, laxalde, maple, suess_jacobian, suess_spectral, always_low, always_high; default 'guarded_alert'"""
     passages: Literal["double", "single"]
-    """double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency before the next one, as selections that foretell the next frequency always do; default 'double'"""
+    """double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency before the next one, as selections that predict the next frequency always do; default 'double'"""
     alert_threshold_percent: float
     """a percentage greater than zero: frequencies whose predicted error is larger get more harmonics (for selections that predict an error); default 5.0"""
     strategy_threshold: float | None
-    """threshold of a selection whose indicator is no error, greater than zero; left out: that of its source"""
+    """threshold of a selection whose indicator is no error, greater than zero; left out: as in its source"""
     per_dof: bool
-    """harmonics of each retained coordinate by itself, as their sources have it (for maple and grolet); default False"""
+    """harmonics chosen for each retained coordinate by itself, as in the sources (for maple and grolet); default False"""
     repeats: bool
-    """solve a frequency again until it has the harmonics that it foretells (for grolet, laxalde, suess_spectral and suess_jacobian); default False"""
+    """solve a frequency again until it has the harmonics predicted for it (for grolet, laxalde, suess_spectral and suess_jacobian); default False"""
     alert_harmonics: Sequence[int] | IntArray | None
-    """harmonics of which the error is taken, 0 for the static part; left out: those that the excitation drives"""
+    """harmonics whose error is taken, 0 for the static part; left out: the harmonics that the excitation drives"""
 
 
 class SolverKeys(TypedDict, total=False):
@@ -52,7 +52,7 @@ class SolverKeys(TypedDict, total=False):
     evaluator: Literal["intervals", "march", "events"]
     """how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), intervals (transitions on the time samples) or march (sample by sample); default 'events'"""
     rescue: Literal["all", "in_time", "off"]
-    """of [forced_response]. all: a frequency that does not converge is looked for by homotopies and other globalisations, up to 300 Newton steps at a point of 60 unknowns, then from the motion in time, if that repeats itself; in_time: by the corrector, from several starts, and from the motion in time, listed frequencies by no branch in between: for strong lift-off of many contacts; off: by the corrector alone; default 'all'"""
+    """what follows where a frequency of [forced_response] does not converge. all: homotopies and other globalisations, up to 300 Newton steps at a point of 60 unknowns, then a start from a periodic motion in time; in_time: the corrector from several starts and from the motion in time, without a branch between listed frequencies, for strong lift-off of many contacts; off: nothing more than the corrector; default 'all'"""
 
 
 class LimitsKeys(TypedDict, total=False):
@@ -76,7 +76,7 @@ class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
     frequencies_hz: Sequence[float] | FloatArray | None
     """frequencies of your own in Hz instead of a range, growing"""
     over: Literal["frequency", "speed"]
-    """frequency: at the one speed of [rotation]; speed: along speed_rpm, the frequency being the engine order times the speed, matrices and static loads those of [rotation]; default 'frequency'"""
+    """frequency: at the one speed of [rotation]; speed: along speed_rpm, at the engine order times the speed, with matrices and static loads from [rotation]; default 'frequency'"""
     speed_rpm: Sequence[float] | FloatArray | None
     """the range [lowest, highest] of speeds in rpm, for over = 'speed'"""
     direction: Literal["up", "down"]
@@ -88,17 +88,17 @@ class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
     frequencies: int | None
     """number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with more points where it turns (a single passage then steps through as many as points says)"""
     stability: Literal["auto", "peak", "off", "all"]
-    """whether a disturbance dies, by Floquet multipliers. auto: at the peak, the ends, beside folds, where the list of transitions in the cycle changes, and between these, at all points where matrices have at most 500 rows, else as far as the work of the solutions goes; peak: at the peak alone; all: at every point; off: nowhere; default 'auto'"""
+    """where stability is examined, by Floquet multipliers. auto: at the peak, the ends, beside folds and where the transitions of the cycle change, then at all other points up to 500 rows of the matrices, for larger ones within the work of the solutions; peak: at the peak alone; all: at every point; off: nowhere; default 'auto'"""
     bifurcations: Literal["off", "folds", "all", "branches"]
     """bifurcations located along the branch. folds: where it turns back; all: period doublings, Neimark-Sacker bifurcations and branch points, too, by the multipliers at every point; branches: all, and the periodic motions that leave there are followed; default 'off'"""
     not_periodic: Literal["in_time", "off"]
-    """where no periodic motion is found, or an unstable one: in_time: envelope, statistics and spectrum of the motion in time, at the peak or the nearest such points to it; off: nothing; default 'in_time'"""
+    """what to do where no stable periodic motion is found. in_time: give envelope, statistics and spectrum of the motion in time, at the peak or the nearest such points; off: nothing; default 'in_time'"""
     not_periodic_s: float
     """work that each such motion may take, in seconds of 4e9 operations, counted in steps and rows: as many periods on a busy machine as on an idle one; greater than zero; default 5.0"""
     not_periodic_points: int
     """most points of a case that are marched so, 1 to 10000: the peak first, then the nearest to it; default 2"""
     static_friction_share: float | None
-    """static state first, then frozen sliders: share of the friction coefficients, above 0 to 1, that may carry the static load before every slider stays where that has left it, the rest is for the vibration; left out: springs start unstretched, static and dynamic part are found together"""
+    """share of the friction coefficients, above 0 to 1, that carries the static load in a static solution first; sliders then stay there, and the rest is left for the vibration. Left out: springs start unstretched, and static and dynamic part are found together"""
 
 
 class NonlinearModeKeys(SolverKeys, total=False):
@@ -107,7 +107,7 @@ class NonlinearModeKeys(SolverKeys, total=False):
     modes: Sequence[int] | IntArray
     """numbers of the modes that are followed, by frequency with contacts stuck, from 1; default [1]"""
     wave_numbers: Sequence[int] | IntArray | None
-    """wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: that of the engine order of the loads, without loads all"""
+    """wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: the wave of the loads' engine order, without loads all"""
     amplitude_mm: Sequence[float] | FloatArray | None
     """the range [lowest, highest] of the amplitude of the peak output, as long as the motion has the shape of the linear mode; left out: from where nothing slips to 300 times where slip begins, or on to gross slip; springs that neither slip nor open need it"""
     points: int
@@ -121,7 +121,7 @@ class NonlinearModeKeys(SolverKeys, total=False):
     to_gross_slip: bool
     """whether a mode ends where every contact that can slip has slipped, of several sliders all of them, or opened; default False"""
     concept: Literal["periodic", "decaying"]
-    """what motions a mode is made of: periodic ones that a damping in proportion to the mass keeps going (Krack 2015), or those that are decaying as they are (Laxalde and Thouverez 2009); both agree where damping is small; default 'periodic'"""
+    """definition of the mode, by periodic motions sustained by mass-proportional negative damping (Krack 2015) or by decaying motions (Laxalde and Thouverez 2009); both agree for small damping; default 'periodic'"""
 
 
 class ModalSynthesisKeys(SolverKeys, total=False):
@@ -155,15 +155,15 @@ class QuasiPeriodicKeys(TypedDict, total=False):
     """Keys of [quasi_periodic]."""
 
     frequency_hz: Sequence[float] | FloatArray | None
-    """the range [lowest, highest] in Hz of the first frequency, that of the loads without one of their own"""
+    """the range [lowest, highest] in Hz of the first frequency, the frequency of all loads without their own"""
     frequencies_hz: Sequence[float] | FloatArray | None
     """first frequencies of your own in Hz instead of a range, growing"""
     points: int
     """first frequencies in the range, 2 to 1000; default 10"""
     second_hz: float | None
-    """where no load has a frequency of its own: near which frequency in Hz a second tone is looked for; left out: near modes that grow with contacts stuck, and what multipliers of the forced motion say"""
+    """frequency in Hz near which a second tone is sought where no load has its own frequency; left out: near modes that grow with contacts stuck and near the multipliers of the forced motion"""
     second_wave: int | None
-    """of a tuned wheel: wave number of that tone; left out: the wave that grows most"""
+    """wave number of the second tone on a tuned wheel; left out: the wave that grows most"""
     harmonics: int
     """sums |j| + |k| of combined frequencies j f1 + k f2 that are kept at first, 1 to 31; default 3"""
     most_harmonics: int
@@ -178,7 +178,7 @@ class LimitCycleKeys(SolverKeys, total=False):
     """Keys of [limit_cycle] and [solver]."""
 
     wave_numbers: Sequence[int] | IntArray | None
-    """wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: those that are unstable with contacts stuck"""
+    """wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: waves that are unstable with contacts stuck"""
     modes: Sequence[int] | IntArray | None
     """numbers of modes, by frequency with contacts stuck, from 1; left out: the unstable ones among the first 6, of a mistuned wheel 6 of each sector"""
     amplitude_mm: Sequence[float] | FloatArray | None
@@ -192,7 +192,7 @@ class LimitCycleKeys(SolverKeys, total=False):
     accuracy_percent: float
     """change of amplitude and frequency by twice the harmonics below which these are enough; default 0.001"""
     in_time: bool
-    """whether stable limit cycles are compared with time integration, and that of all unstable waves together says which one wins; --verify does the same; default False"""
+    """compare stable limit cycles with time integration, and integrate all unstable waves together to see which one wins; --verify does the same; default False"""
     periods: int
     """most periods of a time integration, 50 to 100000; default 400"""
 
@@ -207,7 +207,7 @@ class ResonanceKeys(SolverKeys, total=False):
     values: Sequence[float] | FloatArray | None
     """values of the parameter in the order in which they are visited"""
     span: Sequence[float] | FloatArray | None
-    """in place of values: first and last value of the parameter; the curve is followed by arc length, round folds, over a key of the model for minutes where a contact begins to slip at the peak"""
+    """first and last value of the parameter, in place of values; the curve is followed by arc length round folds, which takes minutes over a key of the model where a contact begins to slip at the peak"""
     points: int
     """least number of points of a span, 2 to 1000; default 30"""
     by: Literal["horizontal_tangent", "phase_quadrature", "variable_phase"]
@@ -265,7 +265,7 @@ class ResidualTractionsKeys(SolverKeys, LimitsKeys, total=False):
     harmonics: int
     """harmonics of the motions, 1 to 200; default 5"""
     starts: int
-    """random starts of the search at each frequency, beside those that are always taken, 0 to 10000; default 4"""
+    """random starts of the search at each frequency, beside its fixed starts, 0 to 10000; default 4"""
     seed: int
     """seed of the random starts; default 0"""
     in_time: bool
@@ -303,7 +303,7 @@ class CampbellKeys(TypedDict, total=False):
     modes: int
     """number of modes that are followed, 1 to 100; default 4"""
     nodal_diameters: Sequence[int] | IntArray | None
-    """nodal diameters; left out: those that the engine orders excite"""
+    """nodal diameters; left out: the ones that the engine orders excite"""
 
 
 class FlutterKeys(TypedDict, total=False):
@@ -316,7 +316,7 @@ class FlutterKeys(TypedDict, total=False):
     nodal_diameters: Sequence[int] | IntArray | None
     """nodal diameters, a list of whole numbers from 0 to half the number of sectors; left out: all. Both directions of each are looked at"""
     required_percent: float
-    """damping ratio in % that every wave must have, that of the structure with it; 0: none may grow; default 0.0"""
+    """damping ratio in % that every wave must have, structural damping included; 0: none may grow; default 0.0"""
 
 
 class SafeKeys(TypedDict, total=False):
@@ -325,7 +325,7 @@ class SafeKeys(TypedDict, total=False):
     contacts: Literal["static", "stuck", "open"]
     """what contacts do: static (those pressed by the static loads stick, the others are open), stuck or open; default 'static'"""
     speed_rpm: float | None
-    """speed in rpm, above zero; left out: that of [rotation]"""
+    """speed in rpm, above zero; left out: as in [rotation]"""
     engine_orders: Required[Sequence[int] | IntArray]
     """engine orders, a list of whole numbers from 1"""
     margin_percent: float
@@ -340,7 +340,7 @@ class RunUpKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
     speeds_rpm: Required[Sequence[float] | FloatArray]
     """the range [lowest, highest] of the speed in rpm, above zero, the lower first"""
     engine_orders: Sequence[int] | IntArray | None
-    """engine orders, a list of whole numbers from 1; each is that of all harmonic loads in turn. Left out: the loads act together, with their own"""
+    """engine orders, a list of whole numbers from 1; all harmonic loads take each in turn. Left out: the loads act together, with their own orders"""
     points: int
     """smallest number of points of each engine order, 2 to 10000; default 40"""
     peak_points: int
