@@ -273,11 +273,14 @@ def test_readme_commands_are_make_targets():
         assert used, page
 
 
-def test_readme_links_lead_somewhere():
+def test_the_readme_reads_alone_and_names_files_that_exist():
+    """Where a package index shows it, relative links lead nowhere: it names files, and its only relative address is the picture's."""
     page = (ROOT / "README.md").read_text()
-    links = [link for link in re.findall(r"\]\(([^)#]+)\)", page) if "://" not in link]
-    assert links
-    assert [link for link in links if not (ROOT / link).exists()] == []
+    relative = [link for link in re.findall(r"\]\(([^)]+)\)", page) if "://" not in link]
+    assert relative == ["docs/images/forced_response.png"]
+    named = [*relative, *re.findall(r"`((?:docs|examples|evidence)(?:/[\w./-]*)?)`", page)]
+    assert len(named) > 20
+    assert [name for name in named if not (ROOT / name).exists()] == []
 
 
 def test_no_tracked_file_knows_this_machine():
