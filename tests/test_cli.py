@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import xarray as xr
@@ -24,7 +25,8 @@ from stickslip.api.study import Study
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.model import blas_threads
-from stickslip.study.file.example import example_text
+from stickslip.study.check import SECTIONS
+from stickslip.study.file.example import Kind, example_text
 from stickslip.study.store import threads
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import Interrupted
@@ -139,7 +141,7 @@ def test_commands_of_before_are_analyses_now(command: str) -> None:
     assert f"No such command '{command}'" in refused(command, "study.toml")
 
 
-@pytest.mark.parametrize("kind", ["blades", "sector", "wheel", "file", "masses"])
+@pytest.mark.parametrize("kind", get_args(Kind))
 def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
     said = done("new", str(tmp_path / "made"), "--kind", kind)
     path = tmp_path / "made" / "study.toml"
@@ -149,6 +151,45 @@ def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
         assert "part.blade.file: there is no file" in refused("check", str(path))
     else:
         assert Study.from_file(path).content.asked
+
+
+# the other kinds are examples of the repository, which tests/test_journeys.py or others go through
+@pytest.mark.parametrize("kind", ["own_blades", "damper", "wheel", "mistuned"])
+def test_check_passes_what_new_writes(tmp_path: Path, kind: str) -> None:
+    done("new", str(tmp_path / "made"), "--kind", kind)
+    said = done("check", str(tmp_path / "made" / "study.toml"))
+    assert said.splitlines()[0].startswith("checking ")
+    assert f"{tmp_path / 'made' / 'study.toml'}: good to run" in said
+    places = [said.index(f"\n{heading}:") for heading in SECTIONS.values() if heading in said]
+    assert places == sorted(places)
+    assert len(places) >= 3
+    rigid_damper = kind in ("own_blades", "damper")
+    assert ("damper: left can slip to and fro" in said) == rigid_damper
+    assert ("of at most 0." in said) == rigid_damper
+
+
+def test_new_overwrites_no_deck(tmp_path: Path) -> None:
+    (tmp_path / "two").mkdir()
+    deck = tmp_path / "two" / "blade.inp"
+    deck.write_text("mine")
+    assert f"{deck}: exists already" in refused("new", str(tmp_path / "two"), "--kind", "own_blades")
+    assert deck.read_text() == "mine"
+    assert not (tmp_path / "two" / "study.toml").exists()
+
+
+def test_check_doubts_units(tmp_path: Path) -> None:
+    """Frequencies 1000 times off the range, a contact that gives way by a millimetre, and a damper as heavy as its blades."""
+    far = write_four_masses(tmp_path / "far", {"forced_response.frequency_hz": "[8000.0, 16000.0]"})
+    said = done("check", str(far))
+    assert "the nearest natural frequency, " in said
+    assert "times below the range. Check the units: lengths in mm" in said
+    soft = write_two_blades(
+        tmp_path / "soft", {"contact.flat.normal_stiffness_n_per_m": "5e4", "part.damper.mass_kg": "3.0"}
+    )
+    said = done("check", str(soft))
+    assert re.search(r"at rest contact flat is pressed together by \d+(\.\d+)? mm", said)
+    assert re.search(r"damper weighs 3 kg beside [\d.]+ kg of all other parts", said)
+    assert "3 doubtful" in said or "2 doubtful" in said
 
 
 def test_new_writes_the_example_and_overwrites_nothing(tmp_path: Path) -> None:

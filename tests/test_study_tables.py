@@ -21,7 +21,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector, Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.analysis import named
-from stickslip.study.file.example import Kind, example_text
+from stickslip.study.file.example import Kind, example_decks, example_text
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.contacts import ContactTable, keys_of
 from stickslip.study.file.quantities import build, table_of
@@ -142,10 +142,31 @@ def test_a_list_holds_something_unless_nothing_has_a_meaning():
     assert found == MAY_BE_EMPTY
 
 
+def _chosen(folder, k):
+    """Return the shape of the damper of the kind `damper` when its choice `k` is the one that is not commented out."""
+    before, *dampers = re.split(r"(?=^(?:# )?\[part\.damper\])", example_text("damper"), flags=re.MULTILINE)
+    last, after = dampers[-1].split("\n\n", 1)
+    dampers[-1] = last
+    path = folder / f"damper{k}.toml"
+    path.write_text(
+        before + re.sub(r"^# (?=\[|\w+ = )", "", dampers[k], flags=re.MULTILINE) + "\n\n" + after, encoding="utf-8"
+    )
+    return read_study(path).tables.part["damper"].shape
+
+
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
     folders = {"blades": "two_blades", "sector": "shrouded_sector", "wheel": "friction_ring", "masses": "four_masses"}
-    if kind in folders:
+    same = {"own_blades": "own_blades", "mistuned": "mistuned_wheel"}  # with choices, which are comments
+    if kind in same:
+        written = EXAMPLES / same[kind]
+        assert tomllib.loads(example_text(kind)) == tomllib.loads((written / "study.toml").read_text(encoding="utf-8"))
+        for name, content in example_decks(kind).items():
+            assert content == (written / name).read_bytes()
+    elif kind == "damper":
+        assert _chosen(tmp_path, 0) == "wedge"
+        assert _chosen(tmp_path, 1) == "cylinder"
+    elif kind in folders:
         written = (EXAMPLES / folders[kind] / "study.toml").read_text(encoding="utf-8")
         own, head = example_text(kind), written.partition("[vary]")[0]
         assert own == written if kind != "wheel" else own.startswith(f"{head}[vary]")

@@ -34,12 +34,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
-Kind = Literal["blades", "sector", "wheel", "file", "masses"]
+Kind = Literal["blades", "damper", "own_blades", "sector", "wheel", "mistuned", "file", "masses"]
 StudyKind = Annotated[
     Kind,
     typer.Option(
         "--kind",
-        help="blades (two blades and a damper), sector (a meshed bladed disk with shrouds), wheel (a blisk of masses with a friction ring, by nodal diameters), file (your finite-element model) or masses (four masses on springs, the smallest study).",
+        help="blades (two blades and a damper), damper (the same, with other dampers to choose), own_blades (blades from a deck, which is "
+        "written beside it), sector (a meshed bladed disk with shrouds), wheel (a blisk of masses with a friction ring, by nodal diameters), "
+        "mistuned (a wheel of unlike blades), file (your finite-element model) or masses (four masses on springs, the smallest study).",
     ),
 ]
 OtherMachines = Annotated[
@@ -139,16 +141,19 @@ def check(study: StudyFile) -> None:
 def new(name: Annotated[Path, typer.Argument(help="A folder to make.")], *, kind: StudyKind = "blades") -> None:
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
-        from stickslip.study.file.example import example_text
+        from stickslip.study.file.example import example_decks, example_text
         from stickslip.study.store.atomic_write import unwritable, write_whole
 
-        target = name / "study.toml"
-        if os.path.lexists(target):
-            raise input_error(str(target), "exists already", "Give another name: nothing is overwritten.")
+        target, decks = name / "study.toml", example_decks(kind)
+        for place in (target, *(name / deck for deck in decks)):
+            if os.path.lexists(place):
+                raise input_error(str(place), "exists already", "Give another name: nothing is overwritten.")
         try:
             name.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise unwritable(target, error) from None
+        for deck, content in decks.items():
+            write_whole(name / deck, content)
         write_whole(target, example_text(kind).encode())
         step = "name your model's file in it, then " if kind == "file" else ""
         typer.echo(f"{target} written. Next: {step}stickslip check {target}")

@@ -17,7 +17,7 @@ from stickslip.response.system import System
 
 CONE_RAYS = 8  # of a friction cone, of which four lie along t and w
 NO_SLIP = 0.999  # share of the friction coefficient below which a flank does not slip
-ANGLES_DEG = np.arange(3.0, 88.0, 6.0)  # between a flank and the pull
+ANGLES_DEG = np.arange(3.0, 88.0, 6.0)  # inclinations of a flank, from square to the pull to along it
 ANGLE_TOLERANCE_DEG = 0.25  # of the ends of a range of angles
 FLAT = 0.05  # rad between the normals of a flank's points above which it is no plane
 
@@ -94,7 +94,7 @@ class FlankLimits:
     most
         Largest T/N in both senses along t, in static equilibrium.
     angle_deg
-        Angle between the flank and the pull, degrees; NaN for a flank that is no plane.
+        Inclination of the flank, degrees: 0 where it is square to the pull, 90 along the pull; NaN for a flank that is no plane.
     held_deg
         Ranges of this angle in which the flank cannot slip to and fro, with the other flanks as they are.
     """
@@ -235,15 +235,15 @@ def _rays(flanks: tuple[Flank, ...], k: int) -> tuple[FloatArray, FloatArray, Fl
 
 
 def _held_angles(flanks: tuple[Flank, ...], k: int, pull: FloatArray) -> tuple[float, tuple[tuple[float, float], ...]]:
-    """Return the angle between flank `k` and the pull, and the ranges of it in which the flank cannot slip, degrees."""
+    """Return the inclination of flank `k`, and the ranges of it in which the flank cannot slip, degrees."""
     flank, along = flanks[k], pull[:3] / np.linalg.norm(pull[:3])
     axis, normal = flank.directions[:, 1].mean(axis=0), flank.directions[:, 2].mean(axis=0)
     axis = axis / np.linalg.norm(axis)
-    sine = float(normal @ along) / np.linalg.norm(normal)
-    own = float(np.degrees(np.arcsin(np.clip(abs(sine), 0.0, 1.0))))
-    # turning by a small angle tells in which sense the flank comes away from the pull
+    cosine = float(normal @ along) / np.linalg.norm(normal)
+    own = float(np.degrees(np.arccos(np.clip(abs(cosine), 0.0, 1.0))))
+    # turning by a small angle tells in which sense the flank becomes steeper
     turned = flank.turned(1e-3, axis).directions[:, 2].mean(axis=0)
-    sense = 1.0 if abs(float(turned @ along)) > abs(sine) else -1.0
+    sense = 1.0 if abs(float(turned @ along)) / np.linalg.norm(turned) < abs(cosine) else -1.0
 
     def held(angle: float) -> bool:
         other = flank.turned(sense * np.radians(angle - own), axis)

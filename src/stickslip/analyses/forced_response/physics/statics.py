@@ -50,7 +50,7 @@ def angle_sentence(limits: FlankLimits) -> str:
     """Return the platform angles at which a flank could not slip; empty for a flank that is no plane."""
     if not np.isfinite(limits.angle_deg):
         return ""
-    own = f"{limits.flank.name} stands at {limits.angle_deg:.0f} degrees to the pull"
+    own = f"{limits.flank.name} is inclined by {limits.angle_deg:.0f} degrees (0: square to the pull)"
     ranges = [_range(low, high) for low, high in limits.held_deg]
     return f"{own}; it cannot slip {' and '.join(ranges)}" if ranges else f"{own}; no angle keeps it from slipping"
 
