@@ -130,7 +130,7 @@ def test_a_range_without_width_is_told_as_such(tmp_path: Path) -> None:
     [
         ("pyyeti", "pyyeti", r"pyyeti is not installed. Use pip install 'stickslip\[readers\]'"),
         ("pyyeti", "matplotlib.pyplot", r"pyyeti: is installed, but it imports matplotlib, which"),
-        ("scikit-fem", "skfem", r"scikit-fem: not installed"),
+        ("scikit-fem", "skfem", r"scikit-fem is not installed"),
     ],
 )
 def test_a_package_that_lacks_another_is_not_called_missing(package, lacking, said):

@@ -316,7 +316,7 @@ def test_harmonics_that_were_raised_along_the_branch_are_told_as_such() -> None:
     text = page_text(html_of(data))
     assert "Harmonics are raised along the branch, from H = 1 up to 5" in text
     assert "3.5 %; 1.2 %" in text
-    assert "predicts of each accepted solution's own harmonics" in text
+    assert "predicts for the harmonics of each accepted solution" in text
     assert "first solved with" not in text
     assert "were asked to repeat" not in text
     view = Response(data)
@@ -472,7 +472,7 @@ def test_the_smallest_peak_is_one_of_resonance() -> None:
     assert card.note.endswith("; of 1 other the largest amplitude stands at the end of the sweep")
     plot = optimisation(Response(data))
     assert plot is not None
-    assert f"which is no resonance: {view.cases[least].label}." in plot.caption
+    assert f"At {view.cases[least].label} the largest amplitude stands at the end of the sweep, which is no resonance." in plot.caption
 
 
 def test_the_panels_of_harmonics_end_at_the_highest_that_is_kept() -> None:

@@ -20,10 +20,7 @@ from stickslip.units import HZ
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _READING = "The curve gives the damping ratio of the motion at each amplitude. Below zero the motion grows, above zero it decays. Where the curve crosses zero the motion is a limit cycle. Upward crossings attract motions of the same wave. Downward crossings repel them, and friction cannot bound the motion beyond."
-_JOINED = (
-    "Straight lines join the amplitudes that were looked at and the limit cycles, which lie between these and have harmonics enough of "
-    "their own."
-)
+_JOINED = "Straight lines join the amplitudes computed and the limit cycles between them. Limit cycles have as many harmonics as they need."
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +104,7 @@ def waves_in_time(view: Cycles) -> Plot | None:
     styled(figure, 420)
     figure.update_xaxes(title_text="time (s)")
     figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
-    caption = (
-        "All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave, or its mode where slip begins if none was "
-        f"found: **{view.found.outcome}**. Waves are told apart by the motion of all sectors at "
-        "one time and by the direction in which they turn; another start may end elsewhere."
-    )
+    caption = f"Outcome of all sectors in time: **{view.found.outcome}**. The start mixes 30 % of the limit cycle of each unstable wave, or of its mode at the onset of slip. Waves are separated by the motion of all sectors at one time and by their direction. Another start may end elsewhere."
     return Plot(f"competing_waves{view.key}", "Competing waves in time", caption, figure)
 
 
@@ -119,7 +112,7 @@ def cycle_table(view: Cycles) -> Table | Words:
     """Return a table of limit cycles, and of modes without any."""
     found = view.found
     if not found.branches:
-        told = f"No mode that was looked at grows with contacts stuck: the least damping ratio is {number(100 * found.least_damping)} %."
+        told = f"No mode computed grows with contacts stuck; the least damping ratio is {number(100 * found.least_damping)} %."
         return Words((told,))
     head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]
     lines = [_row(branch, cycle) for branch, cycle in found.cycles]

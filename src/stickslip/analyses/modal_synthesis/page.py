@@ -124,7 +124,7 @@ def responses(view: Synthesised) -> Plot | None:
         title_text=f"amplitude of {found.output} ({scale.unit})",
         **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]),
     )
-    caption = "Each curve is the response at a level of the loads, from the nonlinear mode, the other modes added as linear ones. A dot (trusted) or a diamond (doubtful) marks the peak of each level. Curves are thin and dashed where contacts slip and the other modes exceed 5 % of the mode, or change the amplitude by more; they may be far off there. Dotted curves are unstable in the mode's own amplitude and phase."
+    caption = "Each curve is the response at a level of the loads: the nonlinear mode, with the other modes added as linear ones. A dot (trusted) or a diamond (doubtful) marks the peak of each level. Curves are thin and dashed where contacts slip and the other modes exceed 5 % of the mode, or change the amplitude by more; they may be far off there. Dotted curves are unstable in the mode's own amplitude and phase."
     caption += f" Rings are solved directly.{_along(view)}" if direct else ""
     left = view.answered("refused", "beyond")
     caption += f" {counted(len(left), 'level')} not shown: see the table." if left else ""
@@ -158,7 +158,7 @@ def _along(view: Synthesised) -> str:
     error, worst = max(known, key=lambda found: found[0])
     hertz = np.nan if worst.along_error_omega is None else worst.along_error_omega / HZ
     return (
-        f" Where the lines around the peaks are full they differ from them by up to {_share(error)}, at level "
+        f" Full lines differ from them around the peaks by up to {_share(error)}, at level "
         f"{number(worst.level)} and {number(hertz, 5)} Hz."
     )
 
@@ -208,7 +208,7 @@ def peaks(view: Synthesised) -> Plot | None:
     styled(figure, 420)
     figure.update_xaxes(type="log", title_text="level of the loads", **log_ticks(level[known]))
     figure.update_yaxes(title_text=f"peak per level ({scale.unit})", rangemode="tozero")
-    caption = "Peak of the mode over the level of the harmonic loads, divided by it: horizontal where nothing slips."
+    caption = "Peak of the mode divided by the level of the harmonic loads. It is horizontal where nothing slips."
     if view.found.homogeneous:
         caption += (
             " All contact laws here are homogeneous, so that this is also the optimisation curve of the static loads: with static loads s times as large "
@@ -238,7 +238,7 @@ def passages(view: Synthesised) -> Plot | None:
     styled(figure, 500)
     figure.update_xaxes(title_text="frequency of the loads (Hz)")
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", rangemode="tozero")
-    caption = "The frequency runs through the resonance at a constant rate, from the steady motion at its beginning: the slowly varying amplitude of the nonlinear mode."
+    caption = "The figure shows the slowly varying amplitude of the nonlinear mode. The frequency runs through the resonance at a constant rate, beginning with the steady motion."
     return Plot(f"modal_synthesis_passage{view.key}", "Passage through resonance", caption, figure)
 
 

@@ -166,10 +166,7 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
         last = max(i for i, row in enumerate(rows) if j < len(row))
         figure.update_xaxes(title_text="relative displacement (µm)", row=last + 1, col=j + 1)
     drawn = sum(map(len, rows))
-    caption = (
-        f"Tangential force on the contact points against their relative displacement along {direction}, one panel a "
-        "point; axes differ between panels. The area of a loop is the energy lost in a cycle."
-    )
+    caption = f"Tangential force on the contact points against their relative displacement along {direction}, in one panel a point. Axes differ between panels. The area of a loop is the energy lost in a cycle."
     if drawn < len(names):
         caption += (
             f" {drawn} of {len(names)} points are drawn: the points with a force along {direction} that dissipate most."
@@ -258,7 +255,7 @@ def state_map(response: Response) -> Plot | None:
     legend_above(figure)
     figure.update_xaxes(title_text="time / period", range=[0, 1], showgrid=False)
     figure.update_yaxes(autorange="reversed", showgrid=False, ticks="", tickfont={"size": 12})
-    caption = "Each row is a contact point in one tangential direction; read from left to right through one cycle."
+    caption = "Each row is a contact point in one tangential direction, through one cycle from left to right."
     captions = {c.index: _state_caption(response, c, rows) for c in cases}
     title = "Contact states over one period at the peak"
     return Plot("states", title, caption, figure, captions, response.chosen)

@@ -50,20 +50,16 @@ def _caption(response: Response) -> str:
     asked, error = response.alert, response.alert.error
     above, real = error > response.threshold, np.isfinite(response.of_points.real_error_percent)
     if response.auto:
-        text = (
-            f"The error that `{response.selection}` predicts of each accepted solution's own harmonics; the dashed line "
-            f"is the threshold of {percent(response.threshold)}. {_above(response)}"
-        )
+        text = f"The error that `{response.selection}` predicts for the harmonics of each accepted solution. The dashed line is the threshold of {percent(response.threshold)}. {_above(response)}"
     elif response.is_error:
         text = (
-            f"The error that `{response.selection}` predicts of the solution with few harmonics "
-            f"(H = {response.low_name} at least); the dashed line is the threshold of {percent(response.threshold)}. "
+            f"The error that `{response.selection}` predicts for the solution with few harmonics (H = {response.low_name} at least). The dashed line is the threshold of {percent(response.threshold)}. "
             f"{int(above.sum())} of {counted(error.size, 'checked point')} lie above it and were asked to repeat with more. "
         )
     else:
         text = (
             f"What `{response.selection}` compares with its threshold of {response.shown(response.threshold)} "
-            "(dashed) at the accepted solution of each frequency: no error, and not to be compared with the indicators of others. "
+            "(dashed) at the accepted solution of each frequency: it is no error, and indicators of other strategies cannot be compared with it. "
         )
     worst = int(np.argmax(error))
     where = response.cases[asked.case[worst]].where
@@ -92,7 +88,7 @@ def _above(response: Response) -> str:
     told = f"Above it: {counted(int(above.sum()), 'point')}"
     if solved.any():
         most = response.shown(float(audit[solved].max()))
-        told += f", {int(solved.sum())} of them solved again with more harmonics, which overrules the prediction: the difference is {most} at most"
+        told += f", {int(solved.sum())} of them solved again with more harmonics, which overrules the prediction; the difference is {most} at most"
     bad = int(doubtful.sum())
     return f"{told}. {bad or 'None'} of them {'are' if bad > 1 else 'is'} doubtful or wrong. "
 

@@ -87,8 +87,7 @@ def _lost(response: Response, at: IntArray, highest: int) -> go.Scatter:
 def _caption(response: Response, cases: list[ShownCase]) -> str:
     good = response.converged
     text = (
-        f"A mark stands for a harmonic that the accepted solution keeps, chosen by `{response.selection}`; the "
-        f"static term is always kept. {int(np.sum(response.more & good))} of {counted(int(good.sum()), 'accepted point')} "
+        f"A mark stands for a harmonic of the accepted solution, chosen by `{response.selection}`. The static term is always kept. {int(np.sum(response.more & good))} of {counted(int(good.sum()), 'accepted point')} "
         f"keep other harmonics than H = {response.low_name}"
     )
     used = np.flatnonzero(response.kept[good].any(axis=0)) if good.any() else np.zeros(0, dtype=int)
@@ -171,10 +170,7 @@ def choice(response: Response) -> list[Table | Words]:
     return [found, Words((said,), folded="As the run put it")] if said else [found]
 
 
-_REASON = (
-    "A contact that slips or lifts off makes forces at multiples of the excitation frequency, which a solution with few "
-    "harmonics cannot see."
-)
+_REASON = "A contact that slips or lifts off makes forces at multiples of the excitation frequency. A solution with few harmonics misses them."
 
 
 def _alert_text(response: Response) -> str:
@@ -207,9 +203,8 @@ def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
 
 def _other_text(response: Response) -> str:
     return (
-        f"`{response.selection}` chooses among the harmonics of H = {response.high_name}, never fewer than "
-        f"H = {response.low_name}, one frequency after the other: it compares an indicator of its own, which is no error, with "
-        f"{response.shown(response.threshold)}. How good the solution is, it does not say; `--verify-harmonics` does. "
+        f"`{response.selection}` chooses among the harmonics of H = {response.high_name}, never fewer than H = {response.low_name}, one frequency after the other. It compares an indicator of its own, which is no error, with "
+        f"{response.shown(response.threshold)}. It does not say how good the solution is; `--verify-harmonics` does. "
         f"{_REASON}"
     )
 
@@ -263,10 +258,7 @@ def attempts(response: Response) -> Table | None:
                 + [fixed(total, digits) for total, digits in zip(sums, (0, 0, 2), strict=True)]
             )
     head = ["H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
-    text = (
-        "By case and harmonics, those solutions included in whose place others were "
-        "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine."
-    )
+    text = "The table counts all solutions by case and harmonics, also the solutions that others replaced. The unknowns of all solutions compare the work of strategies on any machine."
     return response.table("Everything that was solved", (text,), head, rows)
 
 
@@ -285,9 +277,6 @@ def more_harmonics(response: Response) -> Table | None:
         for c, own in found
     ]
     head = ["largest predicted change", "at (Hz)", "points above the threshold"]
-    text = (
-        f"What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
-        "points: the change of the complex amplitude, phase included, over its size."
-    )
+    text = f"Predicted change of the accepted points with twice as many harmonics as {response.high_name}, relative to the complex amplitude, phase included."
     items = response.sentences((c, own.reference_sentence) for c, own in found)
     return response.table("More harmonics", (text,), head, rows, items=items)

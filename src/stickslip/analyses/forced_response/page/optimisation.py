@@ -223,7 +223,7 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
         text += "No value beyond it was computed: the optimum may lie there. "
     if not all(within):
         ends = joined([c.label for c, inside in zip(cases, within, strict=True) if not inside])
-        text += f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
+        text += f"At {ends} the largest amplitude stands at the end of the sweep, which is no resonance. "
     known = [k for k, inside in enumerate(within) if inside]
     if len(known) < 2:
         return text

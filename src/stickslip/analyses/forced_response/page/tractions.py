@@ -68,7 +68,7 @@ def draw_bands(figure: go.Figure, response: Response) -> str:
         drawn = True
     if not drawn:
         return " Residual tractions leave it as it is: the bounds are equal."
-    return f" Band: what residual tractions leave open, with H = {_harmonics(response)}."
+    return f" The band shows the motions that residual tractions allow, with H = {_harmonics(response)}."
 
 
 def _faint(colour: str) -> str:
@@ -109,4 +109,4 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
         x=x, y=most, fill="tonexty", fillcolor="rgba(0,114,178,0.25)", name="residual tractions", row=1, col=1, **shared
     )
     width = 100 * (bounds[known, 2] / bounds[known, 1] - 1)
-    return f" Band: the peak over all residual tractions, up to {percent(float(width.max()))} wide."
+    return f" The band shows the peak over all residual tractions, up to {percent(float(width.max()))} wide."

@@ -72,7 +72,7 @@ def blades(response: Response) -> Plot | None:
     legend_above(figure)
     figure.update_xaxes(title_text=f"{name} ({unit})")
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **log_ticks(size * scale.factor))
-    text = f"Amplitude of every blade ({count} of them), the largest one at each frequency, and the wheel with all sectors alike."
+    text = f"The curves show the amplitude of every blade ({count} blades), the largest one at each frequency, and the wheel with all sectors alike."
     return Plot("blades", "Every blade of the wheel", text, figure, said, response.chosen)
 
 
@@ -148,7 +148,7 @@ def peaks_of_blades(response: Response) -> Plot | None:
         unit = "µm" if name.endswith(GAP) else "%"
         figure.update_yaxes(title_text=f"{name.removesuffix(', ' + GAP)} ({unit})", row=2 + k)
     figure.update_xaxes(title_text="blade", row=rows)
-    text = "Largest amplitude of each blade at any frequency" + (", and what it deviates by." if names else ".")
+    text = "Largest amplitude of each blade at any frequency" + (", and its deviation." if names else ".")
     said = {c.index: _amplified(response, c) for c in response.peaked}
     return Plot("blade_peaks", "Peak of each blade", text, figure, said, response.chosen)
 

@@ -163,10 +163,7 @@ class _Search:
         ends = (self.found[a], self.found[b])
         larger = max(ends, key=lambda e: e.multiplier)
         low, high = sorted(e.omega / HZ for e in ends)
-        said = (
-            f"carried along between {low:.3f} and {high:.3f} Hz: at both ends all multipliers are below {CARRIED:g}, none of them moves so far "
-            "between them that it may pass the unit circle, the transitions in the cycle are the same and the branch does not turn"
-        )
+        said = f"stable by its neighbours at {low:.3f} and {high:.3f} Hz: their multipliers are below {CARRIED:g} and move too little to pass the unit circle, the transitions in the cycle are the same, and the branch does not turn"
         return Examined(
             self._omega(place),
             "stable",
