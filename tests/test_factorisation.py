@@ -123,7 +123,7 @@ def test_without_the_package_superlu_does_it(monkeypatch):
 
 @pytest.mark.skipif(find_spec("feral") is not None, reason="feral is installed")
 def test_the_extra_is_named_where_the_package_is_absent():
-    with pytest.raises(StickslipError, match=r"feral-solver: not installed.*stickslip\[sparse\]"):
+    with pytest.raises(StickslipError, match=r"feral-solver is not installed.*stickslip\[sparse\]"):
         factorise(laplacian((23, 22), 0.3), backend="feral")
 
 

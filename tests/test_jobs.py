@@ -309,7 +309,7 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("stickslip.study.store.workers.find_spec", lambda _name: None)
     with pytest.raises(StickslipError, match=r"distributed is not installed\. Use pip install 'stickslip\[cluster\]'"):
         run_study(study, kind="dask=tcp://127.0.0.1:1")
-    with pytest.raises(StickslipError, match="executorlib: not installed"):
+    with pytest.raises(StickslipError, match="executorlib is not installed"):
         run_study(study, kind="slurm")
     with pytest.raises(InputError, match="would remove what other shards have found"):
         run_study(study, shard=Shard(1, 2), fresh=True)

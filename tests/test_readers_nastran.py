@@ -485,5 +485,5 @@ def test_missing_package_is_named(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / "a.op4").write_text("       1       1       6       2M\n")
     (tmp_path / "a.bdf").write_text("GRID,1,,0.,0.,0.\n")
-    with pytest.raises(StickslipError, match=r"pyyeti: not installed.*stickslip\[readers\]"):
+    with pytest.raises(StickslipError, match=r"pyyeti is not installed.*stickslip\[readers\]"):
         read_nastran_op4(tmp_path / "a.op4", mass="m", stiffness="m", geometry=tmp_path / "a.bdf", dof_set="g")

@@ -472,7 +472,10 @@ def test_the_smallest_peak_is_one_of_resonance() -> None:
     assert card.note.endswith("; of 1 other the largest amplitude stands at the end of the sweep")
     plot = optimisation(Response(data))
     assert plot is not None
-    assert f"At {view.cases[least].label} the largest amplitude stands at the end of the sweep, which is no resonance." in plot.caption
+    assert (
+        f"At {view.cases[least].label} the largest amplitude stands at the end of the sweep, which is no resonance."
+        in plot.caption
+    )
 
 
 def test_the_panels_of_harmonics_end_at_the_highest_that_is_kept() -> None:

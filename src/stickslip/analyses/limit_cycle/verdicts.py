@@ -20,7 +20,9 @@ def case_verdicts(label: str, found: LimitCycles) -> list[Verdict]:
     if found.linear_damping_ratio is None:
         return []
     if not found.branches:
-        why = f"no mode computed grows with contacts stuck; the least damping ratio is {100 * found.least_damping:.3g} %"
+        why = (
+            f"no mode computed grows with contacts stuck; the least damping ratio is {100 * found.least_damping:.3g} %"
+        )
         return [Verdict("trusted", label, None, why, "There is no limit cycle that begins with a linear instability.")]
     verdicts = _not_followed(label, found)
     for branch in found.branches:
