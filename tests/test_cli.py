@@ -168,6 +168,17 @@ def test_check_passes_what_new_writes(tmp_path: Path, kind: str) -> None:
     assert ("of at most 0." in said) == rigid_damper
 
 
+def test_check_estimates_its_time_before_heavy_libraries_are_imported(tmp_path: Path) -> None:
+    """Numba, xarray and the analyses take seconds to import: the line comes before them."""
+    path = write_two_blades(tmp_path)
+    code = (
+        "import sys; from pathlib import Path; from stickslip.api.reading import read\n"
+        f"read(Path({str(path)!r}), lambda line: print(line, [m for m in ('numba', 'xarray', 'stickslip.study.run') if m in sys.modules]))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert re.fullmatch(r"checking one case: parts of about [\d.e+]+ nodes take some \d+ s \[\]\n", told), told
+
+
 def test_new_overwrites_no_deck(tmp_path: Path) -> None:
     (tmp_path / "two").mkdir()
     deck = tmp_path / "two" / "blade.inp"

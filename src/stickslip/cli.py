@@ -133,7 +133,7 @@ def check(study: StudyFile) -> None:
     """Prepare a study without solving it: read, mesh, reduce, static state, natural frequencies."""
     with _errors_as_text():
         with on_screen(Screen(console())):
-            doubts = read(study).check()
+            doubts = read(study, say).check()
         say(f"{study}: good to run{f', {len(doubts)} doubtful' * bool(doubts)}")
 
 

@@ -1,5 +1,6 @@
 """Reading of study files in steps: errors are reported before heavy libraries are imported."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,8 +8,15 @@ if TYPE_CHECKING:
     from stickslip.api.study import Study
 
 
-def read(path: Path) -> "Study":
+def read(path: Path, tell: Callable[[str], None] | None = None) -> "Study":
     """Read a study file for the command line, and set BLAS to one thread unless the user chose a number.
+
+    Parameters
+    ----------
+    path
+        The study file.
+    tell
+        What is given the line on size and time of a check, before heavy libraries are imported.
 
     Raises
     ------
@@ -26,6 +34,10 @@ def read(path: Path) -> "Study":
     from stickslip.study.models.checks import refuse
 
     refuse(file)
+    if tell is not None:
+        from stickslip.study.models.beforehand import before_check
+
+        tell(before_check(file))
     from stickslip.api.study import Study
     from stickslip.study.models.study import judged
 

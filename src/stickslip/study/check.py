@@ -11,9 +11,6 @@ from stickslip.assembly.joints.unconstrained_bodies import unheld
 from stickslip.assembly.model import Model
 from stickslip.model.slow_steps import step, told_when_slow
 from stickslip.study.analysis import Advice
-from stickslip.study.file.tables import Tables
-from stickslip.study.models.checks import sectors_of
-from stickslip.study.models.cost import SECONDS_A_NODE, SECONDS_A_WAVE, nodes_of_tables
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
 from stickslip.study.store.progress import LOG, tell
@@ -40,7 +37,6 @@ def check_study(study: Study) -> tuple[str, ...]:
     asked = asked_for(study)
     told = Advice()
     alike: list[str] = []
-    LOG.info(_beforehand(study))
     for case in study.cases():
         with told_when_slow(case.label), of_task(study, case):
             with step("building the parts"):
@@ -66,24 +62,6 @@ def check_study(study: Study) -> tuple[str, ...]:
     if alike:
         LOG.info(f"the same holds for: {together(alike)}")
     return told.doubts
-
-
-def _beforehand(study: Study) -> str:
-    """Return the line before anything is read: sizes, from files and element sizes, and the time of the check."""
-    case, count = study.file.cases[0], len(study.file.cases)
-    nodes = nodes_of_tables(case.tables, study.file.home)
-    seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * _waves(case.tables)), 1.0)
-    cases = f"{count} cases" if count > 1 else "one case"
-    return f"checking {cases}: parts of about {max(nodes, 1.0):.2g} nodes take some {seconds:.0f} s"
-
-
-def _waves(tables: Tables) -> int:
-    """Return the number of waves of a wheel that are reduced; 0 for a single structure."""
-    asked, sectors = getattr(tables, "forced_response", None), sectors_of(tables) or 1
-    if sectors == 1:
-        return 0
-    every = asked is not None and (asked.stability != "off" or asked.bifurcations in ("all", "branches"))
-    return sectors // 2 + 1 if every else 1
 
 
 def _as_advice(said: tuple[str, ...] | Advice) -> Advice:

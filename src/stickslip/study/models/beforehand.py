@@ -1,0 +1,25 @@
+"""Size and time of ``stickslip check``, told before anything is read and before heavy libraries are imported."""
+
+from stickslip.study.file.study import StudyFile
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.checks import sectors_of
+from stickslip.study.models.cost import SECONDS_A_NODE, SECONDS_A_WAVE, nodes_of_tables
+
+
+def before_check(file: StudyFile) -> str:
+    """Return the line about the size of the parts, from files and element sizes, and the time that they take on one core."""
+    case, count = file.cases[0], len(file.cases)
+    nodes, waves = nodes_of_tables(case.tables, file.home), _waves(case.tables)
+    seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * (waves or 0)), 1.0)
+    of_waves = f", and {nodes * SECONDS_A_WAVE:.2g} s for each wave of a wheel" if waves is None else ""
+    cases = f"{count} cases" if count > 1 else "one case"
+    return f"checking {cases}: parts of about {max(nodes, 1.0):.2g} nodes take some {seconds:.0f} s{of_waves}"
+
+
+def _waves(tables: Tables) -> int | None:
+    """Return the number of waves of a wheel that are reduced; 0 for a single structure, None if only a file holds the sectors."""
+    asked, sectors = getattr(tables, "forced_response", None), sectors_of(tables)
+    if sectors is None or sectors == 1:
+        return 0 if sectors else None
+    every = asked is not None and (asked.stability != "off" or asked.bifurcations in ("all", "branches"))
+    return sectors // 2 + 1 if every else 1
